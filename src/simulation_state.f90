@@ -21,6 +21,7 @@ module simulation_state
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     integer(int64) :: next_epoch = 0              !! number of events at which the epoch moves
     ! Counts and sums since the start of the run
+    integer(int64) :: events = 0                  !! collisions of any kind
     integer(int64) :: collisions = 0              !! of pairs
     integer(int64) :: wall_collisions(n_sides) = 0      !! left, right, bottom, top
     integer(int64) :: obstacle_collisions = 0
@@ -31,7 +32,6 @@ module simulation_state
   contains
     procedure :: time
     procedure :: n_disks
-    procedure :: events
     procedure :: position
     procedure :: velocity
     procedure :: kinetic_energy
@@ -51,13 +51,6 @@ contains
     integer(int32) :: n
     n = size(self%disk, kind=int32)
   end function n_disks
-
-  !> Collisions of any kind since the start of the run.
-  pure function events(self) result(n)
-    class(simulation_t), intent(in) :: self
-    integer(int64) :: n
-    n = self%collisions + sum(self%wall_collisions) + self%obstacle_collisions
-  end function events
 
   !> Where disk i is now. Looking at a disk never changes it.
   pure function position(self, i) result(x)

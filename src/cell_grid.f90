@@ -1,0 +1,370 @@
+!> Search by cells: the box is cut into cells at least one diameter wide, so that a disk meets only those in
+!> its own cell and the eight around it before it leaves its cell, which is an event like any other.
+!> The cost of a prediction does not depend on the number of disks.
+module cell_grid
+  use kinds, only: int16, int32, never, real64
+  use box_geometry, only: box_t, next_obstacle, obstacle_t, side_time
+  use disks, only: disk_t
+  use free_flight, only: time_to_line
+  use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: cell_grid_t
+
+  integer(int32), parameter :: cell_capacity = 3
+  integer(int32), parameter :: count_slot = cell_capacity + 1
+  integer(int32), parameter :: list_capacity = 64
+  real(real64), parameter :: disks_per_cell = 0.7_real64    !! wanted when dilute
+  real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
+
+  !> The disks in a cell: copied as a whole, 16 bytes. The last slot holds their number; a cell with more
+  !> than `cell_capacity` chains the surplus behind its last disk.
+  type :: cell_t
+    integer(int32) :: slot(count_slot) = 0
+  end type cell_t
+
+  type, extends(neighbour_search_t) :: cell_grid_t
+    private
+    integer(int32) :: n(2) = 0                     !! columns, rows
+    integer(int32) :: stride = 0                   !! from row to row; the grid has a ring of empty cells
+    real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
+    type(cell_t), allocatable :: cell(:)           !! (0:)
+    integer(int32), allocatable :: next(:)         !! (disks) chain of a crowded cell
+    integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
+    integer(int32), allocatable :: obstacle_list(:)    !! obstacles that reach into the cell, ascending
+  contains
+    procedure :: build
+    procedure :: predict
+    procedure :: cross
+    procedure, private :: insert
+    procedure, private :: remove
+    procedure, private :: scan_cells
+    procedure, private :: scan_chains
+    procedure, private :: scan_around_edge
+  end type cell_grid_t
+
+contains
+
+  !> Chooses the cells, sorts the disks into them and finds the obstacles that reach into each.
+  subroutine build(self, sim)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64) :: reach, width, x(2)
+    integer(int32) :: i, n_cells
+    reach = 2*maxval(sim%disk%radius)*(1 + spare_width)
+    width = max(reach, sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()))
+    self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
+    self%stride = self%n(1) + 2
+    self%width = sim%box%edges()/self%n
+    n_cells = self%stride*(self%n(2) + 2)
+    if (allocated(self%cell)) then
+      if (size(self%cell) /= n_cells) deallocate (self%cell)
+    end if
+    if (.not. allocated(self%cell)) allocate (self%cell(0:n_cells - 1))
+    if (.not. allocated(self%next)) allocate (self%next(sim%n_disks()))
+    do i = 0, n_cells - 1
+      self%cell(i)%slot = 0
+    end do
+    do i = 1, sim%n_disks()
+      x = (sim%position(i) - sim%box%lower)/self%width
+      sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
+      call self%insert(cell_number(self, sim%tag(i)%cell), i)
+    end do
+    if (allocated(sim%box%obstacle)) then
+      if (size(sim%box%obstacle) > 0) call list_obstacles(self, sim%box, maxval(sim%disk%radius))
+    end if
+  end subroutine build
+
+  !> Which obstacles a disk of at most `radius` can touch with its centre in each cell.
+  subroutine list_obstacles(self, box, radius)
+    class(cell_grid_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius
+    integer(int32) :: ix, iy, m, c, n
+    integer :: pass
+    allocate (self%obstacle_list(0))
+    do pass = 1, 2                                 ! count, then fill
+      if (pass == 2) then
+        deallocate (self%obstacle_list)
+        allocate (self%obstacle_list(n))
+      else
+        if (allocated(self%obstacle_start)) deallocate (self%obstacle_start)
+        allocate (self%obstacle_start(0:size(self%cell)))
+      end if
+      n = 0
+      do c = 0, size(self%cell, kind=int32) - 1
+        self%obstacle_start(c) = n + 1
+        ix = modulo(c, self%stride)
+        iy = c/self%stride
+        do m = 1, size(box%obstacle, kind=int32)
+          if (.not. in_reach(self, box, box%obstacle(m), radius, ix, iy)) cycle
+          n = n + 1
+          if (pass == 2) self%obstacle_list(n) = m
+        end do
+      end do
+      self%obstacle_start(size(self%cell)) = n + 1
+    end do
+  end subroutine list_obstacles
+
+  !> Whether a disk whose centre is in the cell can touch the obstacle.
+  pure function in_reach(self, box, obstacle, radius, ix, iy) result(yes)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    type(obstacle_t), intent(in) :: obstacle
+    real(real64), intent(in) :: radius
+    integer(int32), intent(in) :: ix, iy
+    logical :: yes
+    real(real64) :: middle(2), half(2), gap(2), far(2), spare
+    middle = box%lower + ([ix, iy] - 0.5_real64)*self%width - obstacle%centre
+    half = 0.5_real64*self%width
+    spare = 1 + spare_width
+    gap = max(abs(middle) - half*spare, 0.0_real64)
+    far = abs(middle) + half*spare
+    if (obstacle%inside) then
+      yes = norm2(far) >= (obstacle%radius - radius)/spare
+    else
+      yes = norm2(gap) <= (obstacle%radius + radius)*spare
+    end if
+  end function in_reach
+
+  !> Number of the cell in column cell(1) and row cell(2), both from 1.
+  pure function cell_number(self, cell) result(c)
+    class(cell_grid_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    integer(int32) :: c
+    c = cell(1) + self%stride*cell(2)
+  end function cell_number
+
+  !> Puts disk i into cell c.
+  pure subroutine insert(self, c, i)
+    class(cell_grid_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, i
+    integer(int32) :: n
+    n = self%cell(c)%slot(count_slot)
+    if (n < cell_capacity) then
+      self%next(i) = 0
+      self%cell(c)%slot(n + 1) = i
+    else
+      self%next(i) = self%cell(c)%slot(cell_capacity)
+      self%cell(c)%slot(cell_capacity) = i
+    end if
+    self%cell(c)%slot(count_slot) = n + 1
+  end subroutine insert
+
+  !> Takes disk i out of cell c.
+  pure subroutine remove(self, c, i)
+    class(cell_grid_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, i
+    integer(int32) :: n, k, chained
+    n = self%cell(c)%slot(count_slot)
+    do k = 1, min(n, cell_capacity)
+      if (self%cell(c)%slot(k) == i) exit
+    end do
+    if (n <= cell_capacity) then
+      self%cell(c)%slot(k) = self%cell(c)%slot(n)
+    else
+      chained = self%cell(c)%slot(cell_capacity)
+      if (k <= cell_capacity) then                 ! the head of the chain takes the free place
+        self%cell(c)%slot(k) = chained
+        self%cell(c)%slot(cell_capacity) = self%next(chained)
+        self%next(chained) = 0
+      else
+        do while (self%next(chained) /= i)
+          chained = self%next(chained)
+        end do
+        self%next(chained) = self%next(i)
+      end if
+    end if
+    self%cell(c)%slot(count_slot) = n - 1
+  end subroutine remove
+
+  !> Moves disk i into the cell beyond the face; over a periodic side into the first one behind it.
+  subroutine cross(self, sim, i, code)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code
+    integer(int32) :: face, axis, there
+    face = -merge(code - first_crossing, code, code <= first_crossing)
+    axis = 1 + face/2
+    call self%remove(cell_number(self, sim%tag(i)%cell), i)
+    there = sim%tag(i)%cell(axis) + 2*modulo(face, 2) - 1
+    if (there < 1) there = self%n(axis)
+    if (there > self%n(axis)) there = 1
+    sim%tag(i)%cell(axis) = int(there, int16)
+    call self%insert(cell_number(self, sim%tag(i)%cell), i)
+  end subroutine cross
+
+  !> The earliest of: side or cell face, obstacle, disk in the cells around.
+  subroutine predict(self, sim, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64) :: t, t_y
+    integer(int32) :: code, code_y, c
+    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 1, t, code)
+    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 2, t_y, code_y)
+    code = merge(code, code_y, t <= t_y)
+    t = min(t, t_y)
+    c = cell_number(self, sim%tag(i)%cell)
+    if (allocated(self%obstacle_list)) call next_obstacle(sim%box, sim%disk(i), &
+      self%obstacle_list(self%obstacle_start(c):self%obstacle_start(c + 1) - 1), t, code)
+    if (at_periodic_edge(self, sim%box, sim%tag(i)%cell)) then
+      call self%scan_around_edge(sim, i, t, code)
+    else
+      call self%scan_cells(sim%disk, i, c, sim%box%gravity, t, code)
+    end if
+    sim%disk(i)%event_time = t
+    sim%disk(i)%partner = code
+    if (code > 0) sim%tag(i)%partner_stamp = sim%disk(code)%stamp
+  end subroutine predict
+
+  !> When and through which face the disk leaves its cell along one axis, or meets the side within it.
+  pure subroutine next_face(self, box, disk, cell, now, axis, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(in) :: now
+    integer, intent(in) :: axis
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: face, side, target, inset
+    logical :: up, at_side
+    if (abs(box%gravity(axis)) > 0) then
+      call next_face_falling(self, box, disk, cell, now, axis, t, code)
+      return
+    end if
+    up = disk%v(axis) > 0
+    inset = merge(0.0_real64, disk%radius, box%periodic(axis))
+    face = box%lower(axis) + self%width(axis)*(cell(axis) - merge(0, 1, up))
+    side = merge(box%upper(axis) - inset, box%lower(axis) + inset, up)
+    at_side = merge(face >= side .or. cell(axis) == self%n(axis), face <= side, up)
+    target = merge(side, face, at_side)
+    ! The same numbers as `side_time`: contact with a side is one event, whoever predicts it.
+    t = disk%clock + max(merge(target - disk%x(axis), disk%x(axis) - target, up), 0.0_real64) &
+      /max(abs(disk%v(axis)), tiny(t))
+    t = merge(t, never, abs(disk%v(axis)) > 0)
+    code = merge(0, first_crossing, at_side) - 2*(axis - 1) - merge(1, 0, up)
+  end subroutine next_face
+
+  !> The same on a parabola: each of the two faces can be the one, and the root before `now`, where the disk
+  !> came in, is not.
+  pure subroutine next_face_falling(self, box, disk, cell, now, axis, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(in) :: now
+    integer, intent(in) :: axis
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: face, side, t_k, sense
+    integer(int32) :: k
+    t = never
+    code = -2*(axis - 1)
+    do k = 0, 1
+      sense = 2*k - 1
+      face = box%lower(axis) + self%width(axis)*(cell(axis) - 1 + k)
+      side = merge(box%upper(axis) - disk%radius, box%lower(axis) + disk%radius, k == 1)
+      if (sense*(face - side) >= 0) then
+        t_k = side_time(box, disk, -2*(axis - 1) - k)
+      else if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
+        .and. sense*box%gravity(axis) < 0) then
+        cycle                                      ! flies away from this face, ever faster
+      else
+        t_k = max(now, disk%clock &
+          + time_to_line(sense*(face - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
+      end if
+      if (t_k < t) then
+        t = t_k
+        code = merge(0, first_crossing, sense*(face - side) >= 0) - 2*(axis - 1) - k
+      end if
+    end do
+  end subroutine next_face_falling
+
+  !> Whether the cells around lie partly beyond a periodic side.
+  pure function at_periodic_edge(self, box, cell) result(yes)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    integer(int16), intent(in) :: cell(2)
+    logical :: yes
+    yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
+  end function at_periodic_edge
+
+  !> Contacts with the disks in the nine cells around c. Whole cells are copied into one list without a
+  !> branch on their occupancy; then the kernel has one mostly false branch per candidate.
+  pure subroutine scan_cells(self, disk, i, c, gravity, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: gravity(2)
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    integer(int32) :: list(list_capacity), n, k, m, most
+    n = 0
+    most = 0
+    do k = c - self%stride, c + self%stride, self%stride
+      do m = k - 1, k + 1
+        list(n + 1:n + count_slot) = self%cell(m)%slot
+        most = max(most, self%cell(m)%slot(count_slot))
+        n = n + min(self%cell(m)%slot(count_slot), cell_capacity)
+      end do
+    end do
+    call earliest_contact(disk, i, n, list, [0.0_real64, 0.0_real64], gravity, t, code)
+    if (most <= cell_capacity) return
+    do k = c - self%stride, c + self%stride, self%stride
+      do m = k - 1, k + 1
+        call self%scan_chains(disk, i, m, [0.0_real64, 0.0_real64], gravity, t, code)
+      end do
+    end do
+  end subroutine scan_cells
+
+  !> Contacts with the chained disks of the crowded cell c.
+  pure subroutine scan_chains(self, disk, i, c, shift, gravity, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: shift(2), gravity(2)
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    integer(int32) :: list(list_capacity), n, j
+    if (self%cell(c)%slot(count_slot) <= cell_capacity) return
+    j = self%next(self%cell(c)%slot(cell_capacity))
+    do while (j > 0)
+      n = 0
+      do while (j > 0 .and. n < list_capacity)
+        n = n + 1
+        list(n) = j
+        j = self%next(j)
+      end do
+      call earliest_contact(disk, i, n, list, shift, gravity, t, code)
+    end do
+  end subroutine scan_chains
+
+  !> The same cell by cell where some of the nine are images beyond a periodic side. In a box of fewer than
+  !> three columns a cell stands for several of its images.
+  subroutine scan_around_edge(self, sim, i, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    integer(int32) :: dx, dy, c, there(2), image(2)
+    real(real64) :: shift(2)
+    do dy = -1, 1
+      do dx = -1, 1
+        there = sim%tag(i)%cell + [dx, dy]
+        image = merge(floor(real(there - 1)/self%n), 0, sim%box%periodic)
+        there = there - image*self%n
+        shift = image*sim%box%edges()
+        c = there(1) + self%stride*there(2)
+        call earliest_contact(sim%disk, i, min(self%cell(c)%slot(count_slot), cell_capacity), &
+          self%cell(c)%slot, shift, sim%box%gravity, t, code)
+        call self%scan_chains(sim%disk, i, c, shift, sim%box%gravity, t, code)
+      end do
+    end do
+  end subroutine scan_around_edge
+
+end module cell_grid

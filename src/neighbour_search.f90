@@ -1,0 +1,135 @@
+!> The seam between the dynamics and the ways to find what a disk meets next; and the kernel they share.
+module neighbour_search
+  use kinds, only: int32, never, real64
+  use disks, only: disk_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: neighbour_search_t, earliest_contact, first_crossing
+
+  !> Codes of `disk%partner` from here downwards: the disk leaves its cell to the left, right, bottom, top.
+  integer(int32), parameter :: first_crossing = -2000000000
+
+  type, abstract :: neighbour_search_t
+    logical :: everyone = .false.    !! predict all disks anew after each event, not just those involved
+  contains
+    procedure(build_search), deferred :: build
+    procedure(predict_event), deferred :: predict
+    procedure(cross_cells), deferred :: cross
+  end type neighbour_search_t
+
+  abstract interface
+    !> Takes in where the disks are now.
+    subroutine build_search(self, sim)
+      import :: neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+    end subroutine build_search
+
+    !> Writes into disk i the earliest event it can expect: a disk, a side, an obstacle, a cell's end.
+    subroutine predict_event(self, sim, i)
+      import :: int32, neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+      integer(int32), intent(in) :: i
+    end subroutine predict_event
+
+    !> Moves disk i over the face that its event names: a crossing, or a periodic side.
+    subroutine cross_cells(self, sim, i, code)
+      import :: int32, neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+      integer(int32), intent(in) :: i
+      integer(int32), intent(in) :: code      !! of the crossing or the side
+    end subroutine cross_cells
+  end interface
+
+contains
+
+  !> The earliest contact of disk i with the disks listed, if it comes before the event known already.
+  !>
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their
+  !> clocks, and every term changes sign, or nothing, when they trade places. So it comes out the same to
+  !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
+  !> moment the one with the lower disks wins.
+  !>
+  !> Most candidates fail one combined test: the root is not before the best so far (it needs
+  !> c < -2 b (t - late), with a margin above rounding) or not real.
+  pure subroutine earliest_contact(disk, i, n, list, shift, gravity, t, partner)
+    type(disk_t), intent(in) :: disk(:)
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: n           !! number of candidates
+    integer(int32), intent(in) :: list(*)     !! (n) candidates; i itself is harmless
+    real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
+    real(real64), intent(in) :: gravity(2)
+    real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
+    integer(int32), intent(inout) :: partner  !! likewise
+    real(real64) :: xi, yi, ui, vi, clock, ri, late, si, sj, dx, dy, du, dv, sigma, b, c, disc, gate, t_j
+    integer(int32) :: k, j
+    logical :: falling
+    xi = disk(i)%x(1); yi = disk(i)%x(2)
+    ui = disk(i)%v(1); vi = disk(i)%v(2)
+    clock = disk(i)%clock
+    ri = disk(i)%radius
+    falling = abs(gravity(1)) > 0 .or. abs(gravity(2)) > 0
+    gate = above(t)
+    do k = 1, n
+      j = list(k)
+      late = max(clock, disk(j)%clock)
+      si = late - clock
+      sj = late - disk(j)%clock
+      du = disk(j)%v(1) - ui
+      dv = disk(j)%v(2) - vi
+      if (falling) then
+        dx = (disk(j)%x(1) + (disk(j)%v(1) + 0.5_real64*gravity(1)*sj)*sj) &
+          - (xi + (ui + 0.5_real64*gravity(1)*si)*si)
+        dy = (disk(j)%x(2) + (disk(j)%v(2) + 0.5_real64*gravity(2)*sj)*sj) &
+          - (yi + (vi + 0.5_real64*gravity(2)*si)*si)
+        du = du + gravity(1)*(sj - si)
+        dv = dv + gravity(2)*(sj - si)
+      else
+        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
+        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
+      end if
+      dx = dx + shift(1)
+      dy = dy + shift(2)
+      sigma = ri + disk(j)%radius
+      b = dx*du + dy*dv
+      c = dx*dx + dy*dy - sigma*sigma
+      disc = sigma*sigma*(du*du + dv*dv) - (dx*dv - dy*du)**2
+      if (min(-2*(gate - late)*b - c, disc) > 0) then
+        if (b < 0) then
+          t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
+          if (t_j <= t) then
+            if (t_j < t .or. before(i, j, partner)) then
+              t = t_j
+              partner = j
+              gate = above(t)
+            end if
+          end if
+        end if
+      end if
+    end do
+  end subroutine earliest_contact
+
+  !> A time just above t by more than the rounding of the test that it guards.
+  elemental function above(t) result(gate)
+    real(real64), intent(in) :: t
+    real(real64) :: gate
+    gate = t + 16*epsilon(t)*abs(t) + tiny(t)/epsilon(t)
+  end function above
+
+  !> Whether, at the same moment, i meets disk j before its other partner (a disk or, if <= 0, a wall).
+  elemental function before(i, j, other) result(yes)
+    integer(int32), intent(in) :: i, j, other
+    logical :: yes
+    if (other <= 0) then
+      yes = j < i
+    else if (min(i, j) /= min(i, other)) then
+      yes = min(i, j) < min(i, other)
+    else
+      yes = max(i, j) < max(i, other)
+    end if
+  end function before
+
+end module neighbour_search
