@@ -88,9 +88,11 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: t
+    integer(int64) :: turn
     integer(int32) :: i
-    do while (sim%events < limits%events .and. sim%collisions < limits%collisions &
-      .and. sim%dissipated < limits%dissipated)
+    do turn = 1, limits%turns
+      if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
+        .or. sim%dissipated >= limits%dissipated) return
       if (sim%events >= sim%next_epoch) call self%move_epoch(sim)
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
@@ -201,7 +203,7 @@ contains
     sim%events = sim%events + 1
     sim%collisions = sim%collisions + 1
     sim%virial = sim%virial - q*distance2
-    sim%dissipated = sim%dissipated - 0.5_real64*(1 - restitution)*q*b
+    sim%dissipated = sim%dissipated + 0.5_real64*(1 - restitution)*q*b
   end subroutine collide_pair
 
   !> The whole periods in a separation: dx less these is the nearest image.

@@ -13,6 +13,7 @@ module evolution
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! [energy]
+    integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can look around
   end type limits_t
 
   type, abstract :: evolution_t
