@@ -1,0 +1,81 @@
+"""Animate a run: disks of true size in time.
+
+    python post/animate.py runs/gas.h5 -o gas.mp4              mp4 needs ffmpeg; else write .gif
+    python post/animate.py runs/crater.h5 --colour speed --frames 300 --fps 30
+
+Without -o the name is that of the run, ending in .mp4 if ffmpeg is there and in .gif if not.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import animation
+from tqdm import tqdm
+
+from drawing import caption, command_line, disk_collection, draw_box, launch, plt, species_colours
+from read_run import Run, RunError, read_run
+from snapshot import LABELS, chosen_frames, default_colour, values_of
+
+
+def film_path(asked: Path | None, run: Run) -> Path:
+    """Where to write: as asked, or beside the caller under the name of the run."""
+    ffmpeg = animation.FFMpegWriter.isAvailable()
+    path = asked or Path(run.path.name).with_suffix(".mp4" if ffmpeg else ".gif")
+    if path.suffix == ".mp4" and not ffmpeg:
+        raise RunError(f"{path}: mp4 needs ffmpeg, which is not installed; ask for .gif")
+    if path.suffix not in (".mp4", ".gif"):
+        raise RunError(f"{path}: a film ends in .mp4 or .gif")
+    return path
+
+
+def colour_limits(run: Run, frames: list[int], colour: str) -> tuple[float, float]:
+    """A scale that holds for the whole film, from some of its frames."""
+    some = frames[:: max(1, len(frames) // 20)]
+    top = max(float(np.quantile(values_of(run, frame, colour), 0.99)) for frame in some)
+    return 0.0, top or 1.0
+
+
+def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> None:
+    """Draw once, then move and recolour the disks frame by frame."""
+    aspect = run.edges[1] / run.edges[0]
+    height = min(6.4, 6.4 * aspect)
+    width = height / aspect + (1.2 if colour != "species" else 0.2)
+    figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
+    draw_box(axes, run)
+    if colour == "species":
+        disks = disk_collection(axes, run, run.position[0], facecolors=species_colours(run))
+    else:
+        limits = colour_limits(run, frames, colour)
+        disks = disk_collection(axes, run, run.position[0], array=np.zeros(run.count), clim=limits)
+        figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
+    title = axes.set_title(" ")
+    figure.canvas.draw()
+    figure.set_layout_engine("none")  # the layout is settled; solving it again costs most time
+    writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(fps=fps)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with writer.saving(figure, str(path), dpi=100):
+        for frame in tqdm(frames, unit="frame", desc=path.name):
+            disks.set_offsets(run.position[frame])
+            if colour != "species":
+                disks.set_array(values_of(run, frame, colour))
+            title.set_text(f"{caption([run])},  t = {run.time[frame]:.4g}")
+            writer.grab_frame()
+    plt.close(figure)
+
+
+def main() -> None:
+    parser = command_line(__doc__, "RUN.mp4", one=True)
+    parser.set_defaults(output=None)
+    parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
+    parser.add_argument("--frames", type=int, default=300, help="at most this many [300]")
+    parser.add_argument("--fps", type=int, default=25, help="frames per second [25]")
+    args = parser.parse_args()
+    run = read_run(args.run)
+    path = film_path(args.output, run)
+    frames = chosen_frames(run, None, min(args.frames, run.frames))
+    animate(run, frames, args.colour or default_colour(run), path, args.fps)
+    print(f"film = {path}")
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,186 @@
+"""A crater: before and after, energy in time, and its size.
+
+    python post/crater.py runs/crater.h5 -o crater.png
+    python post/crater.py runs/scan/*.h5 --csv craters.csv     sizes of many runs, no figure
+
+The projectile is the species of that name, or else the only disk that moves at the start; the
+others are the bed.  Sizes: `hit`, bed disks that collided with anything; `displaced`, bed disks
+now further than one radius from where they lay; `width` and `depth`, the extent of the first
+positions of the displaced ones, from the rim of the bed downwards.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.ticker import LogLocator
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import ConvexHull
+
+from drawing import (
+    COLOURS, WALL, caption, command_line, disk_collection, draw_box, launch, plt, read_all, save,
+    write_csv,
+)
+from read_run import Run, RunError
+
+
+class Crater(NamedTuple):
+    """The size of a crater by four definitions, and how the run ended."""
+
+    hit: int
+    displaced: int
+    width: float
+    depth: float
+    energy_left: float  # over the energy at the start
+    time: float
+    collisions: int
+
+
+def projectile(run: Run) -> int:
+    """Index of the projectile."""
+    if "projectile" in run.names:
+        return int(np.flatnonzero(run.of_species("projectile"))[0])
+    moving = np.flatnonzero(run.speed(0) > 0)
+    if len(moving) != 1:
+        raise RunError(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
+    return int(moving[0])
+
+
+def bed(run: Run) -> np.ndarray:
+    """(N,) mask of the disks at rest at the start."""
+    mask = np.ones(run.count, dtype=bool)
+    mask[projectile(run)] = False
+    return mask
+
+
+def displaced(run: Run, frame: int = -1) -> np.ndarray:
+    """(N,) mask of the bed disks further than their radius from where they lay."""
+    return bed(run) & (run.displacement(frame) > run.radius)
+
+
+def crater(run: Run) -> Crater:
+    """The sizes of the crater in the last frame."""
+    if run.collisions is None:
+        raise RunError(f"{run.path}: has no collisions per disk")
+    moved, lying = displaced(run), bed(run)
+    start = run.position[0]
+    rim = np.max((start[:, 1] + run.radius)[lying])
+    bottom = np.min((start[:, 1] - run.radius)[moved], initial=rim)
+    return Crater(
+        hit=int(np.sum(run.collisions[-1][lying] > 0)),
+        displaced=int(moved.sum()),
+        width=float(np.ptp(start[moved, 0])) if moved.any() else 0.0,
+        depth=float(rim - bottom),
+        energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
+        time=float(run.time[-1]),
+        collisions=int(run.observable("collisions").value[-1]),
+    )
+
+
+def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
+    """Area fraction smoothed over a few disks: x and y of the cells and values (y, x)."""
+    here = bed(run)
+    side = run.edges.max() / cells
+    shape = np.maximum(1, np.round(run.edges / side)).astype(int)
+    limits = np.stack([run.lower, run.upper], axis=1)
+    area, xs, ys = np.histogram2d(
+        *run.position[frame][here].T, bins=shape, range=limits, weights=np.pi * run.radius[here]**2
+    )
+    smooth = gaussian_filter(area, 2.5 * np.median(run.radius[here]) / side, mode="reflect")
+    return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
+
+
+def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
+    """Bed disks coloured by value, the projectile black."""
+    draw_box(axes, run)
+    colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
+    colours[projectile(run)] = (0, 0, 0, 1)
+    disk_collection(axes, run, run.position[frame], facecolors=colours)
+    axes.set_title(f"t = {run.time[frame]:.4g}")
+
+
+def draw_hull(axes: plt.Axes, run: Run) -> None:
+    """The outline of the crater: hull of the first positions of the displaced disks."""
+    points = run.position[0][displaced(run)]
+    if len(points) > 3:
+        ring = points[ConvexHull(points).vertices]
+        axes.fill(*ring.T, fill=False, edgecolor=COLOURS[1], lw=1.4, zorder=4)
+        axes.plot([], [], color=COLOURS[1], lw=1.4, label="hull of the displaced disks")
+        axes.legend(loc="upper left")
+
+
+def draw_cavity(axes: plt.Axes, run: Run) -> None:
+    """The outline of the hole: where the packing is half of what it was."""
+    before, after = packing_field(run, 0), packing_field(run, -1)
+    level = 0.5 * np.quantile(before[2][before[2] > 0.05], 0.5)
+    axes.contour(*after, levels=[level], colors=[COLOURS[1]], linewidths=1.2, zorder=4)
+    axes.plot([], [], color=COLOURS[1], lw=1.2, label="half of the first packing")
+    axes.legend(loc="upper left")
+
+
+def draw_energy(axes: plt.Axes, run: Run) -> None:
+    """Energy left against time; the collisions beside it."""
+    time, energy = run.observable("all/kinetic_energy")
+    axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("")
+    fraction = run.parameter("stop", "energy_fraction")
+    if fraction and 0 < float(fraction) < 1:
+        axes.axhline(float(fraction), **{**WALL, "color": "0.6", "linewidth": 0.8}, ls="--")
+    axes.set(xlabel="time (reduced units)", ylabel="$E/E_0$", ylim=(None, 1.3))
+    twin = axes.twinx()
+    twin.plot(*run.observable("collisions"), color=COLOURS[1], ls="-.", label="collisions")
+    twin.set(ylabel="pair collisions", ylim=(0, None))
+    twin.spines["right"].set_visible(True)
+    axes.set_box_aspect(0.9)
+    axes.legend(handles=[axes.lines[0], twin.lines[0]], loc="upper center",
+                bbox_to_anchor=(0.5, 1.14), ncols=2)
+
+
+def draw(run: Run, size: Crater) -> plt.Figure:
+    """Before, after, collisions per disk, energy."""
+    figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
+    moved = run.displacement(-1) / np.median(run.radius)
+    limits = (0, max(1.0, float(np.quantile(moved[displaced(run)], 0.9)) if size.displaced else 1))
+    draw_state(before, run, 0, moved, limits)
+    draw_hull(before, run)
+    draw_state(after, run, -1, moved, limits)
+    draw_cavity(after, run)
+    scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
+    figure.colorbar(scale, ax=[before, after], location="bottom", shrink=0.6, aspect=40,
+                    extend="max", pad=0.02, label="displacement at the end (radii)")
+    count = np.log10(1.0 + run.collisions[-1])
+    top = float(np.ceil(count[bed(run)].max())) or 1.0
+    draw_state(hits, run, 0, count, (0, top))
+    hits.set_title("collisions of each disk, drawn where it lay")
+    scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
+    bar = figure.colorbar(scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02,
+                          label="1 + collisions")
+    bar.set_ticks(np.arange(top + 1), labels=[f"{10**k:.0f}" for k in np.arange(top + 1)])
+    draw_energy(energy, run)
+    tip = projectile(run)
+    lying = np.flatnonzero(bed(run))[0]
+    figure.suptitle(
+        f"{caption([run])},  projectile: mass {run.mass[tip] / run.mass[lying]:.4g} m, radius "
+        f"{run.radius[tip] / run.radius[lying]:.4g} r, speed {run.speed(0)[tip]:.4g}\n"
+        f"crater: {size.hit} disks hit, {size.displaced} displaced by more than r, width "
+        f"{size.width:.3f}, depth {size.depth:.3f}", fontsize=10)
+    return figure
+
+
+def main() -> None:
+    parser = command_line(__doc__, "crater.png", table=True)
+    args = parser.parse_args()
+    runs = read_all(args.runs)
+    sizes = [crater(run) for run in runs]
+    if len(runs) == 1:
+        for key, value in sizes[0]._asdict().items():
+            print(f"{key} = {value:.6g}")
+        save(draw(runs[0], sizes[0]), args.output, runs, "Crater")
+    if args.csv:
+        columns = {key: [getattr(size, key) for size in sizes] for key in Crater._fields}
+        write_csv(args.csv, {"run": [run.path.name for run in runs], **columns})
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,174 @@
+"""Crater size against the projectile's mass, speed and radius, and against restitution.
+
+    python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
+
+Every run tells its own four parameters.  The most frequent value of each is the base; a run
+belongs to the scan of a parameter if the other three are at the base.  Points: means over the
+runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
+restitution, the fraction of normal energy lost in a collision).  Open symbols: some of the runs
+ended by time, with more energy left than the fraction asked for.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from crater import Crater, bed, crater, projectile
+from drawing import (
+    COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv,
+)
+from read_run import Run
+from theory import Estimate, PowerLaw, estimate, fit_power_law
+
+AXES = {
+    "mass": "mass of the projectile / mass of a bed disk",
+    "speed": "speed of the projectile (reduced units)",
+    "radius": "radius of the projectile / radius of a bed disk",
+    "restitution": "restitution ξ",
+}
+SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
+EXTENTS = {"width": "width", "depth": "depth"}
+
+
+class Point(NamedTuple):
+    """The craters of runs that differ by their seed."""
+
+    x: float
+    runs: int
+    sizes: dict[str, Estimate]
+    energy_left: float
+    by_time: bool  # some runs ended before the energy fraction was reached
+
+
+def key_of(run: Run) -> tuple[float, ...]:
+    """Mass ratio, speed, radius ratio, restitution."""
+    tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
+    values = (run.mass[tip] / run.mass[lying], run.speed(0)[tip],
+              run.radius[tip] / run.radius[lying], run.restitution)
+    return tuple(float(f"{value:.9g}") for value in values)
+
+
+def distinct(runs: list[Run]) -> list[Run]:
+    """Each combination of parameters and seed once: scans share their base."""
+    return list({(key_of(run), run.seed, run.count): run for run in runs}.values())
+
+
+def base_of(keys: list[tuple[float, ...]]) -> tuple[float, ...]:
+    """The most frequent value of each parameter."""
+    return tuple(max(sorted(set(column)), key=column.count) for column in zip(*keys, strict=True))
+
+
+def scan_points(keys: list, craters: list[Crater], axis: int, fraction: float) -> list[Point]:
+    """The scan along one parameter, all others at the base, in ascending order."""
+    base = base_of(keys)
+    along = [k for k, key in enumerate(keys)
+             if all(key[j] == base[j] for j in range(len(key)) if j != axis)]
+    points = []
+    for x in sorted({keys[k][axis] for k in along}):
+        here = [craters[k] for k in along if keys[k][axis] == x]
+        sizes = {name: estimate([getattr(c, name) for c in here])
+                 for name in ("hit", "displaced", "width", "depth")}
+        left = [c.energy_left for c in here]
+        points.append(Point(x, len(here), sizes, float(np.mean(left)),
+                            max(left) > fraction * (1 + 1e-9)))
+    return points
+
+
+def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
+    """What a size is fitted against."""
+    return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
+
+
+def fits_of(axis: str, points: list[Point]) -> dict[str, PowerLaw | None]:
+    """A power law for each size."""
+    x = abscissa(axis, [p.x for p in points])
+    return {name: fit_power_law(x, [p.sizes[name].mean for p in points],
+                                [p.sizes[name].error for p in points])
+            for name in points[0].sizes}
+
+
+def draw_sizes(axes: plt.Axes, axis: str, points: list[Point], fits: dict, names: dict,
+               colours: list[str]) -> None:
+    """Some of the sizes with their fits on one pair of axes."""
+    x = np.array([p.x for p in points])
+    base = "(1-ξ^2)" if axis == "restitution" else "x"
+    reached = np.array([not p.by_time for p in points])
+    for (name, label), colour, marker in zip(names.items(), colours, "osD^", strict=False):
+        y = np.array([p.sizes[name].mean for p in points])
+        error = np.nan_to_num([p.sizes[name].error for p in points])
+        fit = fits[name]
+        if fit:
+            power = f"{fit.exponent:.2f} \\pm {fit.exponent_error:.2f}"
+            label += f", $\\propto {base}^{{{power}}}$"
+            inside = np.linspace(x.min(), x.max(), 200)
+            inside = inside[abscissa(axis, inside) > 0]
+            axes.plot(inside, fit(abscissa(axis, inside)), color=colour, lw=1, ls="-")
+        axes.errorbar(x[reached], y[reached], error[reached], ls="", marker=marker, color=colour,
+                      label=label)
+        axes.errorbar(x[~reached], y[~reached], error[~reached], ls="", marker=marker,
+                      color=colour, mfc="white")
+
+
+def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list[Run]):
+    """A panel per parameter: numbers of disks above, width and depth below."""
+    figure = plt.figure(figsize=(11, 11))
+    grid = figure.add_gridspec(4, 2, height_ratios=(1.3, 1, 1.3, 1))
+    for fixed, (axis, points) in enumerate(scans.items()):
+        fits, row, column = fits_of(axis, points), 2 * (fixed // 2), fixed % 2
+        numbers = figure.add_subplot(grid[row, column])
+        lengths = figure.add_subplot(grid[row + 1, column], sharex=numbers)
+        draw_sizes(numbers, axis, points, fits, SIZES, COLOURS[:2])
+        draw_sizes(lengths, axis, points, fits, EXTENTS, COLOURS[2:4])
+        if axis == "mass":
+            x = np.array([p.x for p in points])
+            numbers.plot(x, x * (1 / fraction - 1), color="0.4", lw=1, ls=":",
+                         label=f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$")
+        others = [f"{name} {value:g}" for k, (name, value) in
+                  enumerate(zip(AXES, base, strict=True)) if k != fixed]
+        numbers.set(ylabel="number of disks", title=",  ".join(others))
+        numbers.tick_params(labelbottom=False)
+        lengths.set(xlabel=AXES[axis], ylabel="length (box = 1)")
+        for axes in (numbers, lengths):
+            axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
+            axes.legend(loc="upper left", fontsize=8)
+    per_point = {p.runs for points in scans.values() for p in points}
+    number = "-".join(map(str, sorted({min(per_point), max(per_point)})))
+    ended = any(p.by_time for points in scans.values() for p in points)
+    figure.suptitle(
+        f"Crater size,  N = {', '.join(str(n) for n in sorted({r.count for r in runs}))},  "
+        f"{number} runs per point,  ended at "
+        f"{100 * fraction:g} % of the energy" + (" (open: at a set time)" if ended else ""),
+        fontsize=10)
+    return figure
+
+
+def table(scans: dict[str, list[Point]]) -> dict[str, list]:
+    """All points as columns."""
+    rows = []
+    for axis, points in scans.items():
+        for p in points:
+            row = {"scan": axis, "value": p.x, "runs": p.runs}
+            for name, (mean, error) in p.sizes.items():
+                row |= {name: float(mean), f"{name}_error": float(error)}
+            rows.append(row | {"energy_left": p.energy_left, "ended_by_time": int(p.by_time)})
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def main() -> None:
+    args = command_line(__doc__, "crater_scan.png", table=True).parse_args()
+    runs = distinct(read_all(args.runs))
+    keys, craters = [key_of(run) for run in runs], [crater(run) for run in runs]
+    fraction = float(runs[0].parameter("stop", "energy_fraction", 0.1))
+    scans = {axis: scan_points(keys, craters, k, fraction) for k, axis in enumerate(AXES)}
+    print_table(table(scans))
+    for axis, points in scans.items():
+        for name, fit in fits_of(axis, points).items():
+            if fit:
+                print(f"{axis}.{name}.exponent = {fit.exponent:.4f} +- {fit.exponent_error:.4f}")
+    save(draw(scans, base_of(keys), fraction, runs), args.output, runs, "Crater size")
+    if args.csv:
+        write_csv(args.csv, table(scans))
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,151 @@
+"""What the scripts share: the command line, disks of true size, saving a figure and a table."""
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable, Iterable
+from itertools import groupby
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+import numpy as np  # noqa: E402
+from matplotlib.collections import EllipseCollection  # noqa: E402
+from matplotlib.patches import Circle, Rectangle  # noqa: E402
+
+from read_run import Run, RunError, read_run  # noqa: E402
+
+plt.style.use(Path(__file__).with_name("ricochet.mplstyle"))
+
+COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
+WALL = {"color": "0.25", "linewidth": 1.2}
+
+
+def command_line(
+    doc: str, output: str, one: bool = False, table: bool = False
+) -> argparse.ArgumentParser:
+    """A parser whose help is the script's docstring; `one` run or any number, --csv or not."""
+    parser = argparse.ArgumentParser(
+        description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    if one:
+        parser.add_argument("run", metavar="RUN.h5", help="file written by ricochet")
+    else:
+        parser.add_argument("runs", nargs="+", metavar="RUN.h5", help="files written by ricochet")
+    parser.add_argument("-o", "--output", default=output, type=Path, help=f"[{output}]")
+    if table:
+        parser.add_argument("--csv", type=Path, help="write the numbers behind the figure")
+    return parser
+
+
+def launch(main: Callable[[], None]) -> None:
+    """Run a script: a file that cannot be used is one line on stderr and exit code 2."""
+    name = Path(sys.argv[0]).name
+    try:
+        main()
+    except (RunError, OSError) as problem:
+        print(f"{name}: {' '.join(str(problem).split())}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+def read_all(paths: Iterable[str]) -> list[Run]:
+    """The runs in the order given."""
+    return [read_run(path) for path in paths]
+
+
+def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
+    """Runs put together by a number, in ascending order."""
+    ordered = sorted(runs, key=key)
+    return [(value, list(group)) for value, group in groupby(ordered, key=key)]
+
+
+def caption(runs: list[Run]) -> str:
+    """What a reader must know: number of disks, restitution, seeds."""
+    counts = sorted({run.count for run in runs})
+    parts = [f"N = {', '.join(map(str, counts))}"]
+    restitutions = sorted({run.restitution for run in runs})
+    if all(np.isfinite(restitutions)):
+        parts.append(f"ξ = {', '.join(f'{x:g}' for x in restitutions)}")
+    seeds = sorted({run.seed for run in runs})
+    parts.append(f"seed {seeds[0]}" if len(seeds) == 1 else f"{len(seeds)} seeds")
+    return ",  ".join(parts)
+
+
+def species_label(run: Run, name: str) -> str:
+    """The name and the mass of a species."""
+    return f"{name}, m = {run.mass[run.of_species(name)][0]:g}"
+
+
+def draw_box(axes: plt.Axes, run: Run) -> None:
+    """Walls solid, periodic sides dashed, obstacles grey; equal scales, no ticks."""
+    (x0, y0), (x1, y1) = run.lower, run.upper
+    for axis, (xs, ys) in ((0, ((x0, x0), (y0, y1))), (0, ((x1, x1), (y0, y1))),
+                           (1, ((x0, x1), (y0, y0))), (1, ((x0, x1), (y1, y1)))):
+        axes.plot(xs, ys, ls="--" if run.periodic[axis] else "-", clip_on=False, zorder=3, **WALL)
+    for obstacle in run.obstacles:
+        if obstacle.inside:
+            axes.add_patch(Rectangle(run.lower, *run.edges, facecolor="0.85", zorder=0))
+        fill = "white" if obstacle.inside else "0.75"
+        axes.add_patch(
+            Circle(obstacle.centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
+        )
+    axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
+
+
+def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
+    """Disks of true size at `position` (N, 2); `array=` colours them by value."""
+    diameter = 2 * run.radius
+    style = {"linewidths": 0, **style}
+    collection = EllipseCollection(
+        diameter, diameter, np.zeros(run.count), units="xy",
+        offsets=position, offset_transform=axes.transData, **style,
+    )
+    axes.add_collection(collection)
+    return collection
+
+
+def species_colours(run: Run) -> list[str]:
+    """A colour for each disk."""
+    return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
+
+
+def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
+    """Write the figure with its source in the metadata; the folder is made."""
+    sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
+    commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
+    origin = f"{sources} (ricochet {', '.join(commits)})"
+    keys = {
+        ".pdf": {"Title": title, "Subject": origin},
+        ".svg": {"Title": title, "Description": origin},
+        ".png": {"Title": title, "Description": origin},
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix not in keys:
+        raise RunError(f"{path}: a figure ends in {', '.join(keys)}")
+    figure.savefig(path, metadata=keys[path.suffix])
+    plt.close(figure)
+
+
+def write_csv(path: Path, columns: dict[str, Iterable]) -> None:
+    """A table with one header line; numbers keep all their digits."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def print_table(columns: dict[str, Iterable]) -> None:
+    """The same for people: aligned, six digits."""
+    rows = [[f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
+            for row in zip(*columns.values(), strict=True)]
+    widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
+    for row in (columns, *rows):
+        print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

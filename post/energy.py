@@ -1,0 +1,75 @@
+"""Energies in time, and how well the total is kept.
+
+    python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
+
+Above: mean kinetic and potential energy per disk of each species in the first run.  Below: the
+relative change of the total energy in each run.  Prints the largest change of each.
+"""
+
+import numpy as np
+
+from drawing import COLOURS, caption, command_line, launch, plt, print_table, read_all, save, write_csv
+from equipartition import windows
+from read_run import Run
+
+
+def method(run: Run) -> str:
+    """How the run was integrated, for the legend."""
+    if run.parameter("run", "dynamics", "events") == "steps":
+        return f"time steps, Δt = {float(run.parameter('run', 'dt')):g}"
+    return "event driven"
+
+
+def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Time and E / E(0) - 1 of the total energy."""
+    time, energy = run.observable("total_energy")
+    return time, energy / energy[0] - 1
+
+
+def draw_species(axes: plt.Axes, run: Run) -> None:
+    """Kinetic solid, potential dotted, a colour per species; faint: every sample."""
+    curves = [(name, "kinetic", "-") for name in run.names]
+    if np.any(run.gravity):
+        curves += [(name, "potential", ":") for name in run.names]
+    for name, kind, style in curves:
+        colour = COLOURS[run.names.index(name) % len(COLOURS)]
+        time, value = run.observable(f"{name}/{kind}_energy")
+        axes.plot(time, value, color=colour, lw=0.5, alpha=0.25)
+        axes.plot(*windows(time, value, np.ptp(time) / 50), color=colour, ls=style,
+                  label=f"{kind}, {name}")
+    axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
+    axes.legend(ncols=2, loc="upper right", title="means over 2 % of the time")
+
+
+def draw(runs: list[Run]) -> plt.Figure:
+    """Two rows with one time axis."""
+    figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 7.5))
+    draw_species(top, runs[0])
+    for run, colour in zip(runs, COLOURS[2:] + COLOURS[:2], strict=False):
+        time, change = total_change(run)
+        size = np.maximum(np.abs(change), 1e-17)
+        bottom.semilogy(time, size, color=colour, lw=1, label=method(run))
+    bottom.set(xlabel="time (reduced units)", ylabel="$|E(t)/E(0) - 1|$, total energy",
+               xlim=(0, None), ylim=(1e-17, 1e4 * bottom.get_ylim()[1]))
+    bottom.legend(ncols=2, loc="upper right")
+    return figure
+
+
+def main() -> None:
+    args = command_line(__doc__, "energy.png", table=True).parse_args()
+    runs = read_all(args.runs)
+    result = {
+        "run": [run.path.name for run in runs],
+        "method": [method(run) for run in runs],
+        "total_energy": [float(run.observable("total_energy").value[0]) for run in runs],
+        "largest_change": [float(np.abs(total_change(run)[1]).max()) for run in runs],
+    }
+    print_table(result)
+    save(draw(runs), args.output, runs, "Energy")
+    if args.csv:
+        write_csv(args.csv, result)
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,70 @@
+"""Export a run for other programs.
+
+    python post/export.py runs/gas.h5 -o gas.xyz     extended XYZ, opens in OVITO as a 2D system
+    python post/export.py runs/gas.h5 -o gas.csv     one line per disk and frame, for anything
+
+Extended XYZ has two position columns, which makes OVITO treat the file as two-dimensional, and
+carries velocity, radius, mass, the box and the time.  Numbers keep all their digits.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from drawing import command_line, launch
+from read_run import Run, RunError, read_run
+
+PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1:id:I:1"
+
+
+def xyz_frame(run: Run, frame: int) -> str:
+    """One frame as extended XYZ; positions from the lower corner as origin of the lattice."""
+    (width, height), (x0, y0) = run.edges, run.lower
+    pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
+    head = (f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
+            f"Time={run.time[frame]} Properties={PROPERTIES}")
+    names = [run.names[s - 1].replace(" ", "_") for s in run.species]
+    rows = zip(names, run.position[frame].tolist(), run.velocity[frame].tolist(),
+               run.radius.tolist(), run.mass.tolist(), strict=True)
+    lines = [f"{name} {x} {y} {u} {v} {r} {m} {k}"
+             for k, (name, (x, y), (u, v), r, m) in enumerate(rows, start=1)]
+    return "\n".join([str(run.count), head, *lines, ""])
+
+
+def csv_frame(run: Run, frame: int) -> str:
+    """One frame as comma-separated lines."""
+    rows = zip(run.position[frame].tolist(), run.velocity[frame].tolist(),
+               run.radius.tolist(), run.mass.tolist(), strict=True)
+    return "".join(f"{run.time[frame]},{k},{run.names[run.species[k - 1] - 1]},"
+                   f"{x},{y},{u},{v},{r},{m}\n"
+                   for k, ((x, y), (u, v), r, m) in enumerate(rows, start=1))
+
+
+def exported(run: Run, suffix: str, step: int) -> Iterator[str]:
+    """The text of the whole file, piece by piece."""
+    if suffix == ".csv":
+        yield "time,id,species,x,y,vx,vy,radius,mass\n"
+    one = csv_frame if suffix == ".csv" else xyz_frame
+    for frame in tqdm(np.arange(0, run.frames, step), unit="frame", desc="export"):
+        yield one(run, int(frame))
+
+
+def main() -> None:
+    parser = command_line(__doc__, "RUN.xyz", one=True)
+    parser.set_defaults(output=None)
+    parser.add_argument("--every", type=int, default=1, help="every so many frames [1]")
+    args = parser.parse_args()
+    run = read_run(args.run)
+    path = args.output or Path(run.path.name).with_suffix(".xyz")
+    if path.suffix not in (".xyz", ".csv"):
+        raise RunError(f"{path}: export ends in .xyz or .csv")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as file:
+        file.writelines(exported(run, path.suffix, max(1, args.every)))
+    print(f"export = {path}")
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,325 @@
+"""Read a Ricochet run: the only module that knows where things are in the HDF5 file.
+
+    from read_run import read_run
+    run = read_run("runs/gas.h5")
+    run.time                 # (T,)    times of the frames
+    run.position[-1]         # (N, 2)  one frame, read from the file when asked for
+    run.speed(-1)            # (N,)    derived quantities take a frame index or a slice
+    run.observable("all/kinetic_energy").value
+
+T frames of N disks.  All quantities are in the units of the input file ("reduced units").
+Frames are read on demand, so a file may be larger than the memory.  A file that is still
+being written (`.part`) is read up to its last committed frame.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+DISKS = "particles/disks"
+
+
+class RunError(Exception):
+    """A file that cannot be used; the message is one line that says what and where."""
+
+
+class Series(NamedTuple):
+    """An observable: `value` (T, ...) at `time` (T,), on its own clock."""
+
+    time: np.ndarray
+    value: np.ndarray
+
+
+class Obstacle(NamedTuple):
+    """A circular wall; `inside` tells that the disks are kept in."""
+
+    centre: np.ndarray
+    radius: float
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A per-disk quantity in time, (T, N, ...), read frame by frame when indexed."""
+
+    path: Path
+    name: str
+    count: int
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, frame: int | slice) -> np.ndarray:
+        if isinstance(frame, slice):
+            start, stop, step = frame.indices(self.count)
+            backwards = step < 0
+            if backwards:
+                picked = range(start, stop, step)[::-1]
+                start, stop, step = picked.start, picked.stop, picked.step
+            chosen = slice(start, max(start, stop), step)
+        else:
+            if not -self.count <= frame < self.count:
+                raise RunError(f"{self.path}: no frame {frame}, there are {self.count}")
+            chosen, backwards = int(frame) % self.count, False
+        values = read_values(self.path, f"{DISKS}/{self.name}/value", chosen)
+        values = values.astype(float) if values.dtype.kind == "f" else values
+        return values[::-1] if backwards else values
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return (self[k] for k in range(self.count))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run: constants as arrays, frames on demand, observables by name."""
+
+    path: Path
+    time: np.ndarray  # (T,)
+    position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
+    velocity: Frames  # (T, N, 2)
+    image: Frames | None  # (T, N, 2) how many periods a disk has travelled
+    collisions: Frames | None  # (T, N) collisions of any kind since the start
+    mass: np.ndarray  # (N,)
+    radius: np.ndarray  # (N,)
+    species: np.ndarray  # (N,) 1-based
+    names: tuple[str, ...]  # of the species
+    lower: np.ndarray  # (2,) corner of the box
+    edges: np.ndarray  # (2,) lengths of the box
+    periodic: np.ndarray  # (2,) bool
+    obstacles: tuple[Obstacle, ...]
+    parameters: dict = field(repr=False)  # group -> variable -> value, as used
+    provenance: dict = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """N, the number of disks."""
+        return len(self.mass)
+
+    @property
+    def frames(self) -> int:
+        """T, the number of frames."""
+        return len(self.time)
+
+    @property
+    def upper(self) -> np.ndarray:
+        """(2,) upper right corner of the box."""
+        return self.lower + self.edges
+
+    def of_species(self, name: str) -> np.ndarray:
+        """(N,) mask of the disks of one species."""
+        if name not in self.names:
+            raise RunError(f"{self.path}: no species '{name}', there are {', '.join(self.names)}")
+        return self.species == self.names.index(name) + 1
+
+    def speed(self, frame: int | slice) -> np.ndarray:
+        """(..., N) length of the velocity."""
+        return np.linalg.norm(self.velocity[frame], axis=-1)
+
+    def kinetic_energy(self, frame: int | slice) -> np.ndarray:
+        """(..., N) m v^2 / 2."""
+        return 0.5 * self.mass * np.sum(self.velocity[frame] ** 2, axis=-1)
+
+    def unwrapped(self, frame: int | slice) -> np.ndarray:
+        """(..., N, 2) position with whole periods added: continuous in time."""
+        if self.image is None:
+            return self.position[frame]
+        return self.position[frame] + self.image[frame] * self.edges
+
+    def displacement(self, frame: int | slice, origin: int = 0) -> np.ndarray:
+        """(..., N) distance travelled as the crow flies since the frame `origin`."""
+        return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
+
+    def observable(self, name: str) -> Series:
+        """The observable `name`, such as 'total_energy' or 'all/kinetic_energy'."""
+        with open_file(self.path) as file:
+            group = file.get(f"observables/{name}")
+            if not isinstance(group, h5py.Group) or "value" not in group:
+                raise RunError(f"{self.path}: has no observable '{name}'")
+            count = committed(file, "observables", group["value"].shape[0])
+        chosen = slice(0, count)
+        return Series(
+            read_values(self.path, f"observables/{name}/time", chosen),
+            read_values(self.path, f"observables/{name}/value", chosen),
+        )
+
+    @cached_property
+    def collisions_per_disk(self) -> Series:
+        """2 C / N with C the pair collisions since the start, at the times of the observables."""
+        time, collisions = self.observable("collisions")
+        return Series(time, 2 * collisions / self.count)
+
+    def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
+        """The same at any times of the run, by linear interpolation."""
+        return np.interp(time, *self.collisions_per_disk)
+
+    def parameter(self, group: str, variable: str, default: object = None) -> object:
+        """A variable of the input file as it was used."""
+        return self.parameters.get(group, {}).get(variable, default)
+
+    @property
+    def restitution(self) -> float:
+        """Restitution of disk on disk; NaN if it differs between pairs of species."""
+        values = np.unique(np.asarray(self.parameter("contact", "restitution", 1.0), dtype=float))
+        return float(values[0]) if len(values) == 1 else np.nan
+
+    @property
+    def seed(self) -> int:
+        """Seed of the random numbers."""
+        return int(self.parameter("run", "seed", self.parameters.get("seed", 0)))
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """(2,) acceleration of free flight."""
+        return np.asarray(self.parameter("box", "gravity", (0.0, 0.0)), dtype=float)
+
+
+def read_run(path: str | Path) -> Run:
+    """Open a run, finished or not.  Raises RunError with a one-line reason."""
+    path = Path(path)
+    with open_file(path) as file:
+        check_format(path, file)
+        try:
+            return run_of(path, file)
+        except KeyError as problem:
+            raise RunError(f"{path}: not a complete Ricochet run, {problem.args[0]}") from None
+        except (OSError, RuntimeError):
+            raise RunError(f"{path}: the file is damaged") from None
+
+
+def open_file(path: Path) -> h5py.File:
+    """The HDF5 file for reading, also while a simulation writes it."""
+    if not path.exists():
+        part = Path(f"{path}.part")
+        hint = f", but there is {part} of an unfinished run" if part.exists() else ""
+        raise RunError(f"{path}: no such file{hint}")
+    if path.is_dir():
+        raise RunError(f"{path}: is a folder, not a run")
+    try:
+        return h5py.File(path, "r", locking=False)
+    except PermissionError:
+        raise RunError(f"{path}: no permission to read") from None
+    except OSError:
+        state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
+        raise RunError(f"{path}: {state}") from None
+
+
+def read_values(path: Path, name: str, chosen: int | slice) -> np.ndarray:
+    """A part of a dataset; damage that shows only on reading is a RunError too."""
+    with open_file(path) as file:
+        try:
+            return file[name][chosen]
+        except (OSError, RuntimeError, KeyError):
+            raise RunError(f"{path}: cannot read {name}, the file is damaged") from None
+
+
+def check_format(path: Path, file: h5py.File) -> None:
+    """Refuse a file of another kind or of a later version."""
+    version = file["h5md"].attrs.get("version") if "h5md" in file else None
+    if version is None or DISKS not in file:
+        raise RunError(f"{path}: an HDF5 file, but not of a Ricochet run")
+    if version[0] != 1:
+        raise RunError(f"{path}: H5MD version {version[0]}.{version[1]}, this program reads 1.x")
+
+
+def run_of(path: Path, file: h5py.File) -> Run:
+    """The run in an open file."""
+    disks = file[DISKS]
+    count = committed(file, DISKS, disks["position/value"].shape[0])
+    if count == 0:
+        raise RunError(f"{path}: holds no frame yet")
+    box = disks["box"]
+    parameters = tree(file["parameters"]) if "parameters" in file else {}
+    species = np.asarray(disks["species"][:], dtype=int)
+    names = parameters.get("species", {}).get("names")
+    return Run(
+        path=path,
+        time=disks["position/time"][:count],
+        position=Frames(path, "position", count),
+        velocity=Frames(path, "velocity", count),
+        image=Frames(path, "image", count) if "image" in disks else None,
+        collisions=Frames(path, "collisions", count) if "collisions" in disks else None,
+        mass=disks["mass"][:],
+        radius=disks["radius"][:],
+        species=species,
+        names=tuple(np.atleast_1d(names)) if names is not None else default_names(species),
+        lower=vector(box, "lower", np.zeros(2)),
+        edges=vector(box, "edges", None),
+        periodic=np.array([plain(b) == "periodic" for b in box.attrs["boundary"]]),
+        obstacles=obstacles_of(parameters.get("obstacle", {})),
+        parameters=parameters,
+        provenance=tree(file["provenance"]) if "provenance" in file else {},
+    )
+
+
+def committed(file: h5py.File, group: str, extent: int) -> int:
+    """How many of the `extent` samples of a group are valid (a `.part` is allocated ahead)."""
+    counter = file[group].get("committed")
+    return extent if counter is None else min(extent, int(counter[()]))
+
+
+def default_names(species: np.ndarray) -> tuple[str, ...]:
+    """Names for species that have none."""
+    return tuple(f"species {k + 1}" for k in range(species.max(initial=1)))
+
+
+def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
+    """The circular walls in /parameters/obstacle."""
+    if "centre" not in group:
+        return ()
+    centres = np.reshape(group["centre"], (-1, 2)).astype(float)
+    radii, inside = np.atleast_1d(group["radius"]), np.atleast_1d(group["inside"])
+    return tuple(
+        Obstacle(c, float(r), bool(i)) for c, r, i in zip(centres, radii, inside, strict=True)
+    )
+
+
+def vector(group: h5py.Group, name: str, default: np.ndarray | None) -> np.ndarray:
+    """A small vector that is a dataset or an attribute."""
+    if name in group:
+        return group[name][:]
+    if name in group.attrs or default is None:
+        return np.asarray(group.attrs[name])
+    return default
+
+
+def tree(group: h5py.Group) -> dict:
+    """A group as a dictionary of plain values; attributes and datasets alike."""
+    values = {name: plain(value) for name, value in group.attrs.items()}
+    for name, item in group.items():
+        values[name] = tree(item) if isinstance(item, h5py.Group) else plain(item[()])
+    return values
+
+
+def plain(value: object) -> object:
+    """Text instead of bytes, numbers instead of arrays without an axis."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace").rstrip()
+    if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
+        return [plain(item) for item in value.ravel()]
+    if isinstance(value, np.ndarray) and value.ndim == 0 or isinstance(value, np.generic):
+        return plain(value.item())
+    return value
+
+
+def mdanalysis_universe(run: Run):
+    """The run as an MDAnalysis Universe (needs the package MDAnalysis).
+
+    MDAnalysis knows three dimensions only: z = 0 is added.  Lengths and times keep their
+    numbers.  Selections such as `u.select_atoms("type projectile")` go by species; the
+    analysis classes of MDAnalysis then work on `u.trajectory`.
+    """
+    import MDAnalysis
+
+    universe = MDAnalysis.Universe.empty(run.count, trajectory=True, velocities=True)
+    flat = [np.pad(a[:], ((0, 0), (0, 0), (0, 1))) for a in (run.position, run.velocity)]
+    step = (run.time[-1] - run.time[0]) / (run.frames - 1) if run.frames > 1 else 1.0
+    universe.load_new(flat[0], velocities=flat[1], order="fac", dt=step)
+    universe.add_TopologyAttr("masses", run.mass)
+    universe.add_TopologyAttr("radii", run.radius)
+    universe.add_TopologyAttr("types", [run.names[s - 1] for s in run.species])
+    return universe

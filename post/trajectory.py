@@ -1,0 +1,63 @@
+"""Draw the paths of disks through the frames of a run.
+
+    python post/trajectory.py runs/sinai.h5 -o sinai.png                 all disks (at most 12)
+    python post/trajectory.py runs/sinai.h5 --disks 1,5 --last 200       two of them, last frames
+
+With a frame at every event (output.frames_every_events = 1) the straight lines between frames
+are the exact path of flight without gravity.  Several runs are drawn side by side.
+"""
+
+import numpy as np
+
+from drawing import COLOURS, caption, command_line, draw_box, launch, plt, read_all, save
+from matplotlib.patches import Circle
+from read_run import Run, RunError
+
+
+def paths_of(run: Run, disks: list[int], start: int = 0) -> list[np.ndarray]:
+    """(T', 2) positions of each disk; a row of NaN breaks the line at a periodic side."""
+    paths = list(np.moveaxis(run.position[start:][:, disks], 1, 0))
+    if run.image is None:
+        return paths
+    jumps = np.any(np.diff(run.image[start:][:, disks], axis=0), axis=2).T
+    return [np.insert(path, np.flatnonzero(jump) + 1, np.nan, axis=0)
+            for path, jump in zip(paths, jumps, strict=True)]
+
+
+def chosen_disks(run: Run, text: str | None) -> list[int]:
+    """Indices from numbers that count from 1; the first twelve without a choice."""
+    disks = [int(t) - 1 for t in text.split(",")] if text else list(range(min(12, run.count)))
+    for disk in disks:
+        if not 0 <= disk < run.count:
+            raise RunError(f"{run.path}: no disk {disk + 1}, there are {run.count}")
+    return disks
+
+
+def draw_paths(axes: plt.Axes, run: Run, disks: list[int], start: int) -> None:
+    """Paths, with the disk where it is at the end."""
+    draw_box(axes, run)
+    for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, start), strict=True)):
+        colour = COLOURS[order % len(COLOURS)]
+        alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
+        axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
+        axes.plot(*path[0], marker="x", color=colour, zorder=4)
+        axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=4))
+    axes.set_title(f"{run.path.stem}: {caption([run])}\n"
+                   f"t = {run.time[start]:.4g} (crosses) to {run.time[-1]:.4g} (disks)")
+
+
+def main() -> None:
+    parser = command_line(__doc__, "trajectory.png")
+    parser.add_argument("--disks", help="their numbers from 1, e.g. 1,5,9")
+    parser.add_argument("--last", type=int, help="only the last so many frames")
+    args = parser.parse_args()
+    runs = read_all(args.runs)
+    figure, panels = plt.subplots(1, len(runs), squeeze=False, figsize=(5.2 * len(runs), 5.7))
+    for axes, run in zip(panels.flat, runs, strict=True):
+        start = max(0, run.frames - args.last) if args.last else 0
+        draw_paths(axes, run, chosen_disks(run, args.disks), start)
+    save(figure, args.output, runs, "Paths of disks")
+
+
+if __name__ == "__main__":
+    launch(main)

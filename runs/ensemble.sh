@@ -1,0 +1,328 @@
+#!/usr/bin/env bash
+# Run many members of an ensemble or a scan: seeds x values, all cores, safe to stop and repeat.
+set -euo pipefail
+
+usage() {
+  cat <<'TEXT'
+Usage: runs/ensemble.sh INPUT.nml -d FOLDER [options]
+
+Members:
+  --seeds LIST           run.seed of each member: 1-8 or 1,5,9 or 1-4,11
+  --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors hold commas,
+                         so separate them by semicolons: --scan 'species.ball.velocity=0,-1;0,-2'
+  --set VARIABLE=VALUE   the same for all members; may be repeated
+  --manifest FILE        instead of --seeds and --scan: one member per line,
+                             NAME <TAB or blank> --set VARIABLE=VALUE --set VARIABLE=VALUE ...
+                         (a NAME with blanks needs the TAB; lines that begin with # are left out)
+Running:
+  -j N                   members at a time [all cores]
+  --dry-run              print the members and stop
+  -h, --help
+
+Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
+with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that failed is tried
+again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
+share the work.  The program is build/ricochet, or what the variable RICOCHET names.
+
+Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 75 stopped, the same command goes on.
+TEXT
+}
+
+die() {
+  printf 'ensemble.sh: %s\n' "$*" >&2
+  exit 2
+}
+
+# --- members: two parallel arrays, the name and the overrides ("--set A=B --set C=D") ---
+
+names=()
+overrides=()
+
+# 1-4,11 -> 1 2 3 4 11
+expand_seeds() {
+  local part
+  for part in ${1//,/ }; do
+    if [[ $part =~ ^([0-9]+)-([0-9]+)$ ]] && ((BASH_REMATCH[1] <= BASH_REMATCH[2])); then
+      seq "${BASH_REMATCH[1]}" "${BASH_REMATCH[2]}"
+    elif [[ $part =~ ^[0-9]+$ ]]; then
+      printf '%s\n' "$part"
+    else
+      die "--seeds $1: '$part' is neither a number nor a range such as 1-8"
+    fi
+  done
+}
+
+# species.ball.mass, 5 -> ball.mass_5: a file name without blanks and slashes
+name_of() {
+  local variable=${1#species.} value=$2
+  [[ $variable == *.*.* || $1 == species.* ]] || variable=${variable#*.}
+  printf '%s_%s' "$variable" "${value//[^A-Za-z0-9.+-]/_}"
+}
+
+# Every combination of the scans (first varies slowest) and the seeds.
+generate_members() {
+  local scan variable list separator value k old_names old_overrides
+  names=("") overrides=("")
+  for scan in "${scans[@]}"; do
+    [[ $scan == *.*=?* ]] || die "--scan $scan: write VARIABLE=VALUE,VALUE,..."
+    variable=${scan%%=*} list=${scan#*=} separator=,
+    [[ $list == *';'* ]] && separator=';'
+    old_names=("${names[@]}") old_overrides=("${overrides[@]}")
+    names=() overrides=()
+    for k in "${!old_names[@]}"; do
+      while read -r -d "$separator" value; do
+        names+=("${old_names[k]:+${old_names[k]}_}$(name_of "$variable" "$value")")
+        overrides+=("${old_overrides[k]:+${old_overrides[k]} }--set $variable=$value")
+      done <<<"$list$separator"
+    done
+  done
+}
+
+read_manifest() {
+  local line rest
+  while IFS= read -r line || [[ -n $line ]]; do
+    line=${line%$'\r'}
+    [[ $line =~ ^[[:blank:]]*(#|$) ]] && continue
+    if [[ $line == *$'\t'* ]]; then
+      names+=("${line%%$'\t'*}") rest=${line#*$'\t'}
+    else
+      line=${line#"${line%%[![:blank:]]*}"}
+      names+=("${line%% *}") rest=${line#"${line%% *}"}
+    fi
+    rest=${rest//$'\t'/ }
+    rest=${rest#"${rest%%[![:blank:]]*}"}
+    [[ -z $rest || $rest == '--set '* ]] ||
+      die "$1: member '${names[-1]}': '$rest' does not begin with --set"
+    overrides+=("$rest")
+  done <"$1"
+}
+
+check_names() {
+  local -A seen=()
+  local name
+  for name in "${names[@]}"; do
+    [[ -n $name && $name != */* && $name != -* && $name != .* ]] ||
+      die "'$name' cannot name a member: no slash, no leading dash or dot, not empty"
+    [[ -z ${seen[$name]:-} ]] || die "two members are called '$name'"
+    seen[$name]=1
+  done
+}
+
+# Members of an earlier command on the folder must mean the same: results are told apart by name.
+remember() {
+  local line name k
+  local -A before=()
+  if [[ -e $folder/input.nml ]]; then
+    cmp -s "$input" "$folder/input.nml" ||
+      die "$folder holds members of another version of $input (see $folder/input.nml):" \
+        "choose another folder, or remove this one"
+  fi
+  if [[ -e $folder/manifest.txt ]]; then
+    while IFS= read -r line; do before[${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
+  fi
+  for k in "${!names[@]}"; do
+    name=${names[k]}
+    [[ ${before[$name]-${overrides[k]}} == "${overrides[k]}" ]] ||
+      die "$folder holds a member '$name' with other settings (${before[$name]}):" \
+        "choose another folder or name"
+    before[$name]=${overrides[k]}
+  done
+  cp -f -- "$input" "$folder/.input.$$" && mv -f -- "$folder/.input.$$" "$folder/input.nml"
+  for name in "${!before[@]}"; do printf '%s\t%s\n' "$name" "${before[$name]}"; done | sort \
+    >"$folder/.manifest.$$" && mv -f -- "$folder/.manifest.$$" "$folder/manifest.txt"
+}
+
+# --- workers ---
+
+# Run member k; what became of it goes through the pipe to the parent.
+run_member() {
+  local base=$folder/${names[$1]} rest=${overrides[$1]} status
+  local arguments=("$input" -o "$base.h5" --quiet)
+  while [[ $rest == '--set '* ]]; do
+    rest=${rest#--set }
+    arguments+=(--set "${rest%% --set *}")
+    if [[ $rest == *' --set '* ]]; then rest="--set ${rest#* --set }"; else rest=; fi
+  done
+  if [[ -e $base.chk.h5 ]]; then arguments+=(--resume); fi
+  "$program" "${arguments[@]}" >"$base.log" 2>&1 </dev/null {events}>&- &
+  child=$!
+  while :; do # `wait` also ends when a signal comes
+    interrupted='' status=0
+    wait "$child" || status=$?
+    [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
+  done
+  child=
+  if [[ -n $stopping ]] && ((status >= 127)); then status=75; fi # stopped while it started
+  printf '%s %s\n' "$1" "$status" >&"$events"
+}
+
+# Walk along all members; take those that no other worker and no other copy has taken.
+# The lock is on the log; the program inherits it, so it holds as long as the program lives.
+work() {
+  local k base lock child='' stopping='' interrupted=''
+  trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null' TERM INT
+  for k in "${!names[@]}"; do
+    if [[ -n $stopping ]] || ! kill -0 $$ 2>/dev/null; then break; fi
+    base=$folder/${names[k]}
+    if [[ -e $base.h5 ]] || ! mkdir "$claims/$k" 2>/dev/null; then continue; fi
+    exec {lock}>>"$base.log"
+    if ! flock -n "$lock"; then
+      printf '%s busy\n' "$k" >&"$events"
+    elif [[ -e $base.h5 ]]; then
+      printf '%s 0\n' "$k" >&"$events"
+    else
+      run_member "$k"
+    fi
+    exec {lock}>&-
+  done
+  printf 'worker ends\n' >&"$events"
+}
+
+# --- the parent: starts workers, forwards signals, shows progress ---
+
+clock() {
+  local s=$1
+  if ((s >= 3600)); then
+    printf '%d:%02d:%02d' $((s / 3600)) $((s / 60 % 60)) $((s % 60))
+  else
+    printf '%d:%02d' $((s / 60)) $((s % 60))
+  fi
+}
+
+show_progress() {
+  local now=$SECONDS done_now=$((finished - skipped)) left=$((total - finished - failed)) line
+  line="$finished/$total members finished, $failed failed, $(clock "$now")"
+  if ((done_now > 0 && left > 0)); then line+=", ETA $(clock $((now * left / done_now)))"; fi
+  if [[ -t 2 ]]; then
+    printf '\r%s\033[K' "$line" >&2
+  elif ((now >= next_line)); then
+    printf '%s\n' "$line" >&2
+    next_line=$((now + 30))
+  fi
+}
+
+forward() {
+  stopped=1
+  ((${#workers[@]} == 0)) || kill -TERM "${workers[@]}" 2>/dev/null || true
+}
+
+run_all() {
+  local k status slot
+  claims=$(mktemp -d)
+  trap 'rm -rf -- "$claims"' EXIT
+  mkfifo "$claims/pipe"
+  exec {events}<>"$claims/pipe"
+  trap forward TERM INT
+  set -m # own process groups: Ctrl-C reaches this script alone, which sends each member one TERM
+  for ((slot = 0; slot < jobs && slot < total; slot++)); do
+    [[ -z $stopped ]] || break
+    work &
+    workers+=($!)
+  done
+  set +m
+  while ((ended < ${#workers[@]})); do
+    if read -r -t 1 -u "$events" k status; then
+      count_reply "$k" "$status"
+    elif ! kill -0 "${workers[@]}" 2>/dev/null; then
+      break # all were killed
+    fi
+    show_progress
+  done
+  wait
+  [[ ! -t 2 ]] || printf '\r\033[K' >&2
+}
+
+count_reply() {
+  case $2 in
+  ends) ended=$((ended + 1)) ;;
+  0) finished=$((finished + 1)) ;;
+  75) ;;
+  busy) busy=$((busy + 1)) ;;
+  *)
+    failed=$((failed + 1))
+    failures+=("${names[$1]} (exit $2): $(tail -n 1 -- "$folder/${names[$1]}.log")")
+    ;;
+  esac
+}
+
+summarise() {
+  local failure
+  finished=0
+  for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
+  printf '%s: %d of %d members finished' "$folder" "$finished" "$total" >&2
+  ((skipped == 0)) || printf ', %d of them before' "$skipped" >&2
+  printf ', %d failed, %s\n' "$failed" "$(clock "$SECONDS")" >&2
+  for failure in "${failures[@]}"; do printf '  failed: %s\n' "$failure" >&2; done
+  ((failed == 0)) || exit 1
+  if ((finished < total)); then
+    if ((busy > 0)); then printf '  %d are run by another copy\n' "$busy" >&2; fi
+    printf '  the same command goes on with the rest\n' >&2
+    exit 75
+  fi
+}
+
+# --- command line ---
+
+input='' folder='' seeds='' manifest='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
+common='' scans=()
+while (($#)); do
+  case $1 in
+  -h | --help) usage && exit 0 ;;
+  --dry-run) dry=1 && shift && continue ;;
+  -d | -j | --seeds | --scan | --set | --manifest) (($# > 1)) || die "$1 needs a value" ;;
+  -*) die "unknown option $1, see --help" ;;
+  *)
+    [[ -z $input ]] || die "one input file, not '$input' and '$1'"
+    input=$1 && shift && continue
+    ;;
+  esac
+  case $1 in
+  -d) folder=$2 ;;
+  -j) jobs=$2 ;;
+  --seeds) seeds=$2 ;;
+  --scan) scans+=("$2") ;;
+  --set) common+="${common:+ }--set $2" ;;
+  --manifest) manifest=$2 ;;
+  esac
+  shift 2
+done
+
+[[ -n $input ]] || die "no input file, see --help"
+[[ -r $input && -f $input ]] || die "cannot read $input"
+[[ -n $folder ]] || die "no folder for the members: -d FOLDER"
+[[ $jobs =~ ^[1-9][0-9]*$ ]] || die "-j $jobs: not a number of members"
+if [[ -n $manifest ]]; then
+  [[ -z $seeds && ${#scans[@]} == 0 ]] || die "either --manifest or --seeds and --scan"
+  [[ -r $manifest ]] || die "cannot read $manifest"
+  read_manifest "$manifest"
+else
+  [[ -n $seeds || ${#scans[@]} -gt 0 ]] || die "no members: give --seeds, --scan or --manifest"
+  if [[ -n $seeds ]]; then
+    seeds=$(expand_seeds "$seeds") || exit 2
+    scans+=("run.seed=${seeds//$'\n'/,}")
+  fi
+  generate_members
+fi
+((${#names[@]} > 0)) || die "no members"
+check_names
+for k in "${!overrides[@]}"; do
+  overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
+done
+
+if [[ -n $dry ]]; then
+  for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
+  exit 0
+fi
+
+program=${RICOCHET:-$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)/build/ricochet}
+[[ -x $program ]] || die "no program $program: run make, or set RICOCHET"
+command -v flock >/dev/null || die "needs flock (package util-linux)"
+mkdir -p -- "$folder" || die "cannot make $folder"
+remember
+
+total=${#names[@]} finished=0 failed=0 busy=0 ended=0 next_line=30 stopped='' claims=''
+workers=() failures=()
+for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
+skipped=$finished
+if ((finished < total)); then run_all; fi
+summarise

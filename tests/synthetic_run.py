@@ -1,0 +1,105 @@
+"""Writes small HDF5 files in the layout of a Ricochet run, for tests of the post-processing."""
+
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "post"))
+
+
+def text(value: str) -> np.bytes_:
+    """A fixed-length string, as the program writes them."""
+    return np.bytes_(value.encode())
+
+
+def write_run(
+    path,
+    position,
+    velocity,
+    *,
+    time=None,
+    mass=1.0,
+    radius=0.01,
+    species=None,
+    names=("disk",),
+    lower=(0.0, 0.0),
+    edges=(1.0, 1.0),
+    periodic=(False, False),
+    image=None,
+    collisions=None,
+    observables=None,
+    observable_time=None,
+    parameters=None,
+    obstacles=(),
+    provenance=None,
+    committed=None,
+):
+    """Write a run with `position` and `velocity` (T, N, 2); `observables` name -> (T', ...)."""
+    position, velocity = np.asarray(position, float), np.asarray(velocity, float)
+    frames, count = position.shape[:2]
+    time = np.arange(frames, dtype=float) if time is None else np.asarray(time, float)
+    with h5py.File(path, "w") as file:
+        file.create_group("h5md").attrs["version"] = np.array([1, 1], dtype=np.int32)
+        creator = file.create_group("h5md/creator")
+        creator.attrs["name"] = text("ricochet")
+        disks = file.create_group("particles/disks")
+        box = disks.create_group("box")
+        box.attrs["dimension"] = 2
+        box.attrs["boundary"] = [text("periodic" if p else "none") for p in periodic]
+        box["edges"], box["lower"] = np.asarray(edges, float), np.asarray(lower, float)
+        add_element(disks, "position", time, position)
+        shared = disks["position"]
+        for name, values in (("velocity", velocity), ("image", image), ("collisions", collisions)):
+            if values is not None:
+                group = disks.create_group(name)
+                group["step"], group["time"] = shared["step"], shared["time"]
+                group["value"] = np.asarray(values)
+        disks["mass"] = np.broadcast_to(np.asarray(mass, float), count)
+        disks["radius"] = np.broadcast_to(np.asarray(radius, float), count)
+        species = np.ones(count, np.int32) if species is None else np.asarray(species, np.int32)
+        disks["species"], disks["id"] = species, np.arange(1, count + 1)
+        if committed is not None:
+            disks["committed"] = np.int64(committed)
+        write_observables(file, time if observable_time is None else observable_time, observables)
+        write_parameters(file, parameters, names, species, obstacles)
+        file.create_group("provenance").attrs.update(provenance or {"git_commit": text("abc1234")})
+    return Path(path)
+
+
+def add_element(group, name, time, value):
+    """An H5MD element: step, time, value."""
+    element = group.create_group(name)
+    element["step"], element["time"] = np.arange(len(time)), np.asarray(time, float)
+    element["value"] = value
+
+
+def write_observables(file, time, observables):
+    """All observables share one clock."""
+    group = file.create_group("observables")
+    for name, value in (observables or {}).items():
+        add_element(group, name, time, np.asarray(value))
+    group["committed"] = np.int64(len(time))
+
+
+def write_parameters(file, parameters, names, species, obstacles):
+    """`parameters` as group -> variable -> value."""
+    root = file.create_group("parameters")
+    root["input"] = text("&run\n/\n")
+    for group, variables in (parameters or {}).items():
+        for name, value in variables.items():
+            root.require_group(group).attrs[name] = text(value) if isinstance(value, str) else value
+    root.require_group("species")["names"] = [text(name) for name in names]
+    root["species"]["counts"] = [int(np.sum(species == k + 1)) for k in range(len(names))]
+    if obstacles:
+        centre, radius, inside = zip(*obstacles, strict=True)
+        where = root.create_group("obstacle")
+        where["centre"], where["radius"] = np.array(centre), np.array(radius)
+        where["inside"] = np.array(inside, dtype=np.int32)
+
+
+def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
+    """(frames, count, 2) velocities of an ideal gas."""
+    return rng.normal(0.0, np.sqrt(temperature / np.mean(mass)), (frames, count, 2))
