@@ -109,10 +109,10 @@ contains
     s%velocities = group%text_of('velocities')
     call pair_up(group, 'velocities', 'explicit', 'velocity', problems)
     if (s%velocities == 'file') call pair_up(group, 'velocities', 'file', 'file', problems)
-    if (s%velocities /= 'maxwell') call forbid(group, 'velocities', '''maxwell''', 'temperature', &
-      problems)
-    if (all(s%velocities /= [character(len=11) :: 'equal_speed', 'uniform'])) &
-      call forbid(group, 'velocities', '''equal_speed'' or ''uniform''', 'speed', problems)
+    if (s%velocities /= 'maxwell') &
+      call leave_out(group, 'velocities', '''maxwell''', 'temperature', problems)
+    if (s%velocities /= 'equal_speed' .and. s%velocities /= 'uniform') &
+      call leave_out(group, 'velocities', '''equal_speed'' or ''uniform''', 'speed', problems)
     s%speed = group%real_of('speed', 0.0_real64)
     s%temperature = group%real_of('temperature', 0.0_real64)
     call take_pairs(group, 'velocity', s%velocity, problems)
@@ -138,26 +138,28 @@ contains
 
   !> The variable and the word of the choice need each other.
   subroutine pair_up(group, choice, word, variable, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(parameter_group_t), intent(inout) :: group
     character(len=*), intent(in) :: choice, word, variable
     type(problem_list_t), intent(inout) :: problems
     if (group%text_of(choice) /= word) then
-      call forbid(group, choice, ''''//word//'''', variable, problems)
+      call leave_out(group, choice, ''''//word//'''', variable, problems)
     else if (.not. group%given(variable)) then
       call problems%add(group%line_of(choice), 'species.'//variable, &
         'is missing; '//choice//' = '''//word//''' needs it')
     end if
   end subroutine pair_up
 
-  !> Nothing is ignored silently: a variable without effect is a mistake.
-  subroutine forbid(group, choice, words, variable, problems)
-    type(parameter_group_t), intent(in) :: group
+  !> A variable without effect has no value; if it is given, that is a mistake, for nothing is ignored
+  !> silently.
+  subroutine leave_out(group, choice, words, variable, problems)
+    type(parameter_group_t), intent(inout) :: group
     character(len=*), intent(in) :: choice, words, variable
     type(problem_list_t), intent(inout) :: problems
+    call group%unset(variable)
     if (.not. group%given(variable) .or. group%faulty(choice)) return
     call problems%add(group%line_of(variable), 'species.'//variable, 'has no effect with '// &
       choice//' = '''//group%text_of(choice)//'''; it goes with '//words)
-  end subroutine forbid
+  end subroutine leave_out
 
   !> x1, y1, x2, y2, ... as (2,n).
   subroutine take_pairs(group, name, pairs, problems)

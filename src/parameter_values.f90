@@ -36,7 +36,7 @@ module parameter_values
   contains
     procedure :: integer_of, real_of, reals_of, text_of, logical_of
     procedure :: given, faulty, line_of
-    procedure :: set_integer, set_reals, set_text
+    procedure :: set_integer, set_reals, set_text, unset
   end type parameter_group_t
 
 contains
@@ -150,5 +150,15 @@ contains
     padded = value
     self%values(row_of(self%name, name))%texts = [padded]
   end subroutine set_text
+
+  pure subroutine unset(self, name)
+    class(parameter_group_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    associate (slot => self%values(row_of(self%name, name)))
+      if (allocated(slot%integers)) deallocate (slot%integers)
+      if (allocated(slot%reals)) deallocate (slot%reals)
+      if (allocated(slot%texts)) deallocate (slot%texts)
+    end associate
+  end subroutine unset
 
 end module parameter_values
