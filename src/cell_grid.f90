@@ -14,12 +14,15 @@ module cell_grid
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
+  integer(int32), parameter :: listed = cell_capacity        !! mask of the disks in slots
+  integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
   integer(int32), parameter :: list_capacity = 64
+  real(real64), parameter :: no_shift(2) = 0.0_real64
   real(real64), parameter :: disks_per_cell = 0.7_real64    !! wanted when dilute
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
-  !> The disks in a cell: copied as a whole, 16 bytes. The last slot holds their number; a cell with more
-  !> than `cell_capacity` chains the surplus behind its last disk.
+  !> The disks in a cell: copied as a whole, 16 bytes. The last slot counts them: those in the slots in its
+  !> two lowest bits and, if the cell is crowded, those chained behind the last one in the bits above.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
   end type cell_t
@@ -39,8 +42,8 @@ module cell_grid
     procedure :: cross
     procedure, private :: insert
     procedure, private :: remove
-    procedure, private :: scan_cells
-    procedure, private :: scan_chains
+    procedure, private :: scan_crowd
+    procedure, private :: scan_chain
     procedure, private :: scan_around_edge
   end type cell_grid_t
 
@@ -141,42 +144,48 @@ contains
     class(cell_grid_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
     integer(int32) :: n
-    n = self%cell(c)%slot(count_slot)
-    if (n < cell_capacity) then
-      self%next(i) = 0
-      self%cell(c)%slot(n + 1) = i
-    else
-      self%next(i) = self%cell(c)%slot(cell_capacity)
-      self%cell(c)%slot(cell_capacity) = i
-    end if
-    self%cell(c)%slot(count_slot) = n + 1
+    associate (slot => self%cell(c)%slot)
+      n = slot(count_slot)
+      if (n < cell_capacity) then
+        self%next(i) = 0
+        slot(n + 1) = i
+        slot(count_slot) = n + 1
+      else                                         ! becomes the head of the chain
+        self%next(i) = slot(cell_capacity)
+        slot(cell_capacity) = i
+        slot(count_slot) = n + chained
+      end if
+    end associate
   end subroutine insert
 
   !> Takes disk i out of cell c.
   pure subroutine remove(self, c, i)
     class(cell_grid_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
-    integer(int32) :: n, k, chained
-    n = self%cell(c)%slot(count_slot)
-    do k = 1, min(n, cell_capacity)
-      if (self%cell(c)%slot(k) == i) exit
-    end do
-    if (n <= cell_capacity) then
-      self%cell(c)%slot(k) = self%cell(c)%slot(n)
-    else
-      chained = self%cell(c)%slot(cell_capacity)
-      if (k <= cell_capacity) then                 ! the head of the chain takes the free place
-        self%cell(c)%slot(k) = chained
-        self%cell(c)%slot(cell_capacity) = self%next(chained)
-        self%next(chained) = 0
-      else
-        do while (self%next(chained) /= i)
-          chained = self%next(chained)
-        end do
-        self%next(chained) = self%next(i)
+    integer(int32) :: n, k, link
+    associate (slot => self%cell(c)%slot)
+      n = slot(count_slot)
+      do k = 1, iand(n, listed)
+        if (slot(k) == i) exit
+      end do
+      if (n <= listed) then
+        slot(k) = slot(n)
+        slot(count_slot) = n - 1
+        return
       end if
-    end if
-    self%cell(c)%slot(count_slot) = n - 1
+      link = slot(cell_capacity)
+      if (k <= cell_capacity) then                 ! the head of the chain takes the free place
+        slot(k) = link
+        slot(cell_capacity) = self%next(link)
+        self%next(link) = 0
+      else
+        do while (self%next(link) /= i)
+          link = self%next(link)
+        end do
+        self%next(link) = self%next(i)
+      end if
+      slot(count_slot) = n - chained
+    end associate
   end subroutine remove
 
   !> Moves disk i into the cell beyond the face; over a periodic side into the first one behind it.
@@ -202,7 +211,8 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64) :: t, t_y
-    integer(int32) :: code, code_y, c
+    integer(int32) :: code, code_y, c, n, list(list_capacity)
+    logical :: crowded
     call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 1, t, code)
     call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 2, t_y, code_y)
     code = merge(code, code_y, t <= t_y)
@@ -213,7 +223,9 @@ contains
     if (at_periodic_edge(self, sim%box, sim%tag(i)%cell)) then
       call self%scan_around_edge(sim, i, t, code)
     else
-      call self%scan_cells(sim%disk, i, c, sim%box%gravity, t, code)
+      call gather(self%cell, c, self%stride, list, n, crowded)
+      call earliest_contact(sim%disk, i, n, list, no_shift, sim%box%gravity, t, code)
+      if (crowded) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
     end if
     sim%disk(i)%event_time = t
     sim%disk(i)%partner = code
@@ -293,44 +305,59 @@ contains
     yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
-  !> Contacts with the disks in the nine cells around c. Whole cells are copied into one list without a
-  !> branch on their occupancy; then the kernel has one mostly false branch per candidate.
-  pure subroutine scan_cells(self, disk, i, c, gravity, t, code)
+  !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they
+  !> hold; of a crowded one, only those in its slots.
+  pure subroutine gather(cell, c, stride, list, n, crowded)
+    type(cell_t), intent(in) :: cell(0:*)
+    integer(int32), intent(in) :: c, stride
+    integer(int32), intent(out) :: list(list_capacity)
+    integer(int32), intent(out) :: n               !! number of disks listed
+    logical, intent(out) :: crowded                !! one of the cells has a chain
+    integer(int32) :: k, row, m, counts
+    m = 0
+    counts = 0
+    k = c - stride
+    do row = 1, 3
+      list(m + 1:m + count_slot) = cell(k - 1)%slot
+      m = m + iand(cell(k - 1)%slot(count_slot), listed)
+      list(m + 1:m + count_slot) = cell(k)%slot
+      m = m + iand(cell(k)%slot(count_slot), listed)
+      list(m + 1:m + count_slot) = cell(k + 1)%slot
+      m = m + iand(cell(k + 1)%slot(count_slot), listed)
+      counts = ior(counts, ior(cell(k - 1)%slot(count_slot), &
+        ior(cell(k)%slot(count_slot), cell(k + 1)%slot(count_slot))))
+      k = k + stride
+    end do
+    n = m
+    crowded = counts > listed
+  end subroutine gather
+
+  !> Contacts with the chained disks of the nine cells around c.
+  pure subroutine scan_crowd(self, disk, i, c, gravity, t, code)
     class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk(:)
+    type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    integer(int32) :: list(list_capacity), n, k, m, most
-    n = 0
-    most = 0
+    integer(int32) :: k, m
     do k = c - self%stride, c + self%stride, self%stride
       do m = k - 1, k + 1
-        list(n + 1:n + count_slot) = self%cell(m)%slot
-        most = max(most, self%cell(m)%slot(count_slot))
-        n = n + min(self%cell(m)%slot(count_slot), cell_capacity)
+        call self%scan_chain(disk, i, m, no_shift, gravity, t, code)
       end do
     end do
-    call earliest_contact(disk, i, n, list, [0.0_real64, 0.0_real64], gravity, t, code)
-    if (most <= cell_capacity) return
-    do k = c - self%stride, c + self%stride, self%stride
-      do m = k - 1, k + 1
-        call self%scan_chains(disk, i, m, [0.0_real64, 0.0_real64], gravity, t, code)
-      end do
-    end do
-  end subroutine scan_cells
+  end subroutine scan_crowd
 
   !> Contacts with the chained disks of the crowded cell c.
-  pure subroutine scan_chains(self, disk, i, c, shift, gravity, t, code)
+  pure subroutine scan_chain(self, disk, i, c, shift, gravity, t, code)
     class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk(:)
+    type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
     real(real64), intent(in) :: shift(2), gravity(2)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: list(list_capacity), n, j
-    if (self%cell(c)%slot(count_slot) <= cell_capacity) return
+    if (self%cell(c)%slot(count_slot) <= listed) return
     j = self%next(self%cell(c)%slot(cell_capacity))
     do while (j > 0)
       n = 0
@@ -341,7 +368,7 @@ contains
       end do
       call earliest_contact(disk, i, n, list, shift, gravity, t, code)
     end do
-  end subroutine scan_chains
+  end subroutine scan_chain
 
   !> The same cell by cell where some of the nine are images beyond a periodic side. In a box of fewer than
   !> three columns a cell stands for several of its images.
@@ -360,9 +387,9 @@ contains
         there = there - image*self%n
         shift = image*sim%box%edges()
         c = there(1) + self%stride*there(2)
-        call earliest_contact(sim%disk, i, min(self%cell(c)%slot(count_slot), cell_capacity), &
+        call earliest_contact(sim%disk, i, iand(self%cell(c)%slot(count_slot), listed), &
           self%cell(c)%slot, shift, sim%box%gravity, t, code)
-        call self%scan_chains(sim%disk, i, c, shift, sim%box%gravity, t, code)
+        call self%scan_chain(sim%disk, i, c, shift, sim%box%gravity, t, code)
       end do
     end do
   end subroutine scan_around_edge

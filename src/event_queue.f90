@@ -35,6 +35,7 @@ module event_queue
     integer(int32) :: window = 0                   !! number of the current window since the epoch
     integer(int32) :: half_turn = 0                !! window at which the far list is filed again
     real(real64) :: width = never                  !! of a window [time]
+    real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
     real(real64) :: window_end = never             !! since the epoch [time]
     integer(int64) :: n_taken = 0                  !! events since the last filling
     real(real64) :: filled_at = 0.0_real64         !! moment of the last filling [time]
@@ -65,6 +66,7 @@ contains
     call self%heap%initialise(n)
     tag%bucket = nowhere
     self%width = window_width(self, disk, now)
+    self%per_time = 1/self%width
     self%calendar = calendar .and. self%width < never
     self%n_taken = 0
     self%filled_at = now
@@ -78,7 +80,7 @@ contains
       end if
       if (.not. allocated(self%bucket)) allocate (self%bucket(0:length - 1), self%far(n))
       self%bucket%n = 0
-      self%window = int(min(now/self%width, 1.0e9_real64), int32)
+      self%window = int(min(now*self%per_time, 1.0e9_real64), int32)
       self%window_end = self%width*(self%window + 1)
       self%half_turn = self%window + length/2
     else
@@ -119,8 +121,8 @@ contains
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
     if (disk(i)%event_time < self%window_end) then
       tag(i)%bucket = in_window
@@ -134,7 +136,7 @@ contains
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
   subroutine insert_near(self, disk, event)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
+    type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
     integer(int32) :: k
     if (self%n_list == list_capacity .or. .not. self%calendar) then
@@ -160,11 +162,11 @@ contains
   !> Into a bucket, or the far list. A full bucket spills into an earlier one: opened too soon does no harm.
   subroutine insert_far(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
     integer(int32) :: window, k
-    window = int(min(disk(i)%event_time/self%width, 2.0e9_real64), int32)
+    window = int(min(disk(i)%event_time*self%per_time, 2.0e9_real64), int32)
     if (window == tag(i)%bucket) return
     window = max(window, self%window + 1)
     if (window - self%window < size(self%bucket)) then
@@ -192,8 +194,8 @@ contains
   !> Drops void entries of the far list and files those that have come near.
   subroutine sweep_far_list(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
     integer(int32) :: k, i, n
     n = self%n_far
     self%n_far = 0
@@ -208,8 +210,8 @@ contains
   !> The disk whose event comes first; the event stays in the queue.
   subroutine first(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(out) :: i
     type(event_t) :: event
     do
@@ -233,7 +235,7 @@ contains
   !> Takes the event that `first` found out of the queue.
   subroutine drop_first(self, tag, i)
     class(event_queue_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag(:)
+    type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i                !! as given by `first`
     if (self%n_list > 0) then
       self%n_list = self%n_list - 1
@@ -246,7 +248,7 @@ contains
 
   !> Whether an entry still is what its disk expects.
   pure function expected(disk, event) result(yes)
-    type(disk_t), intent(in) :: disk(:)
+    type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
     logical :: yes
     yes = disk(event%disk)%event_time == event%time .and. disk(event%disk)%partner == event%partner
@@ -255,15 +257,16 @@ contains
   !> Moves on by one window and sorts its bucket into the list.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
     type(bucket_t) :: opened
     integer(int32) :: k, i
     self%window = self%window + 1
     self%window_end = self%width*(self%window + 1)
     if (self%window == self%half_turn) then
       if (ill_fitting(self)) then
-        call self%fill(disk, tag, self%width*self%window, calendar=.true.)
+        k = size(self%far, kind=int32)
+        call self%fill(disk(1:k), tag(1:k), self%width*self%window, calendar=.true.)
         return
       end if
       self%half_turn = self%window + size(self%bucket, kind=int32)/2

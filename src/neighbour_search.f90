@@ -56,7 +56,7 @@ contains
   !> Most candidates fail one combined test: the root is not before the best so far (it needs
   !> c < -2 b (t - late), with a margin above rounding) or not real.
   pure subroutine earliest_contact(disk, i, n, list, shift, gravity, t, partner)
-    type(disk_t), intent(in) :: disk(:)
+    type(disk_t), intent(in) :: disk(*)       !! all disks
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: n           !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates; i itself is harmless
@@ -64,48 +64,45 @@ contains
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
-    real(real64) :: xi, yi, ui, vi, clock, ri, late, si, sj, dx, dy, du, dv, sigma, b, c, disc, gate, t_j
+    real(real64) :: xi, yi, ui, vi, clock, ri, clock_j, late, si, sj, dx, dy, du, dv, sigma2, b, c, disc
+    real(real64) :: t_j, gate, in_time
     integer(int32) :: k, j
-    logical :: falling
+    logical :: bent
     xi = disk(i)%x(1); yi = disk(i)%x(2)
     ui = disk(i)%v(1); vi = disk(i)%v(2)
     clock = disk(i)%clock
     ri = disk(i)%radius
-    falling = abs(gravity(1)) > 0 .or. abs(gravity(2)) > 0
+    bent = any(abs(gravity) > 0) .or. any(abs(shift) > 0)
     gate = above(t)
     do k = 1, n
       j = list(k)
-      late = max(clock, disk(j)%clock)
+      clock_j = disk(j)%clock
+      late = merge(clock, clock_j, clock > clock_j)
       si = late - clock
-      sj = late - disk(j)%clock
+      sj = late - clock_j
       du = disk(j)%v(1) - ui
       dv = disk(j)%v(2) - vi
-      if (falling) then
-        dx = (disk(j)%x(1) + (disk(j)%v(1) + 0.5_real64*gravity(1)*sj)*sj) &
-          - (xi + (ui + 0.5_real64*gravity(1)*si)*si)
-        dy = (disk(j)%x(2) + (disk(j)%v(2) + 0.5_real64*gravity(2)*sj)*sj) &
-          - (yi + (vi + 0.5_real64*gravity(2)*si)*si)
+      dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
+      dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
+      if (bent) then
+        dx = dx + (shift(1) + 0.5_real64*gravity(1)*(sj*sj - si*si))
+        dy = dy + (shift(2) + 0.5_real64*gravity(2)*(sj*sj - si*si))
         du = du + gravity(1)*(sj - si)
         dv = dv + gravity(2)*(sj - si)
-      else
-        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
-        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
       end if
-      dx = dx + shift(1)
-      dy = dy + shift(2)
-      sigma = ri + disk(j)%radius
+      sigma2 = (ri + disk(j)%radius)**2
       b = dx*du + dy*dv
-      c = dx*dx + dy*dy - sigma*sigma
-      disc = sigma*sigma*(du*du + dv*dv) - (dx*dv - dy*du)**2
-      if (min(-2*(gate - late)*b - c, disc) > 0) then
-        if (b < 0) then
-          t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
-          if (t_j <= t) then
-            if (t_j < t .or. before(i, j, partner)) then
-              t = t_j
-              partner = j
-              gate = above(t)
-            end if
+      c = dx*dx + dy*dy - sigma2
+      disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
+      in_time = 2*(late - gate)*b - c
+      in_time = merge(in_time, disc, in_time < disc)
+      if (in_time > 0) then
+        t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
+        if (t_j <= t .and. b < 0) then
+          if (t_j < t .or. before(i, j, partner)) then
+            t = t_j
+            partner = j
+            gate = above(t)
           end if
         end if
       end if
