@@ -102,7 +102,7 @@ def draw_hull(axes: plt.Axes, run: Run) -> None:
     """The outline of the crater: hull of the first positions of the displaced disks."""
     points = run.position[0][displaced(run)]
     if len(points) > 3:
-        ring = points[ConvexHull(points).vertices]
+        ring = points[ConvexHull(points, qhull_options="QJ").vertices]  # QJ: also for a row
         axes.fill(*ring.T, fill=False, edgecolor=COLOURS[1], lw=1.4, zorder=4)
         axes.plot([], [], color=COLOURS[1], lw=1.4, label="hull of the displaced disks")
         axes.legend(loc="upper left")

@@ -1,7 +1,9 @@
 """Writes small HDF5 files in the layout of a Ricochet run, for tests of the post-processing."""
 
+import importlib
 import sys
 from pathlib import Path
+from unittest import mock
 
 import h5py
 import numpy as np
@@ -103,3 +105,16 @@ def write_parameters(file, parameters, names, species, obstacles):
 def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
     """(frames, count, 2) velocities of an ideal gas."""
     return rng.normal(0.0, np.sqrt(temperature / np.mean(mass)), (frames, count, 2))
+
+
+def run_script(name, *arguments):
+    """Run post/NAME.py as from the command line, in this process; returns the exit code."""
+    import drawing
+
+    module = importlib.import_module(name)
+    with mock.patch.object(sys, "argv", [f"{name}.py", *map(str, arguments)]):
+        try:
+            drawing.launch(module.main)
+        except SystemExit as end:
+            return end.code or 0
+    return 0

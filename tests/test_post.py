@@ -1,0 +1,426 @@
+"""The pure functions of post/ against closed formulas, and each figure drawn once."""
+
+import csv
+import warnings
+
+import numpy as np
+import pytest
+from synthetic_run import maxwell_velocities, run_script, text, write_run
+
+import cooling
+import cost
+import crater
+import crater_scan
+import energy
+import equipartition
+import export
+import gravity
+import mixture
+import scattering
+import snapshot
+import speeds
+import theory
+import trajectory
+from read_run import RunError, read_run
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20)
+
+
+# --- theory ---
+
+
+def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
+    u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (20000, 2)), axis=1)
+    right = theory.hold_against(u, theory.maxwell_cdf)
+    wrong = theory.hold_against(1.02 * u, theory.maxwell_cdf)
+    assert right.ks_p > 0.01 and right.chi2_p > 0.01 and right.ks < 1.63 / np.sqrt(right.n)
+    assert wrong.ks_p < 0.01 and wrong.chi2_p < 0.01
+
+
+def test_maxwell_density_and_distribution_agree():
+    u = np.linspace(0, 4, 4001)
+    slope = np.gradient(theory.maxwell_cdf(u), u)
+    np.testing.assert_allclose(slope[1:-1], theory.maxwell_pdf(u)[1:-1], atol=1e-6)
+
+
+def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng):
+    energies = rng.exponential(size=(40000, 5))  # two quadratic terms each: uniform on the simplex
+    energies *= 5 / energies.sum(axis=1, keepdims=True)
+    u = np.sqrt(energies[:, 0])
+    assert theory.hold_against(u, theory.finite_n_cdf(5)).ks_p > 0.01
+    assert theory.hold_against(u, theory.maxwell_cdf).ks_p < 0.01
+    largest = np.max(np.abs(theory.finite_n_cdf(100)(u) - theory.maxwell_cdf(u)))
+    assert largest == pytest.approx(0.232 / 100, rel=0.02)
+
+
+def test_finite_n_law_in_a_periodic_box(rng):
+    v = rng.normal(size=(40000, 4, 2))
+    v -= v.mean(axis=1, keepdims=True)
+    k = np.sum(v**2, axis=2)
+    u = np.sqrt(k[:, 0] / k.mean(axis=1))
+    assert theory.hold_against(u, theory.finite_n_cdf(4, periodic=True)).ks_p > 0.01
+    assert theory.hold_against(u, theory.finite_n_cdf(4)).ks_p < 0.01
+
+
+@pytest.mark.parametrize(("b", "infinite", "million"), [
+    (0.0, 180, 180), (0.1, 168.52165904547, 168.52164764374), (0.5, 120, 119.99995038037),
+    (0.7, 91.145991998389, 91.145934714068), (0.9, 51.683865526334, 51.683820571990), (1.0, 0, 0),
+    (1.2, 0, 0),
+])
+def test_scattering_angle(b, infinite, million):
+    assert np.degrees(theory.scattering_angle(b)) == pytest.approx(infinite, abs=1e-11)
+    assert np.degrees(theory.scattering_angle(b, 1e6)) == pytest.approx(million, abs=1e-11)
+
+
+def test_excess_kurtosis(rng):
+    assert theory.excess_kurtosis(np.ones(10)) == -0.5
+    speed = np.linalg.norm(rng.normal(size=(200000, 2)), axis=1)
+    assert theory.excess_kurtosis(speed) == pytest.approx(0, abs=0.02)
+
+
+def test_estimate_has_the_error_of_the_mean():
+    mean, error = theory.estimate([1.0, 2.0, 3.0, 4.0])
+    assert (mean, error) == (2.5, pytest.approx(np.sqrt(5 / 3 / 4)))
+    assert np.isnan(theory.estimate([1.0]).error)
+
+
+def test_power_law_is_found_with_its_error(rng):
+    x = np.linspace(1, 30, 10)
+    pulls = []
+    for _ in range(200):
+        error = 0.02 * 3 * x**0.7
+        fit = theory.fit_power_law(x, 3 * x**0.7 + error * rng.normal(size=10), error)
+        pulls.append((fit.exponent - 0.7) / fit.exponent_error)
+    assert abs(np.mean(pulls)) < 0.3 and 0.7 < np.std(pulls) < 1.3
+    assert fit.factor == pytest.approx(3, abs=4 * fit.factor_error)
+    assert theory.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
+
+
+# --- gas and mixture ---
+
+
+def gas(path, rng, count=200, frames=41, **more):
+    """Equal speeds at first, then Maxwell with the energy kept; half a collision per frame."""
+    angle = rng.uniform(0, 2 * np.pi, (1, count))
+    v = np.concatenate([np.stack([np.cos(angle), np.sin(angle)], axis=-1),
+                        maxwell_velocities(rng, frames - 1, count)])
+    v *= np.sqrt(count / np.sum(v**2, axis=(1, 2)))[:, None, None]
+    x = rng.uniform(0.05, 0.95, (frames, count, 2))
+    tau = np.arange(frames)
+    return write_run(path, x, v, observables={"collisions": tau * count // 2}, **more)
+
+
+def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
+    run = read_run(gas(tmp_path / "gas.h5", rng))
+    assert speeds.equilibrium_frames(run, skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
+    assert speeds.equilibrium_frames(run, skip=39, apart=0) == [39, 40]
+    assert speeds.equilibrium_frames(run, skip=50, apart=5) == []
+
+
+def test_reduced_speeds_do_not_know_units(tmp_path, rng):
+    path = gas(tmp_path / "a.h5", rng, mass=np.repeat([1.0, 9.0], 100),
+               species=np.repeat([1, 2], 100), names=("a", "b"))
+    u = speeds.reduced_speeds(read_run(path), [5, 6])
+    assert u.shape == (400,)
+    np.testing.assert_allclose(np.mean(u.reshape(2, 2, 100) ** 2, axis=(0, 2)), [1, 1])
+
+
+def test_relaxation_starts_at_minus_one_half(tmp_path, rng):
+    tau, a2 = speeds.relaxation(read_run(gas(tmp_path / "gas.h5", rng)))
+    assert a2[0] == pytest.approx(-0.5) and np.abs(a2[1:]).max() < 0.5
+    np.testing.assert_allclose(tau, np.arange(41))
+
+
+def test_mixture_table(tmp_path, rng):
+    mass = np.repeat([1.0, 4.0], 500)
+    v = maxwell_velocities(rng, 31, 1000) / np.sqrt(mass)[:, None] * np.sqrt(1.25)
+    v[0] = [1, 0]
+    x = np.zeros_like(v)
+    runs = [read_run(write_run(
+        tmp_path / f"{k}.h5", x, np.roll(v, k, axis=2), mass=mass, species=np.repeat([1, 2], 500),
+        names=("light", "heavy"), observables={"collisions": np.arange(31) * 500})) for k in (0, 1)]
+    result = mixture.table(runs, [list(range(1, 31))] * 2)
+    assert result["K_start"] == [0.5, 2.0] and result["v_start"] == [1, 1]
+    np.testing.assert_allclose(result["v_theory"], [1.401248, 0.700624], atol=1e-6)
+    np.testing.assert_allclose(result["K"], 1.25, rtol=0.02)
+    assert min(result["KS_p"]) > 1e-3
+
+
+def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
+    """Energies that decay with collisions; the heavy species `heavy` times as hot."""
+    t = np.linspace(0, 1, points) ** 2
+    total = np.exp(-decay * t)
+    x = np.zeros((1, 4, 2))
+    return read_run(write_run(
+        path, x, x, mass=[1, 1, 4, 4], species=[1, 1, 2, 2], names=("light", "heavy"),
+        observable_time=t, observables={
+            "collisions": 40 * t, "all/kinetic_energy": 3 * total,
+            "light/kinetic_energy": 6 * total / (1 + heavy),
+            "heavy/kinetic_energy": 6 * heavy * total / (1 + heavy)},
+        parameters={"run": {"seed": seed}, "contact": {"restitution": xi}}))
+
+
+def test_cooling_averages_over_runs_on_one_grid(tmp_path):
+    runs = [cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
+            for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])]
+    result = cooling.cooling(runs)
+    tau, curves = result.by_collisions
+    assert tau[-1] == 20 and result.by_time[0][-1] == 1
+    expected = (np.exp(-tau / 20) + np.exp(-tau / 10)) / 2
+    np.testing.assert_allclose(curves.mean[0], expected, atol=1e-4)
+    np.testing.assert_allclose(curves.error[0], np.abs(np.exp(-tau / 20) - np.exp(-tau / 10)) / 2,
+                               atol=1e-4)
+    np.testing.assert_allclose(result.ratio.mean, 2)
+
+
+# --- scattering ---
+
+
+def collision(path, b, ratio=1e6):
+    """Two frames of a light disk scattered by a heavy one at rest, by the collision rule."""
+    r, v = np.array([0.1, 0.001]), np.array([1.0, 0.0])
+    normal = np.array([-np.sqrt(1 - b**2), b]) if b < 1 else np.zeros(2)
+    after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
+    x = [[[0.5, 0.5], [0.1, 0.5 + b * r.sum()]]] * 2
+    return read_run(write_run(path, x, [[[0, 0], v], [[0, 0], after]], mass=[ratio, 1], radius=r,
+                              parameters={"contact": {"restitution": 1.0}}))
+
+
+@pytest.mark.parametrize("b", [0.0, 0.3, 0.7, 0.99, 1.1])
+def test_scattering_of_a_run(tmp_path, b):
+    result = scattering.scattering(collision(tmp_path / "run.h5", b))
+    assert result.impact == pytest.approx(b, abs=1e-14) and result.mass_ratio == 1e6
+    assert result.angle == pytest.approx(theory.scattering_angle(b, 1e6), abs=1e-13)
+
+
+def test_scattering_needs_one_moving_disk(tmp_path):
+    x = np.zeros((1, 2, 2))
+    with pytest.raises(RunError, match="one of them at rest"):
+        scattering.scattering(read_run(write_run(tmp_path / "run.h5", x, x)))
+
+
+# --- crater ---
+
+
+def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=True):
+    """A bed of 4 x 20 disks; the `moved` first ones of the upper row pushed aside."""
+    r = 0.02
+    xs, ys = np.meshgrid(np.arange(20) * 0.05 + 0.025, [0.35, 0.3, 0.25, 0.2])
+    first = np.concatenate([[[0.5, 0.75]], np.stack([xs.ravel(), ys.ravel()], axis=1)])
+    last = first.copy()
+    last[1 : 1 + moved, 1] += 1.5 * r
+    last[1 + moved, 0] += 0.5 * r
+    v = np.zeros((2, 81, 2))
+    v[0, 0], v[1, 0] = (0, -speed), (0, -speed * np.sqrt(left))
+    hit = np.zeros((2, 81), np.int32)
+    hit[1, : 1 + moved + 4] = 2
+    return write_run(
+        path, [first, last], v, mass=np.r_[mass, np.ones(80)], radius=np.r_[5 * r, np.full(80, r)],
+        species=np.r_[1, np.full(80, 2)], names=("projectile" if names else "tip", "bed"),
+        collisions=hit, observables={"collisions": [0, 90], "all/kinetic_energy": [1.0, left]},
+        parameters={"run": {"seed": seed}, "contact": {"restitution": xi},
+                    "stop": {"energy_fraction": 0.1}})
+
+
+@pytest.mark.parametrize("names", [True, False])
+def test_crater_sizes(tmp_path, names):
+    size = crater.crater(read_run(impact(tmp_path / "run.h5", names=names)))
+    assert (size.hit, size.displaced, size.collisions) == (7, 3, 90)
+    assert size.width == pytest.approx(0.1) and size.depth == pytest.approx(0.04)
+    assert size.energy_left == pytest.approx(0.1)
+
+
+def test_no_crater_has_size_zero(tmp_path):
+    size = crater.crater(read_run(impact(tmp_path / "run.h5", moved=0)))
+    assert (size.displaced, size.width, size.depth) == (0, 0, 0)
+
+
+def test_packing_field_holds_the_area_of_the_bed(tmp_path):
+    run = read_run(impact(tmp_path / "run.h5"))
+    x, y, field = crater.packing_field(run, 0)
+    area = field.sum() * (x[1] - x[0]) * (y[1] - y[0])
+    assert area == pytest.approx(80 * np.pi * 0.02**2, rel=1e-6)
+    assert np.all(field[y > 0.6] < 1e-6)
+
+
+def test_scan_finds_its_base_and_its_points(tmp_path):
+    paths = [impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=int(m) // 5 + s)
+             for m in (5, 10, 15, 20, 25) for s in (1, 2)]
+    paths += [impact(tmp_path / f"x{xi}_{s}.h5", xi=xi, seed=s, left=0.1 + (xi > 0.8) * 0.3)
+              for xi in (0.5, 0.7, 0.9) for s in (1, 2)]
+    runs = crater_scan.distinct([read_run(path) for path in paths])
+    assert len(runs) == len(paths) - 2, "mass 25 and xi 0.5 is the base, once per seed"
+    keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
+    assert crater_scan.base_of(keys) == (25, 5, 5, 0.5)
+    mass, speed, _, xi = (crater_scan.scan_points(keys, sizes, k, 0.1) for k in range(4))
+    assert [p.x for p in mass] == [5, 10, 15, 20, 25] and [p.x for p in speed] == [5]
+    assert mass[1].sizes["displaced"] == (3.5, 0.5) and mass[1].runs == 2
+    assert [p.by_time for p in xi] == [False, False, True]
+
+
+# --- gravity ---
+
+
+def test_windows_are_means():
+    time = np.arange(0, 10.01, 0.1)
+    middle, mean = equipartition.windows(time, time, 2.0)
+    np.testing.assert_allclose(middle, [1, 3, 5, 7, 9])
+    np.testing.assert_allclose(mean, [0.95, 2.95, 4.95, 6.95, 8.95])
+
+
+def test_thermalisation_time_ignores_a_passing_agreement():
+    time = np.arange(8.0)
+    ratio = np.array([2, 1.05, 1.5, 1.2, 1.09, 1.0, 0.95, 1.3])
+    assert equipartition.thermalisation_time(time, np.ones(8), ratio) == 4
+    assert np.isnan(equipartition.thermalisation_time(time, np.ones(8), ratio + 1))
+
+
+def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1):
+    """An ideal gas in equilibrium in the gravity box."""
+    mass, r = np.repeat([0.025, 0.05], 30), 0.04
+    x = np.stack([rng.uniform(r, 8 - r, (frames, 60)),
+                  r + rng.exponential(temperature / (mass * 9.81), (frames, 60))], axis=-1)
+    v = rng.normal(size=(frames, 60, 2)) * np.sqrt(temperature / mass)[:, None]
+    k, u = 0.5 * mass * np.sum(v**2, axis=2), mass * 9.81 * x[..., 1]
+    halves = {"A": slice(0, 30), "B": slice(30, 60), "all": slice(0, 60)}
+    observables = {f"{name}/{kind}_energy": e[:, part].mean(axis=1) for name, part in halves.items()
+                   for kind, e in (("kinetic", k), ("potential", u))}
+    time = np.linspace(0, 100, frames)
+    return write_run(
+        path, x, v, time=time, mass=mass, radius=r, species=np.repeat([1, 2], 30), names=("A", "B"),
+        edges=(8, 16), observables={**observables, "collisions": np.arange(frames),
+                                    "total_energy": 80 * (1 + drift * time)},
+        parameters={"run": {"seed": seed, "dynamics": dynamics, "dt": 0.004},
+                    "box": {"gravity": [0.0, -9.81]}, "contact": {"restitution": 1.0},
+                    "species": {"speed": [0.5, 0.5]}})
+
+
+def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
+    run = read_run(falling(tmp_path / "run.h5", rng))
+    result = gravity.table(run, [gravity.samples(run, n, 20.0) for n in run.names], 0.7)
+    for kind in ("speed", "height"):
+        ratio = np.array(result[f"{kind}_slope"]) / result[f"{kind}_slope_law"]
+        np.testing.assert_allclose(ratio, 1, atol=0.05)
+    np.testing.assert_allclose(result["height_slope_law"], [0.025 * 9.81 / 0.7, 0.05 * 9.81 / 0.7])
+    np.testing.assert_allclose(result["K"], 0.7, rtol=0.03)
+
+
+def test_total_change_of_the_energy(tmp_path, rng):
+    run = read_run(falling(tmp_path / "run.h5", rng, dynamics="steps", drift=1e-6))
+    assert energy.total_change(run)[1][-1] == pytest.approx(1e-4)
+    assert energy.method(run) == "time steps, Δt = 0.004"
+
+
+# --- frames, paths, export, cost ---
+
+
+def test_chosen_frames(tmp_path, rng):
+    run = read_run(gas(tmp_path / "gas.h5", rng, count=2))
+    assert snapshot.chosen_frames(run, "0,10,-1", None) == [0, 10, -1]
+    assert snapshot.chosen_frames(run, None, 5) == [0, 10, 20, 30, 40]
+    assert snapshot.chosen_frames(run, None, 1000) == list(range(41))
+    assert snapshot.chosen_frames(run, None, None) == [-1]
+
+
+def test_paths_break_where_a_period_is_crossed(tmp_path):
+    x = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]])
+    run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=(True, False),
+                             image=np.array([[[0, 0]], [[1, 0]], [[1, 0]]])))
+    (path,) = trajectory.paths_of(run, [0])
+    np.testing.assert_array_equal(path, [[0.8, 0.5], [np.nan, np.nan], [0.1, 0.5], [0.4, 0.5]])
+
+
+def test_exports_keep_every_digit(tmp_path, rng):
+    run = read_run(gas(tmp_path / "gas.h5", rng, count=3, frames=2, names=("a disk",)))
+    lines = export.xyz_frame(run, 1).splitlines()
+    assert lines[0] == "3" and 'Lattice="1.0 0 0 0 1.0 0 0 0 1"' in lines[1]
+    assert "pos:R:2" in lines[1] and "Time=1.0" in lines[1] and 'pbc="F F F"' in lines[1]
+    rows = np.array([line.split()[1:] for line in lines[2:]], dtype=float)
+    np.testing.assert_array_equal(rows[:, :2], run.position[1])
+    np.testing.assert_array_equal(rows[:, 2:4], run.velocity[1])
+    table = list(csv.DictReader("".join(export.exported(run, ".csv", 1)).splitlines()))
+    assert len(table) == 6 and table[3]["species"] == "a disk"
+    assert float(table[5]["vy"]) == run.velocity[1][2, 1]
+
+
+def test_cost_takes_the_best_of_equal_runs(tmp_path):
+    runs = []
+    for k, (search, n, rate) in enumerate([("pairs", 20, 1e5), ("pairs", 10, 1e5),
+                                           ("pairs", 10, 2e5), ("cells", 10, 1e6)]):
+        x = np.zeros((1, n, 2))
+        runs.append(read_run(write_run(tmp_path / f"{k}.h5", x, x,
+                                       parameters={"run": {"search": search}},
+                                       provenance={"collisions_per_second": rate})))
+    measured = cost.costs(runs)
+    np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
+    np.testing.assert_allclose(measured["cells"], [[10], [1]])
+
+
+# --- every script draws ---
+
+
+def draw(script, *arguments):
+    """Run a script in this process, warnings being errors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run_script(script, *arguments) == 0
+
+
+def runs_for(script, folder, rng):
+    """Input files and further options for a script."""
+    if script in ("speeds", "snapshot"):
+        options = ["--frames", "0,-1", "--quiver"] if script == "snapshot" else []
+        return [gas(folder / "gas.h5", rng, parameters={"contact": {"restitution": 1.0}}), *options]
+    if script == "mixture":
+        return [gas(folder / f"{k}.h5", rng, mass=np.repeat([1.0, 4.0], 100), names=("a", "b"),
+                    species=np.repeat([1, 2], 100)) for k in range(2)]
+    if script == "cooling":
+        return [cooled(folder / f"{xi}_{s}.h5", xi, 3 * (1 - xi), seed=s).path
+                for xi in (0.8, 0.9, 1.0) for s in (1, 2)]
+    if script == "scattering":
+        return [collision(folder / f"{b}.h5", b).path for b in (0, 0.5, 1.1)]
+    if script == "crater":
+        return [impact(folder / "run.h5", moved=9)]
+    if script == "crater_scan":
+        return [impact(folder / f"{m}_{s}.h5", mass=m, seed=s, moved=3 + s + m // 5)
+                for m in (5, 10, 15, 25) for s in (1, 2)]
+    if script == "trajectory":
+        return [gas(folder / "gas.h5", rng, count=3, obstacles=[((0.5, 0.5), 0.5, 1)])]
+    if script == "cost":
+        x = np.zeros((1, 3, 2))
+        return [write_run(folder / "run.h5", x, x, parameters={"run": {"search": "cells"}},
+                          provenance={"collisions_per_second": 1e6, "git_commit": text("abc")})]
+    return [falling(folder / "run.h5", rng)]
+
+
+@pytest.mark.parametrize("script", [
+    "speeds", "snapshot", "mixture", "cooling", "scattering", "crater", "crater_scan", "energy",
+    "equipartition", "gravity", "trajectory", "cost"])
+def test_script_draws_and_tabulates(tmp_path, rng, script):
+    arguments = runs_for(script, tmp_path, rng)
+    table = [] if script in ("snapshot", "trajectory") else ["--csv", tmp_path / "new" / "a.csv"]
+    draw(script, *arguments, "-o", tmp_path / "deep" / "figure.png", *table)
+    data = (tmp_path / "deep" / "figure.png").read_bytes()
+    assert data.startswith(b"\x89PNG") and len(data) > 10000
+    assert b"ricochet" in data[:3000], "the source stands in the metadata"
+    if table:
+        rows = list(csv.reader(table[1].open()))
+        assert len(rows) > 1 and len({len(row) for row in rows}) == 1
+
+
+def test_vector_figures_are_written_too(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng)
+    draw("snapshot", path, "-o", tmp_path / "a.pdf")
+    draw("snapshot", path, "-o", tmp_path / "a.svg")
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_animation_and_export_write_their_files(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng, frames=4)
+    draw("animate", path, "-o", tmp_path / "film.gif", "--fps", 10)
+    assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF")
+    draw("export", path, "-o", tmp_path / "gas.xyz", "--every", 2)
+    assert (tmp_path / "gas.xyz").read_text().count("Lattice") == 2

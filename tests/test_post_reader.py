@@ -1,0 +1,160 @@
+"""post/read_run.py: what it reads, and what it says about files that it cannot read."""
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from synthetic_run import ROOT, run_script, write_run
+
+from read_run import Obstacle, RunError, mdanalysis_universe, read_run
+
+SCRIPTS = ["speeds", "snapshot", "crater", "crater_scan", "scattering", "mixture", "cooling",
+           "animate", "energy", "equipartition", "gravity", "trajectory", "export", "cost"]
+
+
+@pytest.fixture
+def small(tmp_path):
+    """Three frames of two disks that move apart."""
+    x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
+    v = np.array([[[-3.0, 4.0], [0.0, 1.0]]] * 3)
+    return write_run(
+        tmp_path / "small.h5", x, v, time=[0, 0.5, 1], mass=[2.0, 1.0], radius=[0.1, 0.2],
+        species=[2, 1], names=("light", "heavy one"), edges=(2, 4), lower=(-1, -2),
+        periodic=(True, False), image=np.array([[[0, 0], [0, 0]], [[0, 0], [1, 0]],
+                                                [[-1, 0], [1, 0]]]),
+        collisions=[[0, 0], [1, 0], [3, 2]], obstacles=[((0.5, 0.25), 0.2, 0)],
+        observables={"collisions": [0, 2, 6], "all/kinetic_energy": [1.0, 2.0, 3.0]},
+        parameters={"run": {"seed": 7}, "contact": {"restitution": 0.5},
+                    "box": {"gravity": [0.0, -9.81]}},
+    )
+
+
+def test_constants_and_parameters(small):
+    run = read_run(small)
+    assert (run.count, run.frames, run.names) == (2, 3, ("light", "heavy one"))
+    assert run.seed == 7 and run.restitution == 0.5
+    np.testing.assert_array_equal(run.gravity, [0, -9.81])
+    np.testing.assert_array_equal(run.upper, [1, 2])
+    np.testing.assert_array_equal(run.periodic, [True, False])
+    np.testing.assert_array_equal(run.of_species("heavy one"), [True, False])
+    (obstacle,) = run.obstacles
+    assert obstacle[1:] == Obstacle(None, 0.2, False)[1:]
+
+
+def test_derived_quantities(small):
+    run = read_run(small)
+    np.testing.assert_allclose(run.speed(0), [5, 1])
+    np.testing.assert_allclose(run.kinetic_energy(-1), [25, 0.5])
+    np.testing.assert_allclose(run.unwrapped(2), [[-2, 0.5], [2.9, 0.5]])
+    np.testing.assert_allclose(run.displacement(2), [2.2, 2.2])
+    np.testing.assert_allclose(run.displacement(slice(0, 2)), [[0, 0], [0.1, 2.1]])
+    np.testing.assert_allclose(run.collisions_per_disk_at([0.25, 1.0]), [1, 6])
+
+
+def test_frames_are_indexed_like_an_array(small):
+    run = read_run(small)
+    whole = run.position[:]
+    assert whole.shape == (3, 2, 2)
+    for index in (0, -1, slice(None, None, -1), slice(2, 0, -2), slice(1, None), slice(5, 9)):
+        np.testing.assert_array_equal(run.position[index], whole[index])
+    np.testing.assert_array_equal(np.array(list(run.position)), whole)
+    with pytest.raises(RunError, match="no frame 3, there are 3"):
+        run.position[3]
+
+
+def frames_seen_by_another_program(path):
+    code = f"from read_run import read_run; print(read_run({str(path)!r}).frames)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
+                            cwd=ROOT / "post")
+    return int(result.stdout) if result.returncode == 0 else result.stderr.splitlines()[-1]
+
+
+def test_a_run_in_progress_is_read_up_to_its_last_committed_frame(tmp_path):
+    x = np.zeros((5, 2, 2))
+    path = write_run(tmp_path / "run.h5.part", x, x, committed=2)
+    assert len(read_run(path).position[:]) == 2
+    with h5py.File(path, "r+", locking=True) as writer:  # as the program holds it
+        assert frames_seen_by_another_program(path) == 2
+        writer["particles/disks/committed"][...] = 0
+        writer.flush()
+        assert "holds no frame yet" in frames_seen_by_another_program(path)
+
+
+def test_single_precision_is_computed_in_double(tmp_path):
+    path = write_run(tmp_path / "run.h5", np.zeros((1, 1, 2)), np.ones((1, 1, 2)))
+    with h5py.File(path, "r+") as file:
+        del file["particles/disks/velocity/value"]
+        file["particles/disks/velocity/value"] = np.ones((1, 1, 2), np.float32)
+    assert read_run(path).speed(0).dtype == np.float64
+
+
+def test_restitution_per_pair_of_species(tmp_path):
+    x = np.zeros((1, 1, 2))
+    for matrix, expected in (([[0.5, 0.5], [0.5, 0.5]], 0.5), ([[0.5, 0.9], [0.9, 0.5]], np.nan)):
+        path = write_run(tmp_path / "run.h5", x, x, parameters={"contact": {"restitution": matrix}})
+        np.testing.assert_equal(read_run(path).restitution, expected)
+
+
+def bad_files(folder):
+    """Files that are not finished runs, each with the word that tells why."""
+    good = write_run(folder / "good.h5", np.zeros((4, 50, 2)), np.zeros((4, 50, 2)))
+    (folder / "empty.h5").touch()
+    (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
+    data = good.read_bytes()
+    (folder / "short.h5").write_bytes(data[: len(data) // 2])
+    with h5py.File(folder / "foreign.h5", "w") as file:
+        file["x"] = 1
+    write_run(folder / "future.h5", np.zeros((1, 1, 2)), np.zeros((1, 1, 2)))
+    with h5py.File(folder / "future.h5", "r+") as file:
+        file["h5md"].attrs["version"] = np.array([2, 0])
+    write_run(folder / "partial.h5", np.zeros((1, 1, 2)), np.zeros((1, 1, 2)))
+    with h5py.File(folder / "partial.h5", "r+") as file:
+        del file["particles/disks/velocity"], file["particles/disks/mass"]
+    (folder / "unfinished.h5.part").touch()
+    return {"empty.h5": "empty", "text.h5": "not an HDF5", "short.h5": "cut short",
+            "foreign.h5": "not of a Ricochet run", "future.h5": "version 2.0", "partial.h5": "mass",
+            "missing.h5": "no such file", "unfinished.h5": "unfinished run", "": "folder"}
+
+
+def test_unusable_files_are_told_apart(tmp_path):
+    for name, word in bad_files(tmp_path).items():
+        with pytest.raises(RunError, match=word) as caught:
+            read_run(tmp_path / name)
+        assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, capsys):
+    path = tmp_path / "text.h5"
+    path.write_text("no HDF5 at all\n")
+    assert run_script(script, path) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"{script}.py: {path}") and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_scripts_explain_themselves(script, capsys):
+    assert run_script(script, "--help") == 0
+    said = capsys.readouterr().out
+    assert f"python post/{script}.py" in said and "--output" in said
+
+
+def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
+    result = subprocess.run(
+        [sys.executable, ROOT / "post" / "snapshot.py", small, "-o", "new/a.png"],
+        cwd=tmp_path, env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+        capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "new" / "a.png").exists()
+
+
+def test_mdanalysis_reads_the_bridge(small):
+    pytest.importorskip("MDAnalysis")
+    universe = mdanalysis_universe(read_run(small))
+    assert len(universe.trajectory) == 3 and universe.trajectory.dt == 0.5
+    universe.trajectory[2]
+    np.testing.assert_allclose(universe.atoms.positions, [[0, 0.5, 0], [0.9, 0.5, 0]], atol=1e-7)
+    np.testing.assert_allclose(universe.atoms.velocities[0], [-3, 4, 0])
+    np.testing.assert_allclose(universe.select_atoms("type light").masses, [1])
