@@ -1,0 +1,147 @@
+# Ricochet. `make` builds the program, `make help` lists everything.
+#
+#   BUILD=folder      where everything generated goes; another set of flags wants another folder
+#   DEBUG=1           all run-time checks, no optimisation, in build/debug
+#   ARCH=x86-64-v3    code for other machines than this one (a cluster); default: this machine
+#   FFLAGS, LDFLAGS   replaced as a whole, as usual
+#   PFUNIT_DIR=folder an installed pFUnit; without it the tests run on the substitute in tests/support
+#   V=1               shows the commands
+#
+# Modules and their order are derived from src/*.f90: file name = module name.
+
+comma := ,
+BUILD ?= build$(if $(DEBUG),/debug)
+ARCH ?= native
+OPT ?= $(if $(DEBUG),-O0,-O3 -march=$(ARCH) -finline-limit=2000 -fno-backtrace)
+CHECKS := $(if $(DEBUG),-fcheck=all -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
+FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument $(OPT)
+
+# HDF5's own wrapper knows the compiler, the folders and the libraries.
+H5FC ?= h5fc
+hdf5 := $(shell $(H5FC) -show 2>/dev/null)
+ifeq ($(origin FC),default)
+FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): HDF5 for Fortran is missing. `make set-up` installs it on Debian and Ubuntu))
+endif
+hdf5_flags := $(filter -I%,$(hdf5))
+hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
+# Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
+flags = $(FFLAGS) $(CHECKS) -ffp-contract=off -ffpe-summary=none
+
+PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
+Q := $(if $(V),,@)
+
+sources := $(wildcard src/*.f90)
+modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
+objects := $(modules:%=$(BUILD)/%.o)
+
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.DEFAULT_GOAL := all
+.PHONY: all set-up demo figures test unit-tests check lint bench bench-check coverage docs help clean FORCE
+
+all: $(BUILD)/ricochet  ## builds the program (default)
+
+$(BUILD)/ricochet: $(BUILD)/main.o $(objects)
+	@echo "link    $@"
+	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(hdf5_libs)
+
+$(BUILD)/%.o: src/%.f90 $(BUILD)/flags
+	@echo "compile $<"
+	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+
+$(BUILD)/build_info.o: $(BUILD)/build_info.f90 $(BUILD)/flags
+	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
+
+# A file that is rewritten only when its text changes, so that what hangs on it stays.
+keep = cat > $@.new; if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+
+$(BUILD)/flags: FORCE | $(BUILD)
+	@echo '$(FC) $(flags)' | { $(keep); }
+
+commit = $(shell git describe --always --abbrev=12 --exclude='*' 2>/dev/null || echo unknown)
+changed = $(shell git diff --quiet HEAD -- src Makefile 2>/dev/null || echo +changes)
+$(BUILD)/build_info.f90: FORCE | $(BUILD)
+	@{ echo '!> Where this program comes from. Written by the Makefile.'; \
+	  echo 'module build_info'; \
+	  echo '  implicit none'; \
+	  echo '  private'; \
+	  echo '  public :: git_commit, build_flags'; \
+	  echo "  character(len=*), parameter :: git_commit = '$(commit)$(changed)'"; \
+	  echo "  character(len=*), parameter :: build_flags = '$(firstword $(flags))' &"; \
+	  for flag in $(wordlist 2,$(words $(flags)),$(flags)); do echo "    // ' $$flag' &"; done; \
+	  echo "    // ''"; \
+	  echo 'end module build_info'; } | { $(keep); }
+
+# Who uses whom: `x.o: y.o` for every `use y` in src/x.f90 or tests/x.pf.
+tests := $(wildcard tests/test_*.pf)
+$(BUILD)/deps.mk: $(sources) $(tests) Makefile | $(BUILD)
+	@awk -v build='$(BUILD)' -v known='$(modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
+	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
+	  tolower($$1) == "use" { sub(/,.*/, "", $$2); if ($$2 in own && $$2 != me) print build "/" me ".o: " build "/" $$2 ".o" }' \
+	  $(sources) $(tests) | sort -u > $@
+
+$(BUILD):
+	@mkdir -p $@
+
+ifneq ($(filter-out help clean set-up,$(or $(MAKECMDGOALS),all)),)
+-include $(BUILD)/deps.mk
+endif
+
+# --- Unit tests: the same .pf files under pFUnit or the substitute, always with all checks on -----------------
+
+PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
+unit_make = $(MAKE) --no-print-directory DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests) unit-tests
+
+ifneq ($(PFUNIT_DIR),)
+include $(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk) $(PFUNIT_DIR)/PFUNIT.mk)
+runner := pFUnit $(PFUNIT_VERSION)
+translate = $(PYTHON) $(PFUNIT_BIN_DIR)/funitproc $< $@ >/dev/null
+driver := $(PFUNIT_INCLUDE_DIR)/driver.F90
+test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"'
+test_libs = $(PFUNIT_LIBRARIES)
+else
+runner := the substitute for pFUnit
+translate = $(PYTHON) tests/support/translate_pf.py $< $@
+driver := tests/support/driver.F90
+test_flags = -cpp -I$(BUILD)
+funit := $(BUILD)/funit.o
+endif
+test_objects := $(tests:tests/%.pf=$(BUILD)/%.o)
+
+unit-tests: $(BUILD)/unit_tests
+	@tests/support/run_unit_tests.sh "$(runner)" $< $(tests)
+
+$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(objects) $(funit)
+	@echo "link    $@"
+	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(hdf5_libs)
+
+$(BUILD)/test_%.F90: tests/test_%.pf $(wildcard tests/support/*.py)
+	$(Q)$(translate)
+
+$(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags $(funit)
+	@echo "compile $(<:$(BUILD)/%.F90=tests/%.pf)"
+	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+
+$(BUILD)/funit.o: tests/support/funit.f90 $(BUILD)/flags
+	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
+
+$(BUILD)/tests.inc: FORCE | $(BUILD)
+	@printf 'ADD_TEST_SUITE(%s_suite)\n' $(basename $(notdir $(tests))) | { $(keep); }
+
+# --- What people call ----------------------------------------------------------------------------------------
+
+set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
+	@.ci/set-up demo test
+
+test:  ## unit tests, then whole runs and scripts (two minutes)
+	@.ci/set-up demo test
+	@$(unit_make)
+	@$(MAKE) --no-print-directory all
+	@RICOCHET='$(abspath $(BUILD))/ricochet' .venv/bin/python -m pytest -q tests
+
+clean:  ## removes everything generated, but .venv and runs/
+	rm -rf $(BUILD)
+
+help:  ## this list
+	@awk -F ':.*##' '/^[a-z-]+:.*##/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@sed -n 's/^#   /  /p' Makefile

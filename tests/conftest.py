@@ -1,0 +1,31 @@
+"""What all tests share: the program under test and a way to run it."""
+
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def program() -> Path:
+    """The program: what RICOCHET names, else build/ricochet. Missing is a failure, not a skip."""
+    path = Path(os.environ.get("RICOCHET", ROOT / "build" / "ricochet")).resolve()
+    if not os.access(path, os.X_OK):
+        pytest.fail(f"no program at {path}: run make first, or set RICOCHET")
+    return path
+
+
+@pytest.fixture
+def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
+    """`ricochet(*arguments)` runs the program in `tmp_path`; the result has its status and output."""
+
+    def run(*arguments, timeout=60, **options) -> subprocess.CompletedProcess:
+        command = [program, *map(str, arguments)]
+        options = {"cwd": tmp_path, "capture_output": True, "text": True, **options}
+        return subprocess.run(command, check=False, timeout=timeout, **options)
+
+    return run

@@ -1,0 +1,338 @@
+!> Simulations for tests: states built in a line, followed by any method, and compared; and random cases.
+module test_systems
+  use kinds, only: dp => real64, int32, int64, never
+  use all_pairs, only: all_pairs_t
+  use box_geometry, only: obstacle_reach, obstacle_t
+  use cell_grid, only: cell_grid_t
+  use disks, only: disk_t, tag_t
+  use errors, only: error_t
+  use event_driven, only: event_driven_t
+  use evolution, only: limits_t
+  use random_stream, only: random_stream_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: few_disks, system, prepare, run, difference
+  public :: total_energy, momentum, angular_momentum, tightest_gap
+  public :: draw_between, draw_vector, draw_magnitude, disk_named
+
+contains
+
+  !> Disks one by one, each a species of its own, in the unit box with elastic walls.
+  pure function few_disks(x, v, radius, mass) result(sim)
+    real(dp), intent(in) :: x(:)           !! x1, y1, x2, y2, ... [length]
+    real(dp), intent(in) :: v(:)           !! likewise [length/time]
+    real(dp), intent(in) :: radius(:)      !! (n) [length]
+    real(dp), intent(in) :: mass(:)        !! (n) [mass]
+    type(simulation_t) :: sim
+    integer(int32) :: i, n
+    n = size(radius, kind=int32)
+    allocate (sim%disk(n), sim%tag(n), sim%species(n), sim%law%restitution(n, n))
+    sim%law%restitution = 1
+    do i = 1, n
+      sim%disk(i)%x = x(2*i - 1:2*i)
+      sim%disk(i)%v = v(2*i - 1:2*i)
+      sim%disk(i)%radius = radius(i)
+      sim%tag(i)%id = i
+      sim%tag(i)%species = i
+      sim%species(i)%name = "disk"
+      sim%species(i)%count = 1
+      sim%species(i)%mass = mass(i)
+      sim%species(i)%radius = radius(i)
+    end do
+  end function few_disks
+
+  !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
+  !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` to bounce off and a
+  !> `round` container; `mixture` of two species; a `giant` among the small; `inelastic`; `smooth` walls;
+  !> `contact` time; `few`, `dilute` or `dense`.
+  function system(words, seed) result(sim)
+    character(len=*), intent(in) :: words
+    integer(int64), intent(in) :: seed
+    type(simulation_t) :: sim
+    type(random_stream_t) :: stream
+    real(dp) :: spacing, radius
+    call stream%seed(seed, [1])
+    sim%box%lower = [-1.0_dp, 0.5_dp]
+    sim%box%upper = [2.0_dp, 2.5_dp]
+    sim%box%periodic = [has("periodic") .or. has("channel"), has("periodic")]
+    if (has("gravity")) sim%box%gravity = merge([0.0_dp, -1.0_dp], [0.5_dp, -1.0_dp], has("channel"))
+    call add_obstacles(sim, words)
+    spacing = merge(1.0_dp, 0.2_dp, has("few"))
+    radius = 0.32_dp*spacing
+    if (has("dilute")) radius = 0.13_dp*spacing
+    if (has("dense")) radius = 0.46_dp*spacing
+    allocate (sim%species(3))
+    sim%species(1)%name = "small"
+    sim%species(2)%name = "other"
+    sim%species(3)%name = "giant"
+    sim%species%radius = [radius, merge(0.5_dp, 1.0_dp, has("mixture"))*radius, 0.35_dp]
+    sim%species%mass = [1.0_dp, merge(5.0_dp, 1.0_dp, has("mixture")), 30.0_dp]
+    allocate (sim%law%restitution(3, 3))
+    sim%law%restitution = 1
+    if (has("inelastic")) then
+      sim%law%restitution = reshape([0.9_dp, 0.8_dp, 0.7_dp, 0.8_dp, 0.95_dp, 0.6_dp, 0.7_dp, 0.6_dp, &
+        0.5_dp], [3, 3])
+      sim%law%wall_restitution = 0.85_dp
+    end if
+    sim%law%smooth_walls = has("smooth")
+    if (has("contact")) sim%law%contact_time = 0.01_dp
+    call fill_lattice(sim, spacing, has("giant"), stream)
+    sim%start_energy = sim%kinetic_energy()
+
+  contains
+
+    pure logical function has(word)
+      character(len=*), intent(in) :: word
+      has = index(words, word) > 0
+    end function has
+  end function system
+
+  !> Circles inside the box: three of different size, or one container.
+  subroutine add_obstacles(sim, words)
+    type(simulation_t), intent(inout) :: sim
+    character(len=*), intent(in) :: words
+    allocate (sim%box%obstacle(0))
+    if (index(words, "pegs") > 0) sim%box%obstacle = [ &
+      obstacle_t("small", [-0.3_dp, 1.1_dp], 0.05_dp, .false.), &
+      obstacle_t("middle", [0.9_dp, 1.9_dp], 0.2_dp, .false.), &
+      obstacle_t("large", [1.2_dp, 1.2_dp], 0.3_dp, .false.)]
+    if (index(words, "round") > 0) sim%box%obstacle = [sim%box%obstacle, &
+      obstacle_t("round", [0.5_dp, 1.5_dp], 0.98_dp, .true.)]
+  end subroutine add_obstacles
+
+  !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
+  !> site, with velocity components uniform in (-1,1).
+  subroutine fill_lattice(sim, spacing, giant, stream)
+    type(simulation_t), intent(inout) :: sim
+    real(dp), intent(in) :: spacing
+    logical, intent(in) :: giant
+    type(random_stream_t), intent(inout) :: stream
+    type(disk_t) :: disk
+    type(tag_t) :: tag
+    real(dp) :: jitter(2), site(2), room
+    integer(int32) :: ix, iy, n(2)
+    allocate (sim%disk(0), sim%tag(0))
+    if (giant) then
+      disk%x = [0.1_dp, 1.7_dp]
+      disk%radius = sim%species(3)%radius
+      sim%disk = [disk]
+      tag%id = 1
+      tag%species = 3
+      sim%tag = [tag]
+    end if
+    n = nint(sim%box%edges()/spacing, int32)
+    do iy = 1, n(2)
+      do ix = 1, n(1)
+        tag%species = 1 + modulo(ix + iy, 2)
+        disk%radius = sim%species(tag%species)%radius
+        room = 0.5_dp*spacing - disk%radius
+        call draw_vector(stream, 0.7_dp*room, jitter)
+        call draw_vector(stream, 1.0_dp, disk%v)
+        site = sim%box%lower + ([ix, iy] - 0.5_dp)*spacing
+        if (.not. clear(sim, site, disk%radius + room)) cycle
+        disk%x = site + jitter
+        tag%id = tag%id + 1
+        sim%disk = [sim%disk, disk]
+        sim%tag = [sim%tag, tag]
+      end do
+    end do
+  end subroutine fill_lattice
+
+  !> Whether a circle at a site keeps off the obstacles and the giant, the disk of species 3.
+  pure function clear(sim, site, radius) result(yes)
+    type(simulation_t), intent(in) :: sim
+    real(dp), intent(in) :: site(2), radius
+    logical :: yes
+    integer :: k
+    yes = .true.
+    do k = 1, size(sim%box%obstacle)
+      associate (o => sim%box%obstacle(k))
+        yes = yes .and. (norm2(site - o%centre) > obstacle_reach(o, radius) .neqv. o%inside)
+      end associate
+    end do
+    do k = 1, size(sim%disk)
+      if (sim%tag(k)%species == 3) yes = yes &
+        .and. norm2(site - sim%disk(k)%x) > radius + sim%disk(k)%radius
+    end do
+  end function clear
+
+  !> The dynamics that a method names: `cells`, `pairs` or `rescan`; with `heap`, else a calendar.
+  subroutine prepare(dynamics, method, sim)
+    type(event_driven_t), intent(out) :: dynamics
+    character(len=*), intent(in) :: method
+    type(simulation_t), intent(inout) :: sim
+    if (index(method, "cells") > 0) then
+      allocate (cell_grid_t :: dynamics%search)
+    else
+      allocate (all_pairs_t :: dynamics%search)
+      dynamics%search%everyone = index(method, "rescan") > 0
+    end if
+    dynamics%calendar = index(method, "heap") == 0
+    call dynamics%start(sim)
+  end subroutine prepare
+
+  !> Takes a simulation up, as after a restart, and follows it to a limit.
+  subroutine run(sim, method, time, collisions, events, failure)
+    type(simulation_t), intent(inout) :: sim
+    character(len=*), intent(in) :: method                      !! as for `prepare`
+    real(dp), intent(in), optional :: time                      !! since the start of the run [time]
+    integer, intent(in), optional :: collisions, events
+    character(len=:), allocatable, intent(out), optional :: failure  !! what broke off, '' if nothing
+    type(event_driven_t) :: dynamics
+    type(limits_t) :: limits
+    type(error_t), allocatable :: error
+    if (present(time)) limits%time = time
+    if (present(collisions)) limits%collisions = collisions
+    if (present(events)) limits%events = events
+    call prepare(dynamics, method, sim)
+    call dynamics%advance(sim, limits, error)
+    if (.not. present(failure)) return
+    failure = ""
+    if (allocated(error)) failure = error%message
+  end subroutine run
+
+  !> The first difference between two states, to the last bit; '' if there is none. What the search and the
+  !> queue note in the disks does not count.
+  pure function difference(a, b) result(text)
+    type(simulation_t), intent(in) :: a, b
+    character(len=:), allocatable :: text
+    integer(int32) :: i
+    text = ""
+    if (a%events /= b%events) text = "events"
+    if (a%collisions /= b%collisions) text = "collisions"
+    if (a%next_epoch /= b%next_epoch) text = "next epoch"
+    if (any(a%wall_collisions /= b%wall_collisions)) text = "wall collisions"
+    if (a%obstacle_collisions /= b%obstacle_collisions) text = "obstacle collisions"
+    if (any(differ([a%epoch, a%now, a%virial, a%dissipated, a%wall_impulse], &
+      [b%epoch, b%now, b%virial, b%dissipated, b%wall_impulse]))) text = "a time or a sum"
+    do i = 1, a%n_disks()
+      if (text /= "") return
+      associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
+        if (s%id /= t%id) text = "order of the disks"
+        if (s%collisions /= t%collisions .or. any(s%image /= t%image)) text = "counts of a disk"
+        if (any(differ([p%x, p%v, p%clock, p%radius], [q%x, q%v, q%clock, q%radius]))) &
+          text = "state of a disk"
+      end associate
+    end do
+  end function difference
+
+  !> Whether two numbers differ, in any bit.
+  elemental function differ(a, b) result(yes)
+    real(dp), intent(in) :: a, b
+    logical :: yes
+    yes = transfer(a, 0_int64) /= transfer(b, 0_int64)
+  end function differ
+
+  !> Kinetic and potential energy now, and what has been dissipated.
+  pure function total_energy(sim) result(energy)
+    type(simulation_t), intent(in) :: sim
+    real(dp) :: energy
+    integer(int32) :: i
+    energy = sim%kinetic_energy() + sim%dissipated
+    do i = 1, sim%n_disks()
+      energy = energy - mass(sim, i)*dot_product(sim%box%gravity, sim%position(i))
+    end do
+  end function total_energy
+
+  pure function momentum(sim) result(p)
+    type(simulation_t), intent(in) :: sim
+    real(dp) :: p(2)
+    integer(int32) :: i
+    p = 0
+    do i = 1, sim%n_disks()
+      p = p + mass(sim, i)*sim%velocity(i)
+    end do
+  end function momentum
+
+  !> About a centre.
+  pure function angular_momentum(sim, centre) result(l)
+    type(simulation_t), intent(in) :: sim
+    real(dp), intent(in) :: centre(2)
+    real(dp) :: l, x(2), v(2)
+    integer(int32) :: i
+    l = 0
+    do i = 1, sim%n_disks()
+      x = sim%position(i) - centre
+      v = sim%velocity(i)
+      l = l + mass(sim, i)*(x(1)*v(2) - x(2)*v(1))
+    end do
+  end function angular_momentum
+
+  pure function mass(sim, i) result(m)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(dp) :: m
+    m = sim%species(sim%tag(i)%species)%mass
+  end function mass
+
+  !> The smallest distance between rims now, of disks, sides and obstacles, in diameters of the disks
+  !> concerned; negative if any overlap.
+  pure function tightest_gap(sim) result(gap)
+    type(simulation_t), intent(in) :: sim
+    real(dp) :: gap, x(2), dx(2), reach
+    integer(int32) :: i, j
+    integer :: m
+    gap = never
+    do i = 1, sim%n_disks()
+      x = sim%position(i)
+      associate (r => sim%disk(i)%radius)
+        do j = 1, i - 1
+          dx = sim%position(j) - x
+          dx = dx - merge(sim%box%edges()*anint(dx/sim%box%edges()), 0.0_dp, sim%box%periodic)
+          gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
+        end do
+        gap = min(gap, minval(pack(x - sim%box%lower - r, .not. sim%box%periodic))/(2*r), &
+          minval(pack(sim%box%upper - r - x, .not. sim%box%periodic))/(2*r))
+        do m = 1, n_obstacles(sim)
+          reach = obstacle_reach(sim%box%obstacle(m), r)
+          dx(1) = norm2(x - sim%box%obstacle(m)%centre) - reach
+          gap = min(gap, merge(-dx(1), dx(1), sim%box%obstacle(m)%inside)/(2*r))
+        end do
+      end associate
+    end do
+  end function tightest_gap
+
+  pure function n_obstacles(sim) result(n)
+    type(simulation_t), intent(in) :: sim
+    integer :: n
+    n = 0
+    if (allocated(sim%box%obstacle)) n = size(sim%box%obstacle)
+  end function n_obstacles
+
+  !> Where the disk with this id is in memory.
+  pure function disk_named(sim, id) result(i)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: id
+    integer(int32) :: i
+    i = findloc(sim%tag%id, id, dim=1)
+  end function disk_named
+
+  !> A number uniform between two.
+  subroutine draw_between(stream, low, high, u)
+    type(random_stream_t), intent(inout) :: stream
+    real(dp), intent(in) :: low, high
+    real(dp), intent(out) :: u
+    call stream%draw_uniform(u)
+    u = low + (high - low)*u
+  end subroutine draw_between
+
+  !> A vector with components uniform in (-size, size).
+  subroutine draw_vector(stream, size, v)
+    type(random_stream_t), intent(inout) :: stream
+    real(dp), intent(in) :: size
+    real(dp), intent(out) :: v(2)
+    call draw_between(stream, -size, size, v(1))
+    call draw_between(stream, -size, size, v(2))
+  end subroutine draw_vector
+
+  !> A positive number of random size: 10**u, u uniform in (-decades, decades).
+  subroutine draw_magnitude(stream, decades, u)
+    type(random_stream_t), intent(inout) :: stream
+    real(dp), intent(in) :: decades
+    real(dp), intent(out) :: u
+    call draw_between(stream, -decades, decades, u)
+    u = 10.0_dp**u
+  end subroutine draw_magnitude
+
+end module test_systems

@@ -1,0 +1,206 @@
+"""Translates a pFUnit test file (.pf) into Fortran for the module `funit` beside this script.
+
+It accepts the part of pFUnit's language that the tests need and refuses everything else, also what
+pFUnit itself would accept or silently ignore: a file that runs here runs under pFUnit with the same
+verdict. One line stays one line, so compilers and failures speak of lines of the .pf file.
+
+    python translate_pf.py tests/test_errors.pf build/tests/test_errors.F90
+"""
+
+import re
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Refused(Exception):
+    """A line that is not in the common language."""
+
+
+class Comparison(NamedTuple):
+    """How a two-sided assertion compares `e_` with `a_` and shows them."""
+
+    good: str
+    shown: str = "pf_number_pair(e_, a_)"
+
+
+class Suite(NamedTuple):
+    """The procedures of a file that the driver calls."""
+
+    tests: list[str]
+    fixtures: dict[str, str]
+
+
+CLOSE = "pf_close(real(e_, pf_real), real(a_, pf_real), pf_width({tolerance}))"
+EXACT = {
+    "equal": Comparison("pf_same(e_, a_)", "pf_pair(e_, a_)"),
+    "notequal": Comparison("e_ < a_ .or. e_ > a_"),
+    "lessthan": Comparison("e_ < a_"),
+    "lessthanorequal": Comparison("e_ <= a_"),
+    "greaterthan": Comparison("e_ > a_"),
+    "greaterthanorequal": Comparison("e_ >= a_"),
+}
+TOLERANT = {
+    "equal": Comparison(CLOSE, "pf_real_pair(e_, a_)"),
+    "relativelyequal": Comparison(
+        CLOSE.replace("pf_close", "pf_relatively_close"), "pf_real_pair(e_, a_)"
+    ),
+}
+CONDITION = {
+    "true": "pf_holds({})",
+    "false": "pf_holds(.not. ({}))",
+    "isnan": "pf_is_nan({})",
+    "isfinite": "pf_is_finite({})",
+}
+SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.IGNORECASE)
+
+
+def without_strings(line: str) -> str:
+    """The code of a line: no comment, and texts replaced by blanks of the same length."""
+    blanked = re.sub(r"'[^']*'|\"[^\"]*\"", lambda text: " " * len(text[0]), line)
+    return blanked.split("!")[0]
+
+
+def split_arguments(text: str) -> list[str]:
+    """The arguments of a call, cut at the commas outside brackets and texts."""
+    code = re.sub(r"'[^']*'|\"[^\"]*\"", lambda quoted: " " * len(quoted[0]), text)
+    cuts, depth = [-1], 0
+    for place, letter in enumerate(code):
+        depth += (letter in "([") - (letter in ")]")
+        if depth < 0:
+            raise Refused("text after the closing bracket; nothing may follow a directive")
+        if letter == "," and depth == 0:
+            cuts.append(place)
+    if depth > 0:
+        raise Refused("unbalanced brackets; a directive stands on one line")
+    ends = [*cuts[1:], len(text)]
+    return [text[cut + 1 : end].strip() for cut, end in zip(cuts, ends, strict=True)]
+
+
+def sort_arguments(text: str) -> tuple[list[str], dict[str, str]]:
+    """Positional arguments, and the keywords `message` and `tolerance`."""
+    positional: list[str] = []
+    keywords: dict[str, str] = {}
+    for argument in split_arguments(text):
+        keyword = re.match(r"(\w+)\s*=(?!=)\s*(.+)", argument)
+        if not keyword:
+            if keywords:
+                raise Refused("a positional argument after a keyword")
+            positional.append(argument)
+        elif keyword[1].lower() not in ("message", "tolerance") or keyword[1].lower() in keywords:
+            raise Refused(f"keyword '{keyword[1]}'; once each: message=, tolerance=")
+        else:
+            keywords[keyword[1].lower()] = keyword[2]
+    if "" in positional:
+        raise Refused("an empty argument")
+    return positional, keywords
+
+
+def assertion(name: str, arguments: str, place: str) -> str:
+    """The Fortran of one `@assert`; `place` is the file and line for the report."""
+    values, keywords = sort_arguments(arguments)
+    message = f", message={keywords['message']}" if "message" in keywords else ""
+    table = TOLERANT if "tolerance" in keywords else EXACT
+    kind = name.lower()
+    if kind in table:
+        expect_count(values, 2)
+        good, shown = (part.format(**keywords) for part in table[kind])
+        check = (
+            f"associate (e_ => ({values[0]}), a_ => ({values[1]})); "
+            "if (.not. pf_conform(shape(e_), shape(a_))) then; "
+            f"call pf_fail({place}, 'Assert{name} failed: the shapes differ'{message}); "
+            f"else if (.not. all([{good}])) then; "
+            f"call pf_fail_pair({place}, 'Assert{name}', [{good}], [{shown}]{message}); "
+            "end if; end associate"
+        )
+    elif kind in CONDITION and "tolerance" not in keywords:
+        expect_count(values, 1)
+        condition = CONDITION[kind].format(values[0])
+        check = f"if (.not. {condition}) call pf_fail({place}, 'Assert{name} failed'{message})"
+    elif kind == "fail" and "message" in keywords and len(keywords) == 1:
+        expect_count(values, 0)
+        check = f"call pf_fail({place}, 'AssertFail'{message})"
+    else:
+        raise Refused(f"@assert{name} with these keywords is not in the common language")
+    return f"{check}; if (anyexceptions()) return"
+
+
+def expect_count(values: list[str], count: int) -> None:
+    """Refuses more or fewer positional arguments: tolerance and message are always keywords."""
+    if len(values) != count:
+        raise Refused(f"{len(values)} positional arguments instead of {count}")
+
+
+def translate_line(line: str, place: str) -> str:
+    """One line of Fortran for one line of a .pf file."""
+    found = re.match(r"\s*@assert(\w+)\s*\((.*)\)\s*$", line, re.IGNORECASE)
+    if found:
+        return assertion(found[1], found[2], place)
+    if re.match(r"\s*@(test|before|after)\s*$", line, re.IGNORECASE):
+        return ""
+    if "@" in without_strings(line):
+        raise Refused("not a directive of the common language (alone on its line, no continuation)")
+    return line
+
+
+def find_suite(lines: list[str], stem: str) -> Suite:
+    """The tests and fixtures of a file, and the check that its module has the file's name."""
+    modules = [found[1] for line in lines if (found := re.match(r"\s*module\s+(\w+)\s*$", line))]
+    if modules != [stem]:
+        raise Refused(f"the file must hold one module, named {stem}")
+    suite = Suite([], {})
+    for number, line in enumerate(lines):
+        found = re.match(r"\s*@(test|before|after)\s*$", line, re.IGNORECASE)
+        if not found:
+            continue
+        kind = found[1].lower()
+        following = lines[number + 1 :]
+        if kind == "test":
+            following = [text for text in following if without_strings(text).strip()]
+        head = SUBROUTINE.match(following[0]) if following else None
+        if not head:
+            raise Refused(f"line {number + 1}: @{kind} needs a plain 'subroutine name()' next")
+        if kind == "test":
+            suite.tests.append(head[1])
+        elif kind in suite.fixtures:
+            raise Refused(f"line {number + 1}: a second @{kind}")
+        else:
+            suite.fixtures[kind] = head[1]
+    return suite
+
+
+def translate(source: Path) -> str:
+    """The Fortran text of a whole file: its module, then the subroutine that runs its tests."""
+    lines = source.read_text().splitlines()
+    suite = find_suite(lines, source.stem)
+    fortran = [f'# 1 "{source}"']
+    for number, line in enumerate(lines, start=1):
+        try:
+            fortran.append(translate_line(line, f"'{source.name}', {number}"))
+        except Refused as refusal:
+            raise Refused(f"line {number}: {refusal}") from None
+    fixtures = "".join(f", {kind}={name}" for kind, name in suite.fixtures.items())
+    fortran += [
+        f"subroutine {source.stem}_suite()",
+        "  use funit, only: pf_run",
+        f"  use {source.stem}",
+        "  implicit none",
+        *(f"  call pf_run('{source.stem}.{test}', {test}{fixtures})" for test in suite.tests),
+        f"end subroutine {source.stem}_suite",
+    ]
+    return "\n".join(fortran) + "\n"
+
+
+def main() -> int:
+    """Translates one file into another; 1 if it is refused."""
+    source, target = map(Path, sys.argv[1:])
+    try:
+        target.write_text(translate(source))
+    except Refused as refusal:
+        print(f"{source}: {refusal}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
