@@ -16,8 +16,9 @@ from read_run import Run
 from theory import Estimate, estimate
 
 # Dilute elastic mixture, half m and half 4 m, equal speeds at the start: Boltzmann equation.
-EQUIPARTITION = np.array([(0, 4), (1, 2.02), (2, 1.455), (3, 1.228), (4, 1.115), (5, 1.062),
-                          (6, 1.031), (8, 1.005)])
+EQUIPARTITION = np.array(
+    [(0, 4), (1, 2.02), (2, 1.455), (3, 1.228), (4, 1.115), (5, 1.062), (6, 1.031), (8, 1.005)]
+)
 
 
 class Cooling(NamedTuple):
@@ -30,8 +31,9 @@ class Cooling(NamedTuple):
 
 def energies(run: Run) -> np.ndarray:
     """(1 + S, T) kinetic energy per disk of all and of each species over that of all at t = 0."""
-    values = np.array([run.observable(f"{name}/kinetic_energy").value
-                       for name in ("all", *run.names)])
+    values = np.array(
+        [run.observable(f"{name}/kinetic_energy").value for name in ("all", *run.names)]
+    )
     return values / values[0, 0]
 
 
@@ -86,15 +88,21 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
     axes = figure.add_subplot(grid[2, :])
     for (xi, _), result, colour in zip(groups, results, COLOURS[2:], strict=False):
         band(axes, result.by_collisions[0], result.ratio, color=colour, label=f"ξ = {xi:g}")
-    axes.plot(*EQUIPARTITION.T, ls="", marker="o", mfc="none", color="black",
-              label="ξ = 1, dilute limit (Boltzmann equation)")
+    axes.plot(
+        *EQUIPARTITION.T,
+        ls="",
+        marker="o",
+        mfc="none",
+        color="black",
+        label="ξ = 1, dilute limit (Boltzmann equation)",
+    )
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
-    axes.set(xlabel="collisions per disk", xlim=(0, None),
-             ylabel="temperature ratio heavy / light")
+    axes.set(xlabel="collisions per disk", xlim=(0, None), ylabel="temperature ratio heavy / light")
     axes.legend(ncols=2)
     runs = [run for _, members in groups for run in members]
-    figure.suptitle(f"{caption(runs)}, walls: {runs[0].parameter('contact', 'wall_rule', '')}",
-                    fontsize=10)
+    figure.suptitle(
+        f"{caption(runs)}, walls: {runs[0].parameter('contact', 'wall_rule', '')}", fontsize=10
+    )
     return figure
 
 
@@ -106,8 +114,10 @@ def main() -> None:
     for (xi, members), result in zip(groups, results, strict=True):
         left = Estimate(result.by_time[1].mean[0, -1], result.by_time[1].error[0, -1])
         ratio = Estimate(result.ratio.mean[-1], result.ratio.error[-1])
-        print(f"restitution = {xi:g}  runs = {len(members)}  energy_left = {left}  "
-              f"temperature_ratio = {ratio}")
+        print(
+            f"restitution = {xi:g}  runs = {len(members)}  energy_left = {left}  "
+            f"temperature_ratio = {ratio}"
+        )
     save(draw(groups, results), args.output, runs, "Cooling and equipartition of a mixture")
     if args.csv:
         write_csv(args.csv, columns(groups, results))

@@ -43,11 +43,13 @@ def draw(measured: dict) -> plt.Figure:
         if search not in measured:
             continue
         n, cost = measured[search]
-        axes.loglog(n, cost, ls="", marker=marker, color=colour,
-                    label=f"{search}: {LABELS[search]}")
+        axes.loglog(
+            n, cost, ls="", marker=marker, color=colour, label=f"{search}: {LABELS[search]}"
+        )
         power = POWERS[search]
-        axes.loglog(n, cost[-1] * (n / n[-1]) ** power, color=colour, lw=1,
-                    label=f"$\\propto N^{power}$")
+        axes.loglog(
+            n, cost[-1] * (n / n[-1]) ** power, color=colour, lw=1, label=f"$\\propto N^{power}$"
+        )
     axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
     axes.legend()
     return figure

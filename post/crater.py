@@ -17,7 +17,16 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import ConvexHull
 
 from drawing import (
-    COLOURS, WALL, caption, command_line, disk_collection, draw_box, launch, plt, read_all, save,
+    COLOURS,
+    WALL,
+    caption,
+    command_line,
+    disk_collection,
+    draw_box,
+    launch,
+    plt,
+    read_all,
+    save,
     write_csv,
 )
 from read_run import Run, RunError
@@ -83,10 +92,14 @@ def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, .
     shape = np.maximum(1, np.round(run.edges / side)).astype(int)
     limits = np.stack([run.lower, run.upper], axis=1)
     area, xs, ys = np.histogram2d(
-        *run.position[frame][here].T, bins=shape, range=limits, weights=np.pi * run.radius[here]**2
+        *run.position[frame][here].T,
+        bins=shape,
+        range=limits,
+        weights=np.pi * run.radius[here] ** 2,
     )
     smooth = gaussian_filter(area, 2.5 * np.median(run.radius[here]) / side, mode="reflect")
-    return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
+    fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
+    return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, fraction
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
@@ -133,8 +146,12 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
     twin.set(ylabel="pair collisions", ylim=(0, None))
     twin.spines["right"].set_visible(True)
     axes.set_box_aspect(0.9)
-    axes.legend(handles=[axes.lines[0], twin.lines[0]], loc="upper center",
-                bbox_to_anchor=(0.5, 1.14), ncols=2)
+    axes.legend(
+        handles=[axes.lines[0], twin.lines[0]],
+        loc="upper center",
+        bbox_to_anchor=(0.5, 1.14),
+        ncols=2,
+    )
 
 
 def draw(run: Run, size: Crater) -> plt.Figure:
@@ -147,15 +164,24 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     draw_state(after, run, -1, moved, limits)
     draw_cavity(after, run)
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
-    figure.colorbar(scale, ax=[before, after], location="bottom", shrink=0.6, aspect=40,
-                    extend="max", pad=0.02, label="displacement at the end (radii)")
+    figure.colorbar(
+        scale,
+        ax=[before, after],
+        location="bottom",
+        shrink=0.6,
+        aspect=40,
+        extend="max",
+        pad=0.02,
+        label="displacement at the end (radii)",
+    )
     count = np.log10(1.0 + run.collisions[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
     draw_state(hits, run, 0, count, (0, top))
     hits.set_title("collisions of each disk, drawn where it lay")
     scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
-    bar = figure.colorbar(scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02,
-                          label="1 + collisions")
+    bar = figure.colorbar(
+        scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02, label="1 + collisions"
+    )
     bar.set_ticks(np.arange(top + 1), labels=[f"{10**k:.0f}" for k in np.arange(top + 1)])
     draw_energy(energy, run)
     tip = projectile(run)
@@ -164,7 +190,9 @@ def draw(run: Run, size: Crater) -> plt.Figure:
         f"{caption([run])},  projectile: mass {run.mass[tip] / run.mass[lying]:.4g} m, radius "
         f"{run.radius[tip] / run.radius[lying]:.4g} r, speed {run.speed(0)[tip]:.4g}\n"
         f"crater: {size.hit} disks hit, {size.displaced} displaced by more than r, width "
-        f"{size.width:.3f}, depth {size.depth:.3f}", fontsize=10)
+        f"{size.width:.3f}, depth {size.depth:.3f}",
+        fontsize=10,
+    )
     return figure
 
 

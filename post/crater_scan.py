@@ -15,7 +15,14 @@ import numpy as np
 
 from crater import Crater, bed, crater, projectile
 from drawing import (
-    COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv,
+    COLOURS,
+    command_line,
+    launch,
+    plt,
+    print_table,
+    read_all,
+    save,
+    write_csv,
 )
 from read_run import Run
 from theory import Estimate, PowerLaw, estimate, fit_power_law
@@ -43,8 +50,12 @@ class Point(NamedTuple):
 def key_of(run: Run) -> tuple[float, ...]:
     """Mass ratio, speed, radius ratio, restitution."""
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
-    values = (run.mass[tip] / run.mass[lying], run.speed(0)[tip],
-              run.radius[tip] / run.radius[lying], run.restitution)
+    values = (
+        run.mass[tip] / run.mass[lying],
+        run.speed(0)[tip],
+        run.radius[tip] / run.radius[lying],
+        run.restitution,
+    )
     return tuple(float(f"{value:.9g}") for value in values)
 
 
@@ -61,16 +72,22 @@ def base_of(keys: list[tuple[float, ...]]) -> tuple[float, ...]:
 def scan_points(keys: list, craters: list[Crater], axis: int, fraction: float) -> list[Point]:
     """The scan along one parameter, all others at the base, in ascending order."""
     base = base_of(keys)
-    along = [k for k, key in enumerate(keys)
-             if all(key[j] == base[j] for j in range(len(key)) if j != axis)]
+    along = [
+        k
+        for k, key in enumerate(keys)
+        if all(key[j] == base[j] for j in range(len(key)) if j != axis)
+    ]
     points = []
     for x in sorted({keys[k][axis] for k in along}):
         here = [craters[k] for k in along if keys[k][axis] == x]
-        sizes = {name: estimate([getattr(c, name) for c in here])
-                 for name in ("hit", "displaced", "width", "depth")}
+        sizes = {
+            name: estimate([getattr(c, name) for c in here])
+            for name in ("hit", "displaced", "width", "depth")
+        }
         left = [c.energy_left for c in here]
-        points.append(Point(x, len(here), sizes, float(np.mean(left)),
-                            max(left) > fraction * (1 + 1e-9)))
+        points.append(
+            Point(x, len(here), sizes, float(np.mean(left)), max(left) > fraction * (1 + 1e-9))
+        )
     return points
 
 
@@ -82,31 +99,44 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 def fits_of(axis: str, points: list[Point]) -> dict[str, PowerLaw | None]:
     """A power law for each size."""
     x = abscissa(axis, [p.x for p in points])
-    return {name: fit_power_law(x, [p.sizes[name].mean for p in points],
-                                [p.sizes[name].error for p in points])
-            for name in points[0].sizes}
+    return {
+        name: fit_power_law(
+            x, [p.sizes[name].mean for p in points], [p.sizes[name].error for p in points]
+        )
+        for name in points[0].sizes
+    }
 
 
-def draw_sizes(axes: plt.Axes, axis: str, points: list[Point], fits: dict, names: dict,
-               colours: list[str]) -> None:
+def draw_sizes(
+    axes: plt.Axes, axis: str, points: list[Point], fits: dict, names: dict, colours: list[str]
+) -> None:
     """Some of the sizes with their fits on one pair of axes."""
     x = np.array([p.x for p in points])
     base = "(1-ξ^2)" if axis == "restitution" else "x"
     reached = np.array([not p.by_time for p in points])
-    for (name, label), colour, marker in zip(names.items(), colours, "osD^", strict=False):
+    for (name, title), colour, marker in zip(names.items(), colours, "osD^", strict=False):
         y = np.array([p.sizes[name].mean for p in points])
         error = np.nan_to_num([p.sizes[name].error for p in points])
         fit = fits[name]
+        label = title
         if fit:
             power = f"{fit.exponent:.2f} \\pm {fit.exponent_error:.2f}"
             label += f", $\\propto {base}^{{{power}}}$"
             inside = np.linspace(x.min(), x.max(), 200)
             inside = inside[abscissa(axis, inside) > 0]
             axes.plot(inside, fit(abscissa(axis, inside)), color=colour, lw=1, ls="-")
-        axes.errorbar(x[reached], y[reached], error[reached], ls="", marker=marker, color=colour,
-                      label=label)
-        axes.errorbar(x[~reached], y[~reached], error[~reached], ls="", marker=marker,
-                      color=colour, mfc="white")
+        axes.errorbar(
+            x[reached], y[reached], error[reached], ls="", marker=marker, color=colour, label=label
+        )
+        axes.errorbar(
+            x[~reached],
+            y[~reached],
+            error[~reached],
+            ls="",
+            marker=marker,
+            color=colour,
+            mfc="white",
+        )
 
 
 def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list[Run]):
@@ -121,10 +151,19 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
         draw_sizes(lengths, axis, points, fits, EXTENTS, COLOURS[2:4])
         if axis == "mass":
             x = np.array([p.x for p in points])
-            numbers.plot(x, x * (1 / fraction - 1), color="0.4", lw=1, ls=":",
-                         label=f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$")
-        others = [f"{name} {value:g}" for k, (name, value) in
-                  enumerate(zip(AXES, base, strict=True)) if k != fixed]
+            numbers.plot(
+                x,
+                x * (1 / fraction - 1),
+                color="0.4",
+                lw=1,
+                ls=":",
+                label=f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$",
+            )
+        others = [
+            f"{name} {value:g}"
+            for k, (name, value) in enumerate(zip(AXES, base, strict=True))
+            if k != fixed
+        ]
         numbers.set(ylabel="number of disks", title=",  ".join(others))
         numbers.tick_params(labelbottom=False)
         lengths.set(xlabel=AXES[axis], ylabel="length (box = 1)")
@@ -138,7 +177,8 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
         f"Crater size,  N = {', '.join(str(n) for n in sorted({r.count for r in runs}))},  "
         f"{number} runs per point,  ended at "
         f"{100 * fraction:g} % of the energy" + (" (open: at a set time)" if ended else ""),
-        fontsize=10)
+        fontsize=10,
+    )
     return figure
 
 

@@ -11,12 +11,12 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
-import numpy as np  # noqa: E402
-from matplotlib.collections import EllipseCollection  # noqa: E402
-from matplotlib.patches import Circle, Rectangle  # noqa: E402
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from matplotlib.patches import Circle, Rectangle
 
-from read_run import Run, RunError, read_run  # noqa: E402
+from read_run import Run, RunError, read_run
 
 plt.style.use(Path(__file__).with_name("ricochet.mplstyle"))
 
@@ -85,18 +85,29 @@ def species_label(run: Run, name: str) -> str:
 def draw_box(axes: plt.Axes, run: Run) -> None:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, no ticks."""
     (x0, y0), (x1, y1) = run.lower, run.upper
-    for axis, (xs, ys) in ((0, ((x0, x0), (y0, y1))), (0, ((x1, x1), (y0, y1))),
-                           (1, ((x0, x1), (y0, y0))), (1, ((x0, x1), (y1, y1)))):
+    for axis, (xs, ys) in (
+        (0, ((x0, x0), (y0, y1))),
+        (0, ((x1, x1), (y0, y1))),
+        (1, ((x0, x1), (y0, y0))),
+        (1, ((x0, x1), (y1, y1))),
+    ):
         axes.plot(xs, ys, ls="--" if run.periodic[axis] else "-", clip_on=False, zorder=3, **WALL)
     for obstacle in run.obstacles:
         if obstacle.inside:
             axes.add_patch(Rectangle(run.lower, *run.edges, facecolor="0.85", zorder=0))
         fill = "white" if obstacle.inside else "0.75"
-        axes.add_patch(
-            Circle(obstacle.centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
-        )
+        for centre in images(run, obstacle.centre):
+            axes.add_patch(
+                Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
+            )
     axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
+
+
+def images(run: Run, point: np.ndarray) -> np.ndarray:
+    """(M, 2) the point and its periodic copies beside the box."""
+    shifts = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
+    return np.array([point + run.edges * (i, j) for i in shifts[0] for j in shifts[1]])
 
 
 def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
@@ -104,8 +115,13 @@ def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> 
     diameter = 2 * run.radius
     style = {"linewidths": 0, **style}
     collection = EllipseCollection(
-        diameter, diameter, np.zeros(run.count), units="xy",
-        offsets=position, offset_transform=axes.transData, **style,
+        diameter,
+        diameter,
+        np.zeros(run.count),
+        units="xy",
+        offsets=position,
+        offset_transform=axes.transData,
+        **style,
     )
     axes.add_collection(collection)
     return collection
@@ -144,8 +160,10 @@ def write_csv(path: Path, columns: dict[str, Iterable]) -> None:
 
 def print_table(columns: dict[str, Iterable]) -> None:
     """The same for people: aligned, six digits."""
-    rows = [[f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
-            for row in zip(*columns.values(), strict=True)]
+    rows = [
+        [f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
+        for row in zip(*columns.values(), strict=True)
+    ]
     widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
     for row in (columns, *rows):
         print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

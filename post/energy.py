@@ -8,7 +8,17 @@ relative change of the total energy in each run.  Prints the largest change of e
 
 import numpy as np
 
-from drawing import COLOURS, caption, command_line, launch, plt, print_table, read_all, save, write_csv
+from drawing import (
+    COLOURS,
+    caption,
+    command_line,
+    launch,
+    plt,
+    print_table,
+    read_all,
+    save,
+    write_csv,
+)
 from equipartition import windows
 from read_run import Run
 
@@ -35,8 +45,12 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         colour = COLOURS[run.names.index(name) % len(COLOURS)]
         time, value = run.observable(f"{name}/{kind}_energy")
         axes.plot(time, value, color=colour, lw=0.5, alpha=0.25)
-        axes.plot(*windows(time, value, np.ptp(time) / 50), color=colour, ls=style,
-                  label=f"{kind}, {name}")
+        axes.plot(
+            *windows(time, value, np.ptp(time) / 50),
+            color=colour,
+            ls=style,
+            label=f"{kind}, {name}",
+        )
     axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
     axes.legend(ncols=2, loc="upper right", title="means over 2 % of the time")
@@ -50,8 +64,12 @@ def draw(runs: list[Run]) -> plt.Figure:
         time, change = total_change(run)
         size = np.maximum(np.abs(change), 1e-17)
         bottom.semilogy(time, size, color=colour, lw=1, label=method(run))
-    bottom.set(xlabel="time (reduced units)", ylabel="$|E(t)/E(0) - 1|$, total energy",
-               xlim=(0, None), ylim=(1e-17, 1e4 * bottom.get_ylim()[1]))
+    bottom.set(
+        xlabel="time (reduced units)",
+        ylabel="$|E(t)/E(0) - 1|$, total energy",
+        xlim=(0, None),
+        ylim=(1e-17, 1e4 * bottom.get_ylim()[1]),
+    )
     bottom.legend(ncols=2, loc="upper right")
     return figure
 

@@ -13,8 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from cooling import heaviest, lightest
-from drawing import COLOURS, caption, command_line, grouped, launch, plt, print_table, read_all, save
-from drawing import write_csv
+from drawing import (
+    COLOURS,
+    caption,
+    command_line,
+    grouped,
+    launch,
+    plt,
+    print_table,
+    read_all,
+    save,
+    write_csv,
+)
 from read_run import Run
 from theory import Estimate, estimate
 
@@ -37,8 +47,9 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     return time[0] + (np.arange(count) + 0.5) * width, sums / np.maximum(numbers, 1)
 
 
-def thermalisation_time(time: np.ndarray, light: np.ndarray, heavy: np.ndarray,
-                        within: float = 0.1, lasting: int = 3) -> float:
+def thermalisation_time(
+    time: np.ndarray, light: np.ndarray, heavy: np.ndarray, within: float = 0.1, lasting: int = 3
+) -> float:
     """First time from which |heavy / light - 1| <= within for `lasting` windows in a row."""
     close = np.abs(heavy / light - 1) <= within
     for k in range(len(time) - lasting + 1):
@@ -67,17 +78,24 @@ def start_width(run: Run) -> float:
 
 def draw(groups: list, results: list[Approach], until: float) -> plt.Figure:
     """A panel per v0."""
-    figure, panels = plt.subplots(len(groups), 1, sharex=True, squeeze=False,
-                                  figsize=(8, 1.2 + 2.1 * len(groups)))
+    figure, panels = plt.subplots(
+        len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
+    )
     names = groups[0][1][0].names
     order = (lightest(groups[0][1][0]), heaviest(groups[0][1][0]))
     for axes, (v0, runs), result in zip(panels.flat, groups, results, strict=True):
         for k, energy in zip(order, (result.light, result.heavy), strict=True):
-            axes.errorbar(result.time, energy.mean, energy.error, color=COLOURS[k], marker=".",
-                          label=names[k])
+            axes.errorbar(
+                result.time, energy.mean, energy.error, color=COLOURS[k], marker=".", label=names[k]
+            )
         if np.isfinite(result.thermalisation):
-            axes.axvline(result.thermalisation, color="0.5", ls="--", lw=1,
-                         label=f"agree from t = {result.thermalisation:.2g}")
+            axes.axvline(
+                result.thermalisation,
+                color="0.5",
+                ls="--",
+                lw=1,
+                label=f"agree from t = {result.thermalisation:.2g}",
+            )
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)
         axes.legend(ncols=3, loc="lower right")
@@ -95,7 +113,8 @@ def main() -> None:
     groups = grouped(runs, start_width)
     results = [approach(members, args.window, args.within) for _, members in groups]
     table = {
-        "v0": [v0 for v0, _ in groups], "runs": [len(members) for _, members in groups],
+        "v0": [v0 for v0, _ in groups],
+        "runs": [len(members) for _, members in groups],
         "T_therm": [result.thermalisation for result in results],
         "K_light": [float(r.light.mean[len(r.time) // 2 :].mean()) for r in results],
         "K_heavy": [float(r.heavy.mean[len(r.time) // 2 :].mean()) for r in results],

@@ -23,23 +23,39 @@ def xyz_frame(run: Run, frame: int) -> str:
     """One frame as extended XYZ; positions from the lower corner as origin of the lattice."""
     (width, height), (x0, y0) = run.edges, run.lower
     pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
-    head = (f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
-            f"Time={run.time[frame]} Properties={PROPERTIES}")
+    head = (
+        f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
+        f"Time={run.time[frame]} Properties={PROPERTIES}"
+    )
     names = [run.names[s - 1].replace(" ", "_") for s in run.species]
-    rows = zip(names, run.position[frame].tolist(), run.velocity[frame].tolist(),
-               run.radius.tolist(), run.mass.tolist(), strict=True)
-    lines = [f"{name} {x} {y} {u} {v} {r} {m} {k}"
-             for k, (name, (x, y), (u, v), r, m) in enumerate(rows, start=1)]
+    rows = zip(
+        names,
+        run.position[frame].tolist(),
+        run.velocity[frame].tolist(),
+        run.radius.tolist(),
+        run.mass.tolist(),
+        strict=True,
+    )
+    lines = [
+        f"{name} {x} {y} {u} {v} {r} {m} {k}"
+        for k, (name, (x, y), (u, v), r, m) in enumerate(rows, start=1)
+    ]
     return "\n".join([str(run.count), head, *lines, ""])
 
 
 def csv_frame(run: Run, frame: int) -> str:
     """One frame as comma-separated lines."""
-    rows = zip(run.position[frame].tolist(), run.velocity[frame].tolist(),
-               run.radius.tolist(), run.mass.tolist(), strict=True)
-    return "".join(f"{run.time[frame]},{k},{run.names[run.species[k - 1] - 1]},"
-                   f"{x},{y},{u},{v},{r},{m}\n"
-                   for k, ((x, y), (u, v), r, m) in enumerate(rows, start=1))
+    rows = zip(
+        run.position[frame].tolist(),
+        run.velocity[frame].tolist(),
+        run.radius.tolist(),
+        run.mass.tolist(),
+        strict=True,
+    )
+    return "".join(
+        f"{run.time[frame]},{k},{run.names[run.species[k - 1] - 1]},{x},{y},{u},{v},{r},{m}\n"
+        for k, ((x, y), (u, v), r, m) in enumerate(rows, start=1)
+    )
 
 
 def exported(run: Run, suffix: str, step: int) -> Iterator[str]:

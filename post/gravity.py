@@ -13,7 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from drawing import (
-    COLOURS, caption, command_line, launch, plt, print_table, save, species_label, write_csv,
+    COLOURS,
+    caption,
+    command_line,
+    launch,
+    plt,
+    print_table,
+    save,
+    species_label,
+    write_csv,
 )
 from read_run import Run, RunError, read_run
 from theory import Estimate, estimate
@@ -59,19 +67,26 @@ def table(run: Run, species: list[Samples], temperature: float) -> dict[str, lis
     for name, s in zip(run.names, species, strict=True):
         speed = slope_estimate(s.square, 8 * temperature / s.mass)
         height = slope_estimate(s.height, 4 * temperature / (s.mass * g))
-        rows.append({
-            "species": name, "mass": s.mass, "K": float(0.5 * s.mass * s.square.mean()),
-            "kT": temperature,
-            "speed_slope": speed.mean, "speed_slope_error": float(speed.error),
-            "speed_slope_law": s.mass / (2 * temperature),
-            "height_slope": height.mean, "height_slope_error": float(height.error),
-            "height_slope_law": s.mass * g / temperature,
-        })
+        rows.append(
+            {
+                "species": name,
+                "mass": s.mass,
+                "K": float(0.5 * s.mass * s.square.mean()),
+                "kT": temperature,
+                "speed_slope": speed.mean,
+                "speed_slope_error": float(speed.error),
+                "speed_slope_law": s.mass / (2 * temperature),
+                "height_slope": height.mean,
+                "height_slope_error": float(height.error),
+                "height_slope_law": s.mass * g / temperature,
+            }
+        )
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
-def draw_law(axes: plt.Axes, values: np.ndarray, slope: float, top: float, colour: str,
-             label: str, law: str) -> None:
+def draw_law(
+    axes: plt.Axes, values: np.ndarray, slope: float, top: float, colour: str, label: str, law: str
+) -> None:
     """Histogram and law with logarithmic ordinate."""
     bins = np.linspace(0, top, 51)
     density = np.histogram(values, bins)[0] / (values.size * np.diff(bins))
@@ -84,21 +99,38 @@ def draw_law(axes: plt.Axes, values: np.ndarray, slope: float, top: float, colou
 
 def draw(run: Run, species: list[Samples], result: dict[str, list], after: float) -> plt.Figure:
     """A row per species: squared speed and height."""
-    figure, panels = plt.subplots(len(species), 2, squeeze=False,
-                                  figsize=(10, 3.3 * len(species) + 0.4))
+    figure, panels = plt.subplots(
+        len(species), 2, squeeze=False, figsize=(10, 3.3 * len(species) + 0.4)
+    )
     for k, (s, row) in enumerate(zip(species, panels, strict=True)):
         colour, label = COLOURS[k], species_label(run, run.names[k])
         v_law, h_law = result["speed_slope_law"][k], result["height_slope_law"][k]
         speed = result["speed_slope"][k] / v_law, result["speed_slope_error"][k] / v_law
         height = result["height_slope"][k] / h_law, result["height_slope_error"][k] / h_law
-        draw_law(row[0], s.square.ravel(), v_law, 9 / v_law, colour, label,
-                 "$\\frac{m}{2kT}e^{-mv^2/2kT}$, " f"slope fit/law {speed[0]:.3f} ± {speed[1]:.3f}")
-        draw_law(row[1], s.height.ravel(), h_law, min(9 / h_law, run.edges[1]), colour, label,
-                 "$\\frac{mg}{kT}e^{-mgh/kT}$, " f"slope fit/law {height[0]:.3f} ± {height[1]:.3f}")
+        draw_law(
+            row[0],
+            s.square.ravel(),
+            v_law,
+            9 / v_law,
+            colour,
+            label,
+            f"$\\frac{{m}}{{2kT}}e^{{-mv^2/2kT}}$, slope fit/law {speed[0]:.3f} ± {speed[1]:.3f}",
+        )
+        draw_law(
+            row[1],
+            s.height.ravel(),
+            h_law,
+            min(9 / h_law, run.edges[1]),
+            colour,
+            label,
+            f"$\\frac{{mg}}{{kT}}e^{{-mgh/kT}}$, slope fit/law {height[0]:.3f} ± {height[1]:.3f}",
+        )
         row[0].set(xlabel="$v^2$ (reduced units)", ylabel="probability density")
         row[1].set(xlabel="height of the centre above its lowest place (reduced units)")
-    figure.suptitle(f"{caption([run])},  t = {after:g} to {run.time[-1]:g},  "
-                    f"kT = ⟨K⟩ = {result['kT'][0]:.4f}", fontsize=10)
+    figure.suptitle(
+        f"{caption([run])},  t = {after:g} to {run.time[-1]:g},  kT = ⟨K⟩ = {result['kT'][0]:.4f}",
+        fontsize=10,
+    )
     return figure
 
 

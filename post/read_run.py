@@ -301,7 +301,7 @@ def plain(value: object) -> object:
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
         return [plain(item) for item in value.ravel()]
-    if isinstance(value, np.ndarray) and value.ndim == 0 or isinstance(value, np.generic):
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return plain(value.item())
     return value
 

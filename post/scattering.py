@@ -51,19 +51,36 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
     )
     fine = np.linspace(0, max(1.2, s.max()), 1201)
     exact = f"exact, $m_1/m_2$ = {ratio:,.7g}, ξ = {restitution:g}"
-    top.plot(fine, np.degrees(scattering_angle(fine, ratio, restitution)), color="black", lw=1.2,
-             label=exact)
+    top.plot(
+        fine,
+        np.degrees(scattering_angle(fine, ratio, restitution)),
+        color="black",
+        lw=1.2,
+        label=exact,
+    )
     if restitution == 1:
-        top.plot(fine, np.degrees(scattering_angle(fine)), color=COLOURS[4], lw=1.2, ls="--",
-                 label="$m_1/m_2 = \\infty$: $2\\arccos(b/R_{12})$")
-    top.plot(s, np.degrees(angle), ls="", marker="o", mfc="none", color=COLOURS[0],
-             label=f"simulation, {len(points)} runs")
+        top.plot(
+            fine,
+            np.degrees(scattering_angle(fine)),
+            color=COLOURS[4],
+            lw=1.2,
+            ls="--",
+            label="$m_1/m_2 = \\infty$: $2\\arccos(b/R_{12})$",
+        )
+    top.plot(
+        s,
+        np.degrees(angle),
+        ls="",
+        marker="o",
+        mfc="none",
+        color=COLOURS[0],
+        label=f"simulation, {len(points)} runs",
+    )
     top.set(ylabel="scattering angle θ (degrees)", ylim=(-5, 185), yticks=range(0, 181, 30))
     top.legend()
     error = np.degrees(angle - scattering_angle(s, ratio, restitution))
     bottom.semilogy(s, np.maximum(np.abs(error), 1e-16), ls="", marker=".", color=COLOURS[0])
-    bottom.set(xlabel="impact parameter $b/R_{12}$", ylabel="|error| (degrees)",
-               ylim=(1e-17, 1e-8))
+    bottom.set(xlabel="impact parameter $b/R_{12}$", ylabel="|error| (degrees)", ylim=(1e-17, 1e-8))
     return figure
 
 
@@ -78,12 +95,15 @@ def main() -> None:
     print(f"largest_error_degrees = {error.max():.3g}")
     save(draw(points, restitution), args.output, runs, "Scattering angle")
     if args.csv:
-        write_csv(args.csv, {
-            "b_over_R12": [p.impact for p in points],
-            "angle_degrees": [float(np.degrees(p.angle)) for p in points],
-            "exact_degrees": [float(np.degrees(angle)) for angle in exact],
-            "speed_change": [p.speed_change for p in points],
-        })
+        write_csv(
+            args.csv,
+            {
+                "b_over_R12": [p.impact for p in points],
+                "angle_degrees": [float(np.degrees(p.angle)) for p in points],
+                "exact_degrees": [float(np.degrees(angle)) for angle in exact],
+                "speed_change": [p.speed_change for p in points],
+            },
+        )
 
 
 if __name__ == "__main__":

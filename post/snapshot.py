@@ -10,7 +10,15 @@ Colour: species, speed, displacement from the first frame, or collisions so far.
 import numpy as np
 
 from drawing import (
-    COLOURS, caption, command_line, disk_collection, draw_box, launch, plt, save, species_colours,
+    COLOURS,
+    caption,
+    command_line,
+    disk_collection,
+    draw_box,
+    launch,
+    plt,
+    save,
+    species_colours,
 )
 from read_run import Run, read_run
 
@@ -52,8 +60,9 @@ def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -
     """Velocities as arrows; `longest` is the speed drawn as a tenth of the box."""
     scale = longest / (0.1 * run.edges.max())
     x, v = run.position[frame], run.velocity[frame]
-    axes.quiver(*x.T, *v.T, angles="xy", scale_units="xy", scale=scale, width=0.005,
-                color=colours, zorder=4)
+    axes.quiver(
+        *x.T, *v.T, angles="xy", scale_units="xy", scale=scale, width=0.005, color=colours, zorder=4
+    )
 
 
 def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
@@ -83,8 +92,10 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
             draw_arrows(axes, run, frames[k], longest, arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
-        handles = [plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
-                   for k in range(len(run.names))]
+        handles = [
+            plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
+            for k in range(len(run.names))
+        ]
         if len(run.names) > 1:
             figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
     else:

@@ -13,14 +13,33 @@ KS against the exact law of N disks that share a fixed energy.  a2 = <v^4> / (2 
 import numpy as np
 
 from drawing import (
-    COLOURS, caption, command_line, grouped, launch, plt, print_table, read_all, save, write_csv,
+    COLOURS,
+    caption,
+    command_line,
+    grouped,
+    launch,
+    plt,
+    print_table,
+    read_all,
+    save,
+    write_csv,
 )
 from read_run import Run
 from theory import estimate, excess_kurtosis, finite_n_cdf, hold_against, maxwell_cdf, maxwell_pdf
 
 # Dilute gas from equal speeds, by Monte Carlo solution of the Boltzmann equation (10^6 disks).
-RELAXATION = np.array([(0, -0.5), (1, -0.370), (2, -0.264), (3, -0.184), (4, -0.125),
-                       (5, -0.0855), (6, -0.0565), (8, -0.025)])
+RELAXATION = np.array(
+    [
+        (0, -0.5),
+        (1, -0.370),
+        (2, -0.264),
+        (3, -0.184),
+        (4, -0.125),
+        (5, -0.0855),
+        (6, -0.0565),
+        (8, -0.025),
+    ]
+)
 BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
 
 
@@ -32,11 +51,11 @@ def reduced_speeds(run: Run, frames: list[int]) -> np.ndarray:
     return np.sqrt(energy).ravel()
 
 
-def equilibrium_frames(run: Run, skip: float, apart: float) -> list[int]:
+def equilibrium_frames(run: Run, skip: float, apart: float, first: int = 0) -> list[int]:
     """Frames after `skip` collisions per disk, each `apart` from the one before."""
     chosen, last = [], -np.inf
     for frame, tau in enumerate(run.collisions_per_disk_at(run.time)):
-        if tau >= skip and tau >= last + apart * (1 - 1e-9):
+        if frame >= first and tau >= skip and tau >= last + apart * (1 - 1e-9):
             chosen.append(frame)
             last = tau
     return chosen
@@ -54,12 +73,22 @@ def table(groups: list, samples: list[np.ndarray]) -> dict[str, list]:
     for (count, runs), u in zip(groups, samples, strict=True):
         maxwell = hold_against(u, maxwell_cdf)
         exact = hold_against(u, finite_n_cdf(count, bool(runs[0].periodic.all())))
-        rows.append({
-            "N": count, "runs": len(runs), "speeds": len(u), "mean_u": float(np.mean(u)),
-            "kurtosis": float(np.mean(u**4)), "KS_D": maxwell.ks, "KS_limit_1%": 1.63 / len(u)**0.5,
-            "KS_p": maxwell.ks_p, "chi2/dof": maxwell.chi2, "chi2_p": maxwell.chi2_p,
-            "KS_D_exact": exact.ks, "KS_p_exact": exact.ks_p,
-        })
+        rows.append(
+            {
+                "N": count,
+                "runs": len(runs),
+                "speeds": len(u),
+                "mean_u": float(np.mean(u)),
+                "kurtosis": float(np.mean(u**4)),
+                "KS_D": maxwell.ks,
+                "KS_limit_1%": 1.63 / len(u) ** 0.5,
+                "KS_p": maxwell.ks_p,
+                "chi2/dof": maxwell.chi2,
+                "chi2_p": maxwell.chi2_p,
+                "KS_D_exact": exact.ks,
+                "KS_p_exact": exact.ks_p,
+            }
+        )
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
@@ -67,13 +96,20 @@ def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str])
     """Step histograms over the Maxwell curve."""
     for u, label, colour in zip(samples, labels, COLOURS, strict=False):
         density, _ = np.histogram(u, BINS)
-        axes.stairs(density / (len(u) * np.diff(BINS)), BINS, color=colour, label=label,
-                    fill=len(samples) == 1, alpha=0.45 if len(samples) == 1 else 1, lw=1.6)
+        axes.stairs(
+            density / (len(u) * np.diff(BINS)),
+            BINS,
+            color=colour,
+            label=label,
+            fill=len(samples) == 1,
+            alpha=0.45 if len(samples) == 1 else 1,
+            lw=1.6,
+        )
     fine = np.linspace(0, 3, 301)
-    axes.plot(fine, maxwell_pdf(fine), color="black", lw=1.2,
-              label="Maxwell, $P(u)=2u\\,e^{-u^2}$")
-    axes.set(xlabel="speed $u = v\\,/\\,\\sqrt{2kT/m}$", ylabel="probability density $P(u)$",
-             xlim=(0, 3))
+    axes.plot(fine, maxwell_pdf(fine), color="black", lw=1.2, label="Maxwell, $P(u)=2u\\,e^{-u^2}$")
+    axes.set(
+        xlabel="speed $u = v\\,/\\,\\sqrt{2kT/m}$", ylabel="probability density $P(u)$", xlim=(0, 3)
+    )
     axes.legend()
 
 
@@ -83,10 +119,24 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         tau = np.mean([relaxation(run)[0] for run in runs], axis=0)
         a2 = estimate([relaxation(run)[1] for run in runs])
         early = tau <= 16
-        axes.errorbar(tau[early], a2.mean[early], a2.error[early] if len(runs) > 1 else None,
-                      color=colour, marker=".", ls="-", lw=1, label=f"N = {count}")
-    axes.plot(*RELAXATION.T, ls="", marker="o", mfc="none", color="black",
-              label="dilute limit (Boltzmann equation)")
+        axes.errorbar(
+            tau[early],
+            a2.mean[early],
+            a2.error[early] if len(runs) > 1 else None,
+            color=colour,
+            marker=".",
+            ls="-",
+            lw=1,
+            label=f"N = {count}",
+        )
+    axes.plot(
+        *RELAXATION.T,
+        ls="",
+        marker="o",
+        mfc="none",
+        color="black",
+        label="dilute limit (Boltzmann equation)",
+    )
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
     axes.legend()
@@ -100,11 +150,16 @@ def draw(groups: list, samples: list[np.ndarray], tests: dict) -> plt.Figure:
     draw_histogram(first, [reduced_speeds(largest, [0])], [f"first frame, N = {largest.count}"])
     first.set_title("Start")
     time = largest.time[-1]
-    draw_histogram(last, [reduced_speeds(largest, [-1])],
-                   [f"one frame, t = {time:.4g}, N = {largest.count}"])
+    draw_histogram(
+        last, [reduced_speeds(largest, [-1])], [f"one frame, t = {time:.4g}, N = {largest.count}"]
+    )
     last.set_title("One frame at the end")
-    labels = [f"N = {n}: {size} speeds, KS D = {d:.4f}, p = {p:.2g}" for n, size, d, p in
-              zip(tests["N"], tests["speeds"], tests["KS_D"], tests["KS_p"], strict=True)]
+    labels = [
+        f"N = {n}: {size} speeds, KS D = {d:.4f}, p = {p:.2g}"
+        for n, size, d, p in zip(
+            tests["N"], tests["speeds"], tests["KS_D"], tests["KS_p"], strict=True
+        )
+    ]
     draw_histogram(pooled, samples, labels)
     pooled.set(title="Equilibrium, many frames", ylim=(0, 1.25))
     draw_relaxation(way, groups)
@@ -117,13 +172,18 @@ def main() -> None:
     parser = command_line(__doc__, "speeds.png", table=True)
     parser.add_argument("--skip", type=float, default=15, help="collisions per disk [15]")
     parser.add_argument("--apart", type=float, default=5, help="collisions per disk [5]")
+    parser.add_argument("--first", type=int, default=0, help="no frame before this number [0]")
     args = parser.parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: run.count)
     samples = []
     for _, members in groups:
-        picked = [reduced_speeds(r, equilibrium_frames(r, args.skip, args.apart) or [r.frames - 1])
-                  for r in members]
+        picked = [
+            reduced_speeds(
+                r, equilibrium_frames(r, args.skip, args.apart, args.first) or [r.frames - 1]
+            )
+            for r in members
+        ]
         samples.append(np.concatenate(picked))
     tests = table(groups, samples)
     print_table(tests)

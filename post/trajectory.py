@@ -1,7 +1,7 @@
 """Draw the paths of disks through the frames of a run.
 
     python post/trajectory.py runs/sinai.h5 -o sinai.png                 all disks (at most 12)
-    python post/trajectory.py runs/sinai.h5 --disks 1,5 --last 200       two of them, last frames
+    python post/trajectory.py runs/sinai.h5 --disks 1,5 --first 200      two of them, first frames
 
 With a frame at every event (output.frames_every_events = 1) the straight lines between frames
 are the exact path of flight without gravity.  Several runs are drawn side by side.
@@ -14,14 +14,19 @@ from matplotlib.patches import Circle
 from read_run import Run, RunError
 
 
-def paths_of(run: Run, disks: list[int], start: int = 0) -> list[np.ndarray]:
-    """(T', 2) positions of each disk; a row of NaN breaks the line at a periodic side."""
-    paths = list(np.moveaxis(run.position[start:][:, disks], 1, 0))
+def paths_of(run: Run, disks: list[int], count: int | None = None) -> list[np.ndarray]:
+    """(T', 2) positions of each disk in the first `count` frames.
+
+    A row of NaN breaks the line where a periodic side is crossed.
+    """
+    paths = list(np.moveaxis(run.position[:count][:, disks], 1, 0))
     if run.image is None:
         return paths
-    jumps = np.any(np.diff(run.image[start:][:, disks], axis=0), axis=2).T
-    return [np.insert(path, np.flatnonzero(jump) + 1, np.nan, axis=0)
-            for path, jump in zip(paths, jumps, strict=True)]
+    jumps = np.any(np.diff(run.image[:count][:, disks], axis=0), axis=2).T
+    return [
+        np.insert(path, np.flatnonzero(jump) + 1, np.nan, axis=0)
+        for path, jump in zip(paths, jumps, strict=True)
+    ]
 
 
 def chosen_disks(run: Run, text: str | None) -> list[int]:
@@ -33,29 +38,31 @@ def chosen_disks(run: Run, text: str | None) -> list[int]:
     return disks
 
 
-def draw_paths(axes: plt.Axes, run: Run, disks: list[int], start: int) -> None:
+def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
     """Paths, with the disk where it is at the end."""
     draw_box(axes, run)
-    for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, start), strict=True)):
+    for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, count), strict=True)):
         colour = COLOURS[order % len(COLOURS)]
         alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
         axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=4))
-    axes.set_title(f"{run.path.stem}: {caption([run])}\n"
-                   f"t = {run.time[start]:.4g} (crosses) to {run.time[-1]:.4g} (disks)")
+    axes.set_title(
+        f"{run.path.stem}: {caption([run])}\n"
+        f"t = {run.time[0]:.4g} (crosses) to {run.time[count - 1]:.4g} (disks)"
+    )
 
 
 def main() -> None:
     parser = command_line(__doc__, "trajectory.png")
     parser.add_argument("--disks", help="their numbers from 1, e.g. 1,5,9")
-    parser.add_argument("--last", type=int, help="only the last so many frames")
+    parser.add_argument("--first", type=int, metavar="K", help="only the first K frames")
     args = parser.parse_args()
     runs = read_all(args.runs)
     figure, panels = plt.subplots(1, len(runs), squeeze=False, figsize=(5.2 * len(runs), 5.7))
     for axes, run in zip(panels.flat, runs, strict=True):
-        start = max(0, run.frames - args.last) if args.last else 0
-        draw_paths(axes, run, chosen_disks(run, args.disks), start)
+        count = min(run.frames, args.first or run.frames)
+        draw_paths(axes, run, chosen_disks(run, args.disks), count)
     save(figure, args.output, runs, "Paths of disks")
 
 

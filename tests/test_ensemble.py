@@ -54,15 +54,19 @@ def environment(lab, pause=0):
 
 def ensemble(lab, *options, pause=0):
     return subprocess.run(
-        command(lab, *options), env=environment(lab, pause), capture_output=True, text=True,
+        command(lab, *options),
+        env=environment(lab, pause),
+        capture_output=True,
+        text=True,
         timeout=60,
     )
 
 
 def starts(lab):
     """Member -> one line per start, 'anew' or 'resumed' and the overrides."""
-    return {path.stem: path.read_text().splitlines()
-            for path in sorted((lab / "out").glob("*.starts"))}
+    return {
+        path.stem: path.read_text().splitlines() for path in sorted((lab / "out").glob("*.starts"))
+    }
 
 
 def wait_for(condition, seconds=20):
@@ -73,13 +77,22 @@ def wait_for(condition, seconds=20):
 
 
 def test_members_are_seeds_times_values(lab):
-    result = ensemble(lab, "--seeds", "1-2,5", "--scan", "species.ball.mass=1,2.5",
-                      "--set", "contact.restitution=0.5")
+    result = ensemble(
+        lab,
+        "--seeds",
+        "1-2,5",
+        "--scan",
+        "species.ball.mass=1,2.5",
+        "--set",
+        "contact.restitution=0.5",
+    )
     assert result.returncode == 0
     assert starts(lab) == {
         f"ball.mass_{mass}_seed_{seed}": [
-            f"anew contact.restitution=0.5|species.ball.mass={mass}|run.seed={seed}|"]
-        for mass in ("1", "2.5") for seed in (1, 2, 5)
+            f"anew contact.restitution=0.5|species.ball.mass={mass}|run.seed={seed}|"
+        ]
+        for mass in ("1", "2.5")
+        for seed in (1, 2, 5)
     }
     assert "6 of 6 members finished, 0 failed" in result.stderr
 
@@ -87,16 +100,23 @@ def test_members_are_seeds_times_values(lab):
 def test_vector_values_are_separated_by_semicolons(lab):
     assert ensemble(lab, "--scan", "species.ball.velocity=0,-1;0,-2").returncode == 0
     assert [lines[0] for lines in starts(lab).values()] == [
-        "anew species.ball.velocity=0,-1|", "anew species.ball.velocity=0,-2|"]
+        "anew species.ball.velocity=0,-1|",
+        "anew species.ball.velocity=0,-2|",
+    ]
 
 
 def test_manifest_takes_names_and_values_with_blanks(lab):
     manifest = lab / "members.txt"
-    manifest.write_text("# two members\n\none two\t--set run.title=a b --set run.seed=3\n"
-                        "plain --set run.seed=4\nbare\n")
+    manifest.write_text(
+        "# two members\n\none two\t--set run.title=a b --set run.seed=3\n"
+        "plain --set run.seed=4\nbare\n"
+    )
     assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
-    assert starts(lab) == {"one two": ["anew run.title=a b|run.seed=3|"],
-                           "plain": ["anew run.seed=4|"], "bare": ["anew "]}
+    assert starts(lab) == {
+        "one two": ["anew run.title=a b|run.seed=3|"],
+        "plain": ["anew run.seed=4|"],
+        "bare": ["anew "],
+    }
 
 
 def test_manifest_of_the_folder_repeats_the_ensemble(lab):
@@ -145,8 +165,12 @@ def test_exit_75_is_not_done(lab):
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
-    with subprocess.Popen(command(lab, "--seeds", "1-6", "-j", "2"), env=environment(lab, 200),
-                          start_new_session=True, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        command(lab, "--seeds", "1-6", "-j", "2"),
+        env=environment(lab, 200),
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+    ) as process:
         wait_for(lambda: len(starts(lab)) == 2 if (lab / "out").exists() else False)
         time.sleep(0.2)
         os.killpg(process.pid, how)  # as a terminal does
@@ -154,14 +178,17 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     assert len(list((lab / "out").glob("*.chk.h5"))) == 2
     assert [p.read_text() for p in (lab / "out").glob("*.signals")] == ["TERM\n"] * 2
     assert ensemble(lab, "--seeds", "1-6").returncode == 0
-    assert sorted(lines[-1].split()[0] for lines in starts(lab).values()) == [
-        "anew"] * 4 + ["resumed"] * 2
+    assert (
+        sorted(lines[-1].split()[0] for lines in starts(lab).values())
+        == ["anew"] * 4 + ["resumed"] * 2
+    )
 
 
 def test_two_copies_share_the_members(lab):
     line = command(lab, "--seeds", "1-8", "-j", "2")
-    copies = [subprocess.Popen(line, env=environment(lab, 4), stderr=subprocess.DEVNULL)
-              for _ in range(2)]
+    copies = [
+        subprocess.Popen(line, env=environment(lab, 4), stderr=subprocess.DEVNULL) for _ in range(2)
+    ]
     codes = [copy.wait(timeout=60) for copy in copies]
     assert set(codes) <= {0, 75} and 0 in codes
     assert len(starts(lab)) == 8
@@ -184,18 +211,21 @@ def test_results_of_other_settings_are_not_mixed(lab):
     assert result.returncode == 2 and "another version" in result.stderr
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ([], "no members"),
-    (["--seeds", "1-"], "neither a number nor a range"),
-    (["--seeds", "3-1"], "neither a number nor a range"),
-    (["--scan", "mass"], "write VARIABLE=VALUE"),
-    (["--seeds", "1", "-j", "0"], "-j 0"),
-    (["--frobnicate"], "unknown option"),
-    (["--seeds"], "needs a value"),
-    (["--seeds", "1", "--manifest", "x"], "either"),
-    (["--manifest", "/nowhere"], "cannot read"),
-    (["--seeds", "1,1"], "two members are called"),
-])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "no members"),
+        (["--seeds", "1-"], "neither a number nor a range"),
+        (["--seeds", "3-1"], "neither a number nor a range"),
+        (["--scan", "mass"], "write VARIABLE=VALUE"),
+        (["--seeds", "1", "-j", "0"], "-j 0"),
+        (["--frobnicate"], "unknown option"),
+        (["--seeds"], "needs a value"),
+        (["--seeds", "1", "--manifest", "x"], "either"),
+        (["--manifest", "/nowhere"], "cannot read"),
+        (["--seeds", "1,1"], "two members are called"),
+    ],
+)
 def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):
     result = ensemble(lab, *options)
     assert result.returncode == 2

@@ -65,11 +65,18 @@ def test_finite_n_law_in_a_periodic_box(rng):
     assert theory.hold_against(u, theory.finite_n_cdf(4)).ks_p < 0.01
 
 
-@pytest.mark.parametrize(("b", "infinite", "million"), [
-    (0.0, 180, 180), (0.1, 168.52165904547, 168.52164764374), (0.5, 120, 119.99995038037),
-    (0.7, 91.145991998389, 91.145934714068), (0.9, 51.683865526334, 51.683820571990), (1.0, 0, 0),
-    (1.2, 0, 0),
-])
+@pytest.mark.parametrize(
+    ("b", "infinite", "million"),
+    [
+        (0.0, 180, 180),
+        (0.1, 168.52165904547, 168.52164764374),
+        (0.5, 120, 119.99995038037),
+        (0.7, 91.145991998389, 91.145934714068),
+        (0.9, 51.683865526334, 51.683820571990),
+        (1.0, 0, 0),
+        (1.2, 0, 0),
+    ],
+)
 def test_scattering_angle(b, infinite, million):
     assert np.degrees(theory.scattering_angle(b)) == pytest.approx(infinite, abs=1e-11)
     assert np.degrees(theory.scattering_angle(b, 1e6)) == pytest.approx(million, abs=1e-11)
@@ -105,8 +112,12 @@ def test_power_law_is_found_with_its_error(rng):
 def gas(path, rng, count=200, frames=41, **more):
     """Equal speeds at first, then Maxwell with the energy kept; half a collision per frame."""
     angle = rng.uniform(0, 2 * np.pi, (1, count))
-    v = np.concatenate([np.stack([np.cos(angle), np.sin(angle)], axis=-1),
-                        maxwell_velocities(rng, frames - 1, count)])
+    v = np.concatenate(
+        [
+            np.stack([np.cos(angle), np.sin(angle)], axis=-1),
+            maxwell_velocities(rng, frames - 1, count),
+        ]
+    )
     v *= np.sqrt(count / np.sum(v**2, axis=(1, 2)))[:, None, None]
     x = rng.uniform(0.05, 0.95, (frames, count, 2))
     tau = np.arange(frames)
@@ -121,8 +132,13 @@ def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
 
 
 def test_reduced_speeds_do_not_know_units(tmp_path, rng):
-    path = gas(tmp_path / "a.h5", rng, mass=np.repeat([1.0, 9.0], 100),
-               species=np.repeat([1, 2], 100), names=("a", "b"))
+    path = gas(
+        tmp_path / "a.h5",
+        rng,
+        mass=np.repeat([1.0, 9.0], 100),
+        species=np.repeat([1, 2], 100),
+        names=("a", "b"),
+    )
     u = speeds.reduced_speeds(read_run(path), [5, 6])
     assert u.shape == (400,)
     np.testing.assert_allclose(np.mean(u.reshape(2, 2, 100) ** 2, axis=(0, 2)), [1, 1])
@@ -139,9 +155,20 @@ def test_mixture_table(tmp_path, rng):
     v = maxwell_velocities(rng, 31, 1000) / np.sqrt(mass)[:, None] * np.sqrt(1.25)
     v[0] = [1, 0]
     x = np.zeros_like(v)
-    runs = [read_run(write_run(
-        tmp_path / f"{k}.h5", x, np.roll(v, k, axis=2), mass=mass, species=np.repeat([1, 2], 500),
-        names=("light", "heavy"), observables={"collisions": np.arange(31) * 500})) for k in (0, 1)]
+    runs = [
+        read_run(
+            write_run(
+                tmp_path / f"{k}.h5",
+                x,
+                np.roll(v, k, axis=2),
+                mass=mass,
+                species=np.repeat([1, 2], 500),
+                names=("light", "heavy"),
+                observables={"collisions": np.arange(31) * 500},
+            )
+        )
+        for k in (0, 1)
+    ]
     result = mixture.table(runs, [list(range(1, 31))] * 2)
     assert result["K_start"] == [0.5, 2.0] and result["v_start"] == [1, 1]
     np.testing.assert_allclose(result["v_theory"], [1.401248, 0.700624], atol=1e-6)
@@ -154,25 +181,39 @@ def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
     t = np.linspace(0, 1, points) ** 2
     total = np.exp(-decay * t)
     x = np.zeros((1, 4, 2))
-    return read_run(write_run(
-        path, x, x, mass=[1, 1, 4, 4], species=[1, 1, 2, 2], names=("light", "heavy"),
-        observable_time=t, observables={
-            "collisions": 40 * t, "all/kinetic_energy": 3 * total,
-            "light/kinetic_energy": 6 * total / (1 + heavy),
-            "heavy/kinetic_energy": 6 * heavy * total / (1 + heavy)},
-        parameters={"run": {"seed": seed}, "contact": {"restitution": xi}}))
+    return read_run(
+        write_run(
+            path,
+            x,
+            x,
+            mass=[1, 1, 4, 4],
+            species=[1, 1, 2, 2],
+            names=("light", "heavy"),
+            observable_time=t,
+            observables={
+                "collisions": 40 * t,
+                "all/kinetic_energy": 3 * total,
+                "light/kinetic_energy": 6 * total / (1 + heavy),
+                "heavy/kinetic_energy": 6 * heavy * total / (1 + heavy),
+            },
+            parameters={"run": {"seed": seed}, "contact": {"restitution": xi}},
+        )
+    )
 
 
 def test_cooling_averages_over_runs_on_one_grid(tmp_path):
-    runs = [cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
-            for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])]
+    runs = [
+        cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
+        for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])
+    ]
     result = cooling.cooling(runs)
     tau, curves = result.by_collisions
     assert tau[-1] == 20 and result.by_time[0][-1] == 1
     expected = (np.exp(-tau / 20) + np.exp(-tau / 10)) / 2
     np.testing.assert_allclose(curves.mean[0], expected, atol=1e-4)
-    np.testing.assert_allclose(curves.error[0], np.abs(np.exp(-tau / 20) - np.exp(-tau / 10)) / 2,
-                               atol=1e-4)
+    np.testing.assert_allclose(
+        curves.error[0], np.abs(np.exp(-tau / 20) - np.exp(-tau / 10)) / 2, atol=1e-4
+    )
     np.testing.assert_allclose(result.ratio.mean, 2)
 
 
@@ -185,8 +226,16 @@ def collision(path, b, ratio=1e6):
     normal = np.array([-np.sqrt(1 - b**2), b]) if b < 1 else np.zeros(2)
     after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
     x = [[[0.5, 0.5], [0.1, 0.5 + b * r.sum()]]] * 2
-    return read_run(write_run(path, x, [[[0, 0], v], [[0, 0], after]], mass=[ratio, 1], radius=r,
-                              parameters={"contact": {"restitution": 1.0}}))
+    return read_run(
+        write_run(
+            path,
+            x,
+            [[[0, 0], v], [[0, 0], after]],
+            mass=[ratio, 1],
+            radius=r,
+            parameters={"contact": {"restitution": 1.0}},
+        )
+    )
 
 
 @pytest.mark.parametrize("b", [0.0, 0.3, 0.7, 0.99, 1.1])
@@ -218,11 +267,21 @@ def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=
     hit = np.zeros((2, 81), np.int32)
     hit[1, : 1 + moved + 4] = 2
     return write_run(
-        path, [first, last], v, mass=np.r_[mass, np.ones(80)], radius=np.r_[5 * r, np.full(80, r)],
-        species=np.r_[1, np.full(80, 2)], names=("projectile" if names else "tip", "bed"),
-        collisions=hit, observables={"collisions": [0, 90], "all/kinetic_energy": [1.0, left]},
-        parameters={"run": {"seed": seed}, "contact": {"restitution": xi},
-                    "stop": {"energy_fraction": 0.1}})
+        path,
+        [first, last],
+        v,
+        mass=np.r_[mass, np.ones(80)],
+        radius=np.r_[5 * r, np.full(80, r)],
+        species=np.r_[1, np.full(80, 2)],
+        names=("projectile" if names else "tip", "bed"),
+        collisions=hit,
+        observables={"collisions": [0, 90], "all/kinetic_energy": [1.0, left]},
+        parameters={
+            "run": {"seed": seed},
+            "contact": {"restitution": xi},
+            "stop": {"energy_fraction": 0.1},
+        },
+    )
 
 
 @pytest.mark.parametrize("names", [True, False])
@@ -247,10 +306,16 @@ def test_packing_field_holds_the_area_of_the_bed(tmp_path):
 
 
 def test_scan_finds_its_base_and_its_points(tmp_path):
-    paths = [impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=int(m) // 5 + s)
-             for m in (5, 10, 15, 20, 25) for s in (1, 2)]
-    paths += [impact(tmp_path / f"x{xi}_{s}.h5", xi=xi, seed=s, left=0.1 + (xi > 0.8) * 0.3)
-              for xi in (0.5, 0.7, 0.9) for s in (1, 2)]
+    paths = [
+        impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=int(m) // 5 + s)
+        for m in (5, 10, 15, 20, 25)
+        for s in (1, 2)
+    ]
+    paths += [
+        impact(tmp_path / f"x{xi}_{s}.h5", xi=xi, seed=s, left=0.1 + (xi > 0.8) * 0.3)
+        for xi in (0.5, 0.7, 0.9)
+        for s in (1, 2)
+    ]
     runs = crater_scan.distinct([read_run(path) for path in paths])
     assert len(runs) == len(paths) - 2, "mass 25 and xi 0.5 is the base, once per seed"
     keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
@@ -281,21 +346,44 @@ def test_thermalisation_time_ignores_a_passing_agreement():
 def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1):
     """An ideal gas in equilibrium in the gravity box."""
     mass, r = np.repeat([0.025, 0.05], 30), 0.04
-    x = np.stack([rng.uniform(r, 8 - r, (frames, 60)),
-                  r + rng.exponential(temperature / (mass * 9.81), (frames, 60))], axis=-1)
+    x = np.stack(
+        [
+            rng.uniform(r, 8 - r, (frames, 60)),
+            r + rng.exponential(temperature / (mass * 9.81), (frames, 60)),
+        ],
+        axis=-1,
+    )
     v = rng.normal(size=(frames, 60, 2)) * np.sqrt(temperature / mass)[:, None]
     k, u = 0.5 * mass * np.sum(v**2, axis=2), mass * 9.81 * x[..., 1]
     halves = {"A": slice(0, 30), "B": slice(30, 60), "all": slice(0, 60)}
-    observables = {f"{name}/{kind}_energy": e[:, part].mean(axis=1) for name, part in halves.items()
-                   for kind, e in (("kinetic", k), ("potential", u))}
+    observables = {
+        f"{name}/{kind}_energy": e[:, part].mean(axis=1)
+        for name, part in halves.items()
+        for kind, e in (("kinetic", k), ("potential", u))
+    }
     time = np.linspace(0, 100, frames)
     return write_run(
-        path, x, v, time=time, mass=mass, radius=r, species=np.repeat([1, 2], 30), names=("A", "B"),
-        edges=(8, 16), observables={**observables, "collisions": np.arange(frames),
-                                    "total_energy": 80 * (1 + drift * time)},
-        parameters={"run": {"seed": seed, "dynamics": dynamics, "dt": 0.004},
-                    "box": {"gravity": [0.0, -9.81]}, "contact": {"restitution": 1.0},
-                    "species": {"speed": [0.5, 0.5]}})
+        path,
+        x,
+        v,
+        time=time,
+        mass=mass,
+        radius=r,
+        species=np.repeat([1, 2], 30),
+        names=("A", "B"),
+        edges=(8, 16),
+        observables={
+            **observables,
+            "collisions": np.arange(frames),
+            "total_energy": 80 * (1 + drift * time),
+        },
+        parameters={
+            "run": {"seed": seed, "dynamics": dynamics, "dt": 0.004},
+            "box": {"gravity": [0.0, -9.81]},
+            "contact": {"restitution": 1.0},
+            "species": {"speed": [0.5, 0.5]},
+        },
+    )
 
 
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
@@ -327,8 +415,15 @@ def test_chosen_frames(tmp_path, rng):
 
 def test_paths_break_where_a_period_is_crossed(tmp_path):
     x = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]])
-    run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=(True, False),
-                             image=np.array([[[0, 0]], [[1, 0]], [[1, 0]]])))
+    run = read_run(
+        write_run(
+            tmp_path / "run.h5",
+            x,
+            x,
+            periodic=(True, False),
+            image=np.array([[[0, 0]], [[1, 0]], [[1, 0]]]),
+        )
+    )
     (path,) = trajectory.paths_of(run, [0])
     np.testing.assert_array_equal(path, [[0.8, 0.5], [np.nan, np.nan], [0.1, 0.5], [0.4, 0.5]])
 
@@ -348,12 +443,21 @@ def test_exports_keep_every_digit(tmp_path, rng):
 
 def test_cost_takes_the_best_of_equal_runs(tmp_path):
     runs = []
-    for k, (search, n, rate) in enumerate([("pairs", 20, 1e5), ("pairs", 10, 1e5),
-                                           ("pairs", 10, 2e5), ("cells", 10, 1e6)]):
+    for k, (search, n, rate) in enumerate(
+        [("pairs", 20, 1e5), ("pairs", 10, 1e5), ("pairs", 10, 2e5), ("cells", 10, 1e6)]
+    ):
         x = np.zeros((1, n, 2))
-        runs.append(read_run(write_run(tmp_path / f"{k}.h5", x, x,
-                                       parameters={"run": {"search": search}},
-                                       provenance={"collisions_per_second": rate})))
+        runs.append(
+            read_run(
+                write_run(
+                    tmp_path / f"{k}.h5",
+                    x,
+                    x,
+                    parameters={"run": {"search": search}},
+                    provenance={"collisions_per_second": rate},
+                )
+            )
+        )
     measured = cost.costs(runs)
     np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
     np.testing.assert_allclose(measured["cells"], [[10], [1]])
@@ -375,30 +479,65 @@ def runs_for(script, folder, rng):
         options = ["--frames", "0,-1", "--quiver"] if script == "snapshot" else []
         return [gas(folder / "gas.h5", rng, parameters={"contact": {"restitution": 1.0}}), *options]
     if script == "mixture":
-        return [gas(folder / f"{k}.h5", rng, mass=np.repeat([1.0, 4.0], 100), names=("a", "b"),
-                    species=np.repeat([1, 2], 100)) for k in range(2)]
+        return [
+            gas(
+                folder / f"{k}.h5",
+                rng,
+                mass=np.repeat([1.0, 4.0], 100),
+                names=("a", "b"),
+                species=np.repeat([1, 2], 100),
+            )
+            for k in range(2)
+        ]
     if script == "cooling":
-        return [cooled(folder / f"{xi}_{s}.h5", xi, 3 * (1 - xi), seed=s).path
-                for xi in (0.8, 0.9, 1.0) for s in (1, 2)]
+        return [
+            cooled(folder / f"{xi}_{s}.h5", xi, 3 * (1 - xi), seed=s).path
+            for xi in (0.8, 0.9, 1.0)
+            for s in (1, 2)
+        ]
     if script == "scattering":
         return [collision(folder / f"{b}.h5", b).path for b in (0, 0.5, 1.1)]
     if script == "crater":
         return [impact(folder / "run.h5", moved=9)]
     if script == "crater_scan":
-        return [impact(folder / f"{m}_{s}.h5", mass=m, seed=s, moved=3 + s + m // 5)
-                for m in (5, 10, 15, 25) for s in (1, 2)]
+        return [
+            impact(folder / f"{m}_{s}.h5", mass=m, seed=s, moved=3 + s + m // 5)
+            for m in (5, 10, 15, 25)
+            for s in (1, 2)
+        ]
     if script == "trajectory":
         return [gas(folder / "gas.h5", rng, count=3, obstacles=[((0.5, 0.5), 0.5, 1)])]
     if script == "cost":
         x = np.zeros((1, 3, 2))
-        return [write_run(folder / "run.h5", x, x, parameters={"run": {"search": "cells"}},
-                          provenance={"collisions_per_second": 1e6, "git_commit": text("abc")})]
+        return [
+            write_run(
+                folder / "run.h5",
+                x,
+                x,
+                parameters={"run": {"search": "cells"}},
+                provenance={"collisions_per_second": 1e6, "git_commit": text("abc")},
+            )
+        ]
     return [falling(folder / "run.h5", rng)]
 
 
-@pytest.mark.parametrize("script", [
-    "speeds", "snapshot", "mixture", "cooling", "scattering", "crater", "crater_scan", "energy",
-    "equipartition", "gravity", "trajectory", "cost"])
+@pytest.mark.parametrize(
+    "script",
+    [
+        "speeds",
+        "snapshot",
+        "mixture",
+        "cooling",
+        "scattering",
+        "crater",
+        "crater_scan",
+        "energy",
+        "equipartition",
+        "gravity",
+        "trajectory",
+        "cost",
+    ],
+)
 def test_script_draws_and_tabulates(tmp_path, rng, script):
     arguments = runs_for(script, tmp_path, rng)
     table = [] if script in ("snapshot", "trajectory") else ["--csv", tmp_path / "new" / "a.csv"]

@@ -10,8 +10,22 @@ from synthetic_run import ROOT, run_script, write_run
 
 from read_run import Obstacle, RunError, mdanalysis_universe, read_run
 
-SCRIPTS = ["speeds", "snapshot", "crater", "crater_scan", "scattering", "mixture", "cooling",
-           "animate", "energy", "equipartition", "gravity", "trajectory", "export", "cost"]
+SCRIPTS = [
+    "speeds",
+    "snapshot",
+    "crater",
+    "crater_scan",
+    "scattering",
+    "mixture",
+    "cooling",
+    "animate",
+    "energy",
+    "equipartition",
+    "gravity",
+    "trajectory",
+    "export",
+    "cost",
+]
 
 
 @pytest.fixture
@@ -20,14 +34,26 @@ def small(tmp_path):
     x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
     v = np.array([[[-3.0, 4.0], [0.0, 1.0]]] * 3)
     return write_run(
-        tmp_path / "small.h5", x, v, time=[0, 0.5, 1], mass=[2.0, 1.0], radius=[0.1, 0.2],
-        species=[2, 1], names=("light", "heavy one"), edges=(2, 4), lower=(-1, -2),
-        periodic=(True, False), image=np.array([[[0, 0], [0, 0]], [[0, 0], [1, 0]],
-                                                [[-1, 0], [1, 0]]]),
-        collisions=[[0, 0], [1, 0], [3, 2]], obstacles=[((0.5, 0.25), 0.2, 0)],
+        tmp_path / "small.h5",
+        x,
+        v,
+        time=[0, 0.5, 1],
+        mass=[2.0, 1.0],
+        radius=[0.1, 0.2],
+        species=[2, 1],
+        names=("light", "heavy one"),
+        edges=(2, 4),
+        lower=(-1, -2),
+        periodic=(True, False),
+        image=np.array([[[0, 0], [0, 0]], [[0, 0], [1, 0]], [[-1, 0], [1, 0]]]),
+        collisions=[[0, 0], [1, 0], [3, 2]],
+        obstacles=[((0.5, 0.25), 0.2, 0)],
         observables={"collisions": [0, 2, 6], "all/kinetic_energy": [1.0, 2.0, 3.0]},
-        parameters={"run": {"seed": 7}, "contact": {"restitution": 0.5},
-                    "box": {"gravity": [0.0, -9.81]}},
+        parameters={
+            "run": {"seed": 7},
+            "contact": {"restitution": 0.5},
+            "box": {"gravity": [0.0, -9.81]},
+        },
     )
 
 
@@ -66,8 +92,9 @@ def test_frames_are_indexed_like_an_array(small):
 
 def frames_seen_by_another_program(path):
     code = f"from read_run import read_run; print(read_run({str(path)!r}).frames)"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
-                            cwd=ROOT / "post")
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT / "post"
+    )
     return int(result.stdout) if result.returncode == 0 else result.stderr.splitlines()[-1]
 
 
@@ -113,9 +140,17 @@ def bad_files(folder):
     with h5py.File(folder / "partial.h5", "r+") as file:
         del file["particles/disks/velocity"], file["particles/disks/mass"]
     (folder / "unfinished.h5.part").touch()
-    return {"empty.h5": "empty", "text.h5": "not an HDF5", "short.h5": "cut short",
-            "foreign.h5": "not of a Ricochet run", "future.h5": "version 2.0", "partial.h5": "mass",
-            "missing.h5": "no such file", "unfinished.h5": "unfinished run", "": "folder"}
+    return {
+        "empty.h5": "empty",
+        "text.h5": "not an HDF5",
+        "short.h5": "cut short",
+        "foreign.h5": "not of a Ricochet run",
+        "future.h5": "version 2.0",
+        "partial.h5": "mass",
+        "missing.h5": "no such file",
+        "unfinished.h5": "unfinished run",
+        "": "folder",
+    }
 
 
 def test_unusable_files_are_told_apart(tmp_path):
@@ -144,8 +179,11 @@ def test_scripts_explain_themselves(script, capsys):
 def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
     result = subprocess.run(
         [sys.executable, ROOT / "post" / "snapshot.py", small, "-o", "new/a.png"],
-        cwd=tmp_path, env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
-        capture_output=True, text=True)
+        cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "new" / "a.png").exists()
 

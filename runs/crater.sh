@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# S5: one crater in pictures, then its size against mass, speed, radius and restitution.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+data=runs/crater figures=runs/figures
+mkdir -p "$data" "$figures"
+
+# Eight beds (seeds) for each of ten values of each parameter, the other three at the base
+# mass 25, speed 5, radius 5, restitution 0.5.  There is no energy scale, so the speed must not
+# matter: the contact time goes with 1/speed to keep that exact.
+member() { # mass speed radius restitution seed
+  local contact_time
+  contact_time=$(awk -v v="$2" 'BEGIN { printf "%.17g", 5e-5 / v }')
+  printf 'mass_%s_speed_%s_radius_%s_restitution_%s_seed_%s\t' "$@"
+  printf -- '--set species.projectile.mass=%s --set species.projectile.velocity=0,-%s ' "$1" "$2"
+  printf -- '--set species.projectile.radius=%s --set contact.restitution=%s ' "$3" "$4"
+  printf -- '--set run.seed=%s --set contact.contact_time=%s\n' "$5" "$contact_time"
+}
+for seed in {1..8}; do
+  for mass in 5 10 15 20 25 30 35 40 45 50; do member "$mass" 5 5 0.5 "$seed"; done
+  for speed in 1 2 3 4 5 6 7 8 9 10; do member 25 "$speed" 5 0.5 "$seed"; done
+  for radius in 1 2 3 4 5 6 7 8 9 10; do member 25 5 "$radius" 0.5 "$seed"; done
+  for restitution in 0 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9; do
+    member 25 5 5 "$restitution" "$seed"
+  done
+done | sort -u >"$data/members.txt"
+
+runs/ensemble.sh input/crater.nml -d "$data" --manifest "$data/members.txt" "$@"
+"$python" post/crater.py "$data/mass_25_speed_5_radius_5_restitution_0.5_seed_1.h5" \
+  -o "$figures/crater.png"
+"$python" post/crater_scan.py "$data"/*.h5 -o "$figures/crater_scan.png" \
+  --csv "$figures/crater_scan.csv"

@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# Reproduce the figures of every system and show them side by side in runs/figures/index.html.
+#
+#   runs/figures.sh                 all
+#   runs/figures.sh gas crater      some
+#   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+figures=runs/figures
+systems=(scattering gas mixture cooling crater lab cost billiards gravity)
+
+options=()
+while [[ ${1:-} == -* ]]; do
+  options+=("$1" "${2:?"$1 needs a value"}")
+  shift 2
+done
+(($# == 0)) || systems=("$@")
+
+failed=()
+for system in "${systems[@]}"; do
+  [[ -x runs/$system.sh && $system != figures && $system != ensemble ]] || {
+    printf 'figures.sh: no system %s\n' "$system" >&2
+    exit 2
+  }
+  printf '== %s\n' "$system" >&2
+  status=0
+  "runs/$system.sh" "${options[@]}" || status=$?
+  case $status in
+  0) ;;
+  75 | 130 | 143) exit 75 ;; # stopped on purpose: the same command goes on
+  *) failed+=("$system (exit $status)") ;;
+  esac
+done
+
+# One section per figure that is there: file, title, the script that makes it.
+section() {
+  local file=$1 title=$2 script=$3 table
+  [[ -e $figures/$file ]] || return 0
+  table=${file%.*}.csv
+  printf '<figure id="%s">\n<a href="%s"><img src="%s" alt="%s" loading="lazy"></a>\n' \
+    "${file%.*}" "$file" "$file" "$title"
+  printf '<figcaption><b>%s</b> <code>runs/%s.sh</code>' "$title" "$script"
+  [[ ! -e $figures/$table ]] || printf ' <a href="%s">numbers</a>' "$table"
+  printf '</figcaption>\n</figure>\n'
+}
+
+mkdir -p "$figures"
+{
+  cat <<'HTML'
+<!DOCTYPE html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Ricochet: figures</title>
+<style>
+  body { font: 16px/1.4 system-ui, sans-serif; margin: 2rem; }
+  main { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 34rem), 1fr)); gap: 2rem; }
+  figure { margin: 0; }
+  img { width: 100%; height: 30rem; object-fit: contain; object-position: left top; background: white; }
+</style>
+<h1>Ricochet: figures</h1>
+<main>
+HTML
+  section scattering.png 'Scattering angle against impact parameter' scattering
+  section gas_frames.png 'A gas: first and last frame' gas
+  section gas.png 'A gas: speeds from equal to Maxwellian' gas
+  section mixture.png 'A mixture: speeds and energies' mixture
+  section cooling_velocity.png 'Cooling; walls slow both components' cooling
+  section cooling_normal.png 'Cooling; walls slow the normal component' cooling
+  section crater.png 'A crater' crater
+  section crater_scan.png 'Crater size against four parameters' crater
+  section lab_frames.png '10 x 10 disks on a grid: events 0, 50, 100, 300' lab
+  section lab_speeds.png '10 x 10 disks: speeds' lab
+  section lab.gif '10 x 10 disks: event by event' lab
+  section cost.png 'Cost of a collision' cost
+  section billiards.png 'Billiards: Sinai, Lorentz' billiards
+  section container.png 'A round container' billiards
+  section container.gif 'A round container, film' billiards
+  section brownian.png 'Brownian motion' billiards
+  section gravity_energy.png 'Gravity: energies, time steps and events' gravity
+  section gravity_equipartition.png 'Gravity: equipartition' gravity
+  section gravity_laws.png 'Gravity: speeds and heights' gravity
+  section gravity_frames.png 'Gravity: frames' gravity
+  section gravity.gif 'Gravity, film' gravity
+  printf '</main>\n</html>\n'
+} >"$figures/index.html"
+printf 'figures = %s/index.html\n' "$figures"
+
+if ((${#failed[@]} > 0)); then
+  printf 'figures.sh: failed: %s\n' "${failed[@]}" >&2
+  exit 1
+fi

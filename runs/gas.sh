@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# S2: speeds of 1000 and of 2000 disks, from equal speeds to the Maxwell law; four seeds each.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+data=runs/gas figures=runs/figures
+
+# A frame every half collision per disk shows the relaxation; the histogram takes every tenth.
+for count in 1000 2000; do
+  runs/ensemble.sh input/gas.nml -d "$data" --scan "species.gas.count=$count" --seeds 1-4 \
+    --set stop.collisions_per_disk=65 --set "output.frames_every_collisions=$((count / 4))" \
+    --set "output.observables_every_collisions=$((count / 4))" "$@"
+done
+"$python" post/speeds.py "$data"/*.h5 -o "$figures/gas.png" --csv "$figures/gas.csv"
+"$python" post/snapshot.py "$data/gas.count_1000_seed_1.h5" --frames 0,-1 --colour speed \
+  -o "$figures/gas_frames.png"

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# L1: 10 x 10 disks on a grid: frames, speeds of the last and of every 100th state, a film.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+data=runs/lab figures=runs/figures
+
+runs/ensemble.sh input/lab.nml -d "$data" --seeds 1 "$@"
+# Frame 50 is the state after 5000 events; the 500 that follow give 50 000 speeds.
+"$python" post/speeds.py "$data/seed_1.h5" --first 51 --skip 0 --apart 0 \
+  -o "$figures/lab_speeds.png" --csv "$figures/lab_speeds.csv"
+runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 \
+  --set output.frames_every_events=1 "$@"
+"$python" post/snapshot.py "$data/start/seed_1.h5" --frames 0,50,100,300 --quiver \
+  -o "$figures/lab_frames.png"
+"$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab.gif"

@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# S1: scattering angle of a light disk off a heavy one, for 41 impact parameters b/R12 in 0..1.2.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+data=runs/scattering figures=runs/figures
+mkdir -p "$data" "$figures"
+
+# Height of the light disk: 0.5 + b, R12 = 0.1 + 0.001.
+for k in {0..40}; do
+  awk -v k="$k" 'BEGIN {
+    s = 1.2 * k / 40
+    printf "b_%.2f\t--set species.light.position=0.2,%.17g\n", s, 0.5 + 0.101 * s }'
+done >"$data/members.txt"
+
+runs/ensemble.sh input/scattering.nml -d "$data" --manifest "$data/members.txt" "$@"
+"$python" post/scattering.py "$data"/*.h5 -o "$figures/scattering.png" --csv "$figures/scattering.csv"
