@@ -73,7 +73,8 @@ $(BUILD)/build_info.f90: FORCE | $(BUILD)
 	  echo 'end module build_info'; } | { $(keep); }
 
 # Who uses whom: `x.o: y.o` for every `use y` in src/x.f90 or tests/x.pf.
-tests := $(wildcard tests/test_*.pf)
+suites := tests
+tests := $(wildcard $(suites)/test_*.pf)
 $(BUILD)/deps.mk: $(sources) $(tests) Makefile | $(BUILD)
 	@awk -v build='$(BUILD)' -v known='$(modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
 	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
@@ -95,7 +96,7 @@ unit_make = $(MAKE) --no-print-directory DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(P
 ifneq ($(PFUNIT_DIR),)
 include $(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk) $(PFUNIT_DIR)/PFUNIT.mk)
 runner := pFUnit $(PFUNIT_VERSION)
-translate = $(PYTHON) $(PFUNIT_BIN_DIR)/funitproc $< $@ >/dev/null
+translate = log=$$($(PYTHON) $(PFUNIT_BIN_DIR)/funitproc $< $@ 2>&1) || { echo "$$log"; false; }
 driver := $(PFUNIT_INCLUDE_DIR)/driver.F90
 test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"'
 test_libs = $(PFUNIT_LIBRARIES)
@@ -106,7 +107,7 @@ driver := tests/support/driver.F90
 test_flags = -cpp -I$(BUILD)
 funit := $(BUILD)/funit.o
 endif
-test_objects := $(tests:tests/%.pf=$(BUILD)/%.o)
+test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
 
 unit-tests: $(BUILD)/unit_tests
 	@tests/support/run_unit_tests.sh "$(runner)" $< $(tests)
@@ -115,11 +116,11 @@ $(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(objects) $(f
 	@echo "link    $@"
 	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(hdf5_libs)
 
-$(BUILD)/test_%.F90: tests/test_%.pf $(wildcard tests/support/*.py)
+$(BUILD)/test_%.F90: $(suites)/test_%.pf tests/support/translate_pf.py
 	$(Q)$(translate)
 
 $(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags $(funit)
-	@echo "compile $(<:$(BUILD)/%.F90=tests/%.pf)"
+	@echo "compile $(<:$(BUILD)/%.F90=$(suites)/%.pf)"
 	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
 $(BUILD)/funit.o: tests/support/funit.f90 $(BUILD)/flags

@@ -21,7 +21,7 @@ def program() -> Path:
 
 @pytest.fixture
 def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
-    """`ricochet(*arguments)` runs the program in `tmp_path`; the result has its status and output."""
+    """`ricochet(*arguments)` runs the program in `tmp_path`; returns its status and output."""
 
     def run(*arguments, timeout=60, **options) -> subprocess.CompletedProcess:
         command = [program, *map(str, arguments)]

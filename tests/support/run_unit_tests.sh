@@ -5,7 +5,7 @@
 set -euo pipefail
 runner=$1 program=$2
 shift 2
-expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*(\(.*\))?[[:space:]]*$')
+expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*$')
 echo "$expected unit tests under $runner"
 status=0
 output=$("$program" 2>&1) || status=$?
