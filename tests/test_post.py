@@ -215,6 +215,12 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
         curves.error[0], np.abs(np.exp(-tau / 20) - np.exp(-tau / 10)) / 2, atol=1e-4
     )
     np.testing.assert_allclose(result.ratio.mean, 2)
+    np.testing.assert_allclose(curves.mean[:, 0], [1, 2 / 3, 4 / 3])
+
+
+def test_energies_are_in_units_of_the_first_mean(tmp_path):
+    kinetic = cooling.energies(cooled(tmp_path / "run.h5", 0.9, decay=5.0, points=3))
+    np.testing.assert_allclose(kinetic[0], np.exp([0, -1.25, -5]))
 
 
 # --- scattering ---
@@ -388,7 +394,9 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
 
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng))
-    result = gravity.table(run, [gravity.samples(run, n, 20.0) for n in run.names], 0.7)
+    species = [gravity.samples(run, name, 20.0) for name in run.names]
+    assert species[0].height.shape == (320, 30) and 0 <= species[0].height.min() < 0.01
+    result = gravity.table(run, species, 0.7)
     for kind in ("speed", "height"):
         ratio = np.array(result[f"{kind}_slope"]) / result[f"{kind}_slope_law"]
         np.testing.assert_allclose(ratio, 1, atol=0.05)
