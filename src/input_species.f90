@@ -3,7 +3,7 @@ module input_species
   use kinds, only: int64, pi, real64
   use input_problems, only: problem_list_t
   use parameter_values, only: parameter_group_t
-  use parameters, only: row_of
+  use parameters, only: largest, row_of, smallest
   use settings, only: box_settings_t, species_settings_t
   use texts, only: shown, suggestion, written
   implicit none
@@ -44,7 +44,7 @@ contains
         call group%set_integer('count', int(s%count, int64))
         call group%set_reals('mass', [s%mass])
         call group%set_reals('radius', [s%radius])
-        if (area(s%region) > 0) call group%set_reals('packing_fraction', &
+        if (s%radius < sqrt(area(s%region))) call group%set_reals('packing_fraction', &
           [s%count*pi*s%radius**2/area(s%region)])
         call group%set_reals('region', s%region)
       end associate
@@ -213,6 +213,7 @@ contains
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
     integer :: base(size(species)), k, j, step
+    logical :: fits
     do k = 1, size(species)
       call find_base(groups, k, base(k), problems)
       mass(k) = groups(k)%real_of('mass', 1.0_real64)
@@ -225,12 +226,13 @@ contains
       do step = 1, size(species)
         species(k)%mass = species(k)%mass*mass(j)
         species(k)%radius = species(k)%radius*radius(j)
+        fits = max(species(k)%mass, species(k)%radius) <= largest .and. species(k)%mass >= smallest
         j = base(j)
-        if (j == 0) exit
+        if (j == 0 .or. .not. fits) exit
       end do
-      if (j == 0) cycle
+      if (j == 0 .and. fits) cycle
       call problems%add(groups(k)%line_of('relative_to'), 'species.relative_to', &
-        'leads back to the species itself')
+        'leads back to the species itself, or to sizes out of range')
       species(k)%radius = 0
     end do
   end subroutine resolve_sizes

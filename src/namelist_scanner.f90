@@ -170,18 +170,15 @@ contains
     class(scanner_t), intent(inout) :: self
     type(statement_t), intent(inout) :: statement
     type(problem_list_t), intent(inout) :: problems
-    integer :: length, status
+    integer :: last, length
     if (character_at(self%text, self%at) /= '(') return
-    length = scan(self%text(self%at:), ')'//eol)
-    status = 1
-    if (length >= 3 .and. length <= 10) then
-      associate (inner => self%text(self%at + 1:self%at + length - 2))
-        if (verify(inner, digits) == 0) read (inner, *, iostat=status) statement%element
-      end associate
+    length = verify(self%text(self%at + 1:), digits) - 1
+    last = self%at + length
+    if (length >= 1 .and. length <= 8 .and. self%text(last + 1:last + 1) == ')') then
+      read (self%text(self%at + 1:last), *) statement%element
+      self%at = last + 2
     end if
-    self%at = self%at + length - 1
-    if (self%text(self%at:self%at) == ')') self%at = self%at + 1
-    if (status == 0 .and. statement%element > 0) return
+    if (statement%element > 0) return
     call problems%add(statement%line, self%group//'.'//plain(statement%name), &
       'in brackets stands the number of one value: name(2) = value')
     statement%sound = .false.

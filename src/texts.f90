@@ -34,21 +34,20 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> Six significant digits without trailing zeros.
-  pure function written_real(number) result(text)
+  !> Without trailing zeros; with an exponent only where it helps.
+  pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
-    character(len=32) :: buffer
-    integer :: tail, last
-    write (buffer, '(g0.6)') number
-    tail = index(buffer, 'E')
-    if (tail == 0) tail = len_trim(buffer) + 1
-    last = tail - 1
-    if (index(buffer(:last), '.') > 0) then
-      last = verify(buffer(:last), '0', back=.true.)
-      if (buffer(last:last) == '.') last = last - 1
+    character(len=24) :: buffer
+    integer :: exponent
+    if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
+      write (buffer, '(f24.6)') number
+      text = trim(adjustl(buffer(:verify(buffer, '0', back=.true.))))
+      if (text(len(text):) == '.') text = text(:len(text) - 1)
+    else
+      exponent = floor(log10(abs(number)))
+      text = written_real(number/10.0_real64**exponent)//'e'//written_integer(exponent)
     end if
-    text = buffer(:last)//trim(buffer(tail:))
   end function written_real
 
   !> ASCII letters in lower case; every other byte as it is.
