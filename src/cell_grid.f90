@@ -18,7 +18,8 @@ module cell_grid
   integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
   integer(int32), parameter :: list_capacity = 64
   real(real64), parameter :: no_shift(2) = 0.0_real64
-  real(real64), parameter :: disks_per_cell = 0.7_real64    !! wanted when dilute
+  real(real64), parameter :: disks_per_cell = 0.5_real64    !! wanted when dilute
+  real(real64), parameter :: slowest = 1/never              !! a disk slower than this is at rest
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
   !> The disks in a cell: copied as a whole, 16 bytes. The last slot counts them: those in the slots in its
@@ -32,6 +33,11 @@ module cell_grid
     integer(int32) :: n(2) = 0                     !! columns, rows
     integer(int32) :: stride = 0                   !! from row to row; the grid has a ring of empty cells
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
+    real(real64) :: side(0:1, 2) = 0.0_real64      !! of the box, lower and upper by axis [length]
+    real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
+    logical :: periodic = .false.                  !! along one axis at least
+    logical :: falling = .false.                   !! disks fly on parabolas
+    logical :: obstructed = .false.                !! there are obstacles
     type(cell_t), allocatable :: cell(:)           !! (0:)
     integer(int32), allocatable :: next(:)         !! (disks) chain of a crowded cell
     integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
@@ -40,11 +46,6 @@ module cell_grid
     procedure :: build
     procedure :: predict
     procedure :: cross
-    procedure, private :: insert
-    procedure, private :: remove
-    procedure, private :: scan_crowd
-    procedure, private :: scan_chain
-    procedure, private :: scan_around_edge
   end type cell_grid_t
 
 contains
@@ -59,7 +60,12 @@ contains
     width = max(reach, sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()))
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%stride = self%n(1) + 2
-    self%width = sim%box%edges()/self%n
+    self%width = sim%box%edges()/self%n*(1 + 4*epsilon(width))   ! the last face is not before the side
+    self%side(0, :) = sim%box%lower
+    self%side(1, :) = sim%box%upper
+    self%walled = merge(0, 1, sim%box%periodic)
+    self%periodic = any(sim%box%periodic)
+    self%falling = sim%box%falling()
     n_cells = self%stride*(self%n(2) + 2)
     if (allocated(self%cell)) then
       if (size(self%cell) /= n_cells) deallocate (self%cell)
@@ -72,11 +78,11 @@ contains
     do i = 1, sim%n_disks()
       x = (sim%position(i) - sim%box%lower)/self%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      call self%insert(cell_number(self, sim%tag(i)%cell), i)
+      call insert(self, cell_number(self, sim%tag(i)%cell), i)
     end do
-    if (allocated(sim%box%obstacle)) then
-      if (size(sim%box%obstacle) > 0) call list_obstacles(self, sim%box, maxval(sim%disk%radius))
-    end if
+    self%obstructed = .false.
+    if (allocated(sim%box%obstacle)) self%obstructed = size(sim%box%obstacle) > 0
+    if (self%obstructed) call list_obstacles(self, sim%box, maxval(sim%disk%radius))
   end subroutine build
 
   !> Which obstacles a disk of at most `radius` can touch with its centre in each cell.
@@ -86,6 +92,7 @@ contains
     real(real64), intent(in) :: radius
     integer(int32) :: ix, iy, m, c, n
     integer :: pass
+    if (allocated(self%obstacle_list)) deallocate (self%obstacle_list)
     allocate (self%obstacle_list(0))
     do pass = 1, 2                                 ! count, then fill
       if (pass == 2) then
@@ -197,12 +204,12 @@ contains
     integer(int32) :: face, axis, there
     face = -merge(code - first_crossing, code, code <= first_crossing)
     axis = 1 + face/2
-    call self%remove(cell_number(self, sim%tag(i)%cell), i)
+    call remove(self, cell_number(self, sim%tag(i)%cell), i)
     there = sim%tag(i)%cell(axis) + 2*modulo(face, 2) - 1
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
-    call self%insert(cell_number(self, sim%tag(i)%cell), i)
+    call insert(self, cell_number(self, sim%tag(i)%cell), i)
   end subroutine cross
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -210,56 +217,71 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    real(real64) :: t, t_y
-    integer(int32) :: code, code_y, c, n, list(list_capacity)
+    real(real64) :: t
+    integer(int32) :: code, c, n, list(list_capacity)
     logical :: crowded
-    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 1, t, code)
-    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, 2, t_y, code_y)
-    code = merge(code, code_y, t <= t_y)
-    t = min(t, t_y)
+    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
     c = cell_number(self, sim%tag(i)%cell)
-    if (allocated(self%obstacle_list)) call next_obstacle(sim%box, sim%disk(i), &
+    if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
       self%obstacle_list(self%obstacle_start(c):self%obstacle_start(c + 1) - 1), t, code)
     if (at_periodic_edge(self, sim%box, sim%tag(i)%cell)) then
-      call self%scan_around_edge(sim, i, t, code)
+      call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cell, c, self%stride, list, n, crowded)
-      call earliest_contact(sim%disk, i, n, list, no_shift, sim%box%gravity, t, code)
-      if (crowded) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
+      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
+        no_shift, sim%box%gravity, t, code)
+      if (crowded) call scan_crowd(self, sim%disk, i, c, sim%box%gravity, t, code)
     end if
     sim%disk(i)%event_time = t
     sim%disk(i)%partner = code
-    if (code > 0) sim%tag(i)%partner_stamp = sim%disk(code)%stamp
+    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
   end subroutine predict
 
-  !> When and through which face the disk leaves its cell along one axis, or meets the side within it.
-  pure subroutine next_face(self, box, disk, cell, now, axis, t, code)
+  !> When and how the disk leaves its cell, or meets a side within it.
+  pure subroutine next_face(self, box, disk, cell, now, t, code)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_y
+    integer(int32) :: code_y
+    if (self%falling) then
+      call next_face_falling(self, box, disk, cell, now, 1, t, code)
+      call next_face_falling(self, box, disk, cell, now, 2, t_y, code_y)
+    else
+      call next_face_straight(self, disk, cell, 1, t, code)
+      call next_face_straight(self, disk, cell, 2, t_y, code_y)
+    end if
+    code = merge(code_y, code, t_y < t)
+    t = merge(t_y, t, t_y < t)
+  end subroutine next_face
+
+  !> Along one axis on a straight line, without a branch. Contact with a side comes out as `side_time` has
+  !> it: it is one event, whoever predicts it.
+  pure subroutine next_face_straight(self, disk, cell, axis, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    integer(int16), intent(in) :: cell(2)
     integer, intent(in) :: axis
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: face, side, target, inset
-    logical :: up, at_side
-    if (abs(box%gravity(axis)) > 0) then
-      call next_face_falling(self, box, disk, cell, now, axis, t, code)
-      return
-    end if
-    up = disk%v(axis) > 0
-    inset = merge(0.0_real64, disk%radius, box%periodic(axis))
-    face = box%lower(axis) + self%width(axis)*(cell(axis) - merge(0, 1, up))
-    side = merge(box%upper(axis) - inset, box%lower(axis) + inset, up)
-    at_side = merge(face >= side .or. cell(axis) == self%n(axis), face <= side, up)
-    target = merge(side, face, at_side)
-    ! The same numbers as `side_time`: contact with a side is one event, whoever predicts it.
-    t = disk%clock + max(merge(target - disk%x(axis), disk%x(axis) - target, up), 0.0_real64) &
-      /max(abs(disk%v(axis)), tiny(t))
-    t = merge(t, never, abs(disk%v(axis)) > 0)
-    code = merge(0, first_crossing, at_side) - 2*(axis - 1) - merge(1, 0, up)
-  end subroutine next_face
+    real(real64) :: to_face, to_side, sense, inset, speed
+    integer(int32) :: up
+    up = merge(1, 0, disk%v(axis) > 0)
+    sense = sign(1.0_real64, disk%v(axis))
+    inset = self%walled(axis)*disk%radius
+    to_face = sense*((self%side(0, axis) + self%width(axis)*(cell(axis) - 1 + up)) - disk%x(axis))
+    to_side = sense*((self%side(up, axis) - sense*inset) - disk%x(axis))
+    code = merge(0, first_crossing, to_side <= to_face) - 2*(axis - 1) - up
+    to_face = merge(to_side, to_face, to_side <= to_face)
+    to_face = merge(to_face, 0.0_real64, to_face > 0)
+    speed = abs(disk%v(axis))
+    t = disk%clock + to_face/merge(speed, slowest, speed > slowest)
+    t = merge(t, never, t < never)
+  end subroutine next_face_straight
 
   !> The same on a parabola: each of the two faces can be the one, and the root before `now`, where the disk
   !> came in, is not.
@@ -302,7 +324,8 @@ contains
     type(box_t), intent(in) :: box
     integer(int16), intent(in) :: cell(2)
     logical :: yes
-    yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
+    yes = .false.
+    if (self%periodic) yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
   !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they
@@ -343,7 +366,7 @@ contains
     integer(int32) :: k, m
     do k = c - self%stride, c + self%stride, self%stride
       do m = k - 1, k + 1
-        call self%scan_chain(disk, i, m, no_shift, gravity, t, code)
+        call scan_chain(self, disk, i, m, no_shift, gravity, t, code)
       end do
     end do
   end subroutine scan_crowd
@@ -366,7 +389,7 @@ contains
         list(n) = j
         j = self%next(j)
       end do
-      call earliest_contact(disk, i, n, list, shift, gravity, t, code)
+      call earliest_contact(disk, i, n, list, .false., .true., shift, gravity, t, code)
     end do
   end subroutine scan_chain
 
@@ -388,8 +411,8 @@ contains
         shift = image*sim%box%edges()
         c = there(1) + self%stride*there(2)
         call earliest_contact(sim%disk, i, iand(self%cell(c)%slot(count_slot), listed), &
-          self%cell(c)%slot, shift, sim%box%gravity, t, code)
-        call self%scan_chain(sim%disk, i, c, shift, sim%box%gravity, t, code)
+          self%cell(c)%slot, .false., .true., shift, sim%box%gravity, t, code)
+        call scan_chain(self, sim%disk, i, c, shift, sim%box%gravity, t, code)
       end do
     end do
   end subroutine scan_around_edge

@@ -5,7 +5,6 @@ module encounters
   use box_geometry, only: box_t, first_obstacle
   use collisions, only: pair_impulse, wall_rebound
   use disks, only: disk_t
-  use free_flight, only: flight, flight_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -13,12 +12,16 @@ module encounters
 
 contains
 
-  !> Brings a disk's own state to the time t.
+  !> Brings a disk's own state to the time t: `flight` and `flight_velocity`, in place.
   pure subroutine land(disk, gravity, t)
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: gravity(2), t
-    disk%x = flight(disk%x, disk%v, gravity, t - disk%clock)
-    disk%v = flight_velocity(disk%v, gravity, t - disk%clock)
+    real(real64) :: s
+    s = t - disk%clock
+    disk%x(1) = disk%x(1) + (disk%v(1) + 0.5_real64*gravity(1)*s)*s
+    disk%x(2) = disk%x(2) + (disk%v(2) + 0.5_real64*gravity(2)*s)*s
+    disk%v(1) = disk%v(1) + gravity(1)*s
+    disk%v(2) = disk%v(2) + gravity(2)*s
     disk%clock = t
     disk%stamp = disk%stamp + 1
   end subroutine land

@@ -35,11 +35,6 @@ module event_driven
   contains
     procedure :: start
     procedure :: advance
-    procedure, private :: react
-    procedure, private :: expect_everything
-    procedure, private :: predict
-    procedure, private :: watch
-    procedure, private :: move_epoch
   end type event_driven_t
 
 contains
@@ -49,7 +44,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
     real(real64) :: fastest
-    call self%expect_everything(sim)
+    call expect_everything(self, sim)
     fastest = norm2(sim%box%gravity)*minval(sim%disk%radius)
     do i = 1, sim%n_disks()
       fastest = max(fastest, dot_product(sim%disk(i)%v, sim%disk(i)%v))
@@ -91,7 +86,7 @@ contains
     do turn = 1, limits%turns
       if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
         .or. sim%dissipated >= limits%dissipated) return
-      if (sim%events >= sim%next_epoch) call self%move_epoch(sim)
+      if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
       if (.not. t <= min(limits%time - sim%epoch, last_time)) then
@@ -102,9 +97,9 @@ contains
       end if
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
-      call self%react(sim, i)
+      call react(self, sim, i)
       self%events_since = self%events_since + 1
-      if (self%events_since > patience) call self%watch(sim, i, error)
+      if (self%events_since > patience) call watch(self, sim, i, error)
       if (allocated(error)) return
     end do
   end subroutine advance
@@ -119,27 +114,27 @@ contains
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         call collide_pair(sim, min(i, code), max(i, code), sim%disk(i)%event_time)
-        call self%predict(sim, i)
-        call self%predict(sim, code)
+        call predict(self, sim, i)
+        call predict(self, sim, code)
       else
-        call self%predict(sim, i)
+        call predict(self, sim, i)
         return
       end if
     else if (code <= first_crossing) then
       call self%search%cross(sim, i, code)
-      call self%predict(sim, i)
+      call predict(self, sim, i)
       return
     else if (passes(sim, code)) then
       call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
-      call self%predict(sim, i)
+      call predict(self, sim, i)
     else
       call collide_wall(sim, i, code, sim%disk(i)%event_time)
-      call self%predict(sim, i)
+      call predict(self, sim, i)
     end if
     if (self%search%everyone) then
       do k = 1, sim%n_disks()
-        call self%predict(sim, k)
+        call predict(self, sim, k)
       end do
     end if
   end subroutine react
@@ -204,7 +199,7 @@ contains
     sim%epoch = sim%epoch + shift
     sim%next_epoch = sim%events + events_per_epoch(sim)
     self%last_look = self%last_look - shift
-    call self%expect_everything(sim)
+    call expect_everything(self, sim)
   end subroutine move_epoch
 
 end module event_driven

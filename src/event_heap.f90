@@ -24,8 +24,6 @@ module event_heap
     procedure :: update
     procedure :: remove
     procedure :: first
-    procedure, private :: sift_up
-    procedure, private :: sift_down
   end type event_heap_t
 
 contains
@@ -74,8 +72,8 @@ contains
       self%n = self%n + 1
       k = self%n
     end if
-    call self%sift_up(k, event)
-    if (self%slot(event%disk) == k) call self%sift_down(k, event)
+    call sift_up(self, k, event)
+    if (self%slot(event%disk) == k) call sift_down(self, k, event)
   end subroutine update
 
   !> Takes a disk's event out; nothing happens if there is none.
@@ -90,8 +88,8 @@ contains
     last = self%entry(self%n)
     self%n = self%n - 1
     if (last%disk == disk) return
-    call self%sift_up(k, last)
-    if (self%slot(last%disk) == k) call self%sift_down(k, last)
+    call sift_up(self, k, last)
+    if (self%slot(last%disk) == k) call sift_down(self, k, last)
   end subroutine remove
 
   !> The earliest event. The heap must not be empty.

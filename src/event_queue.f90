@@ -32,6 +32,7 @@ module event_queue
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
     integer(int32), allocatable :: far(:)          !! (n_far) disks whose event lies beyond the ring
     integer(int32) :: n_far = 0
+    integer(int32) :: length = 0                   !! number of buckets
     integer(int32) :: window = 0                   !! number of the current window since the epoch
     integer(int32) :: half_turn = 0                !! window at which the far list is filed again
     real(real64) :: width = never                  !! of a window [time]
@@ -44,10 +45,6 @@ module event_queue
     procedure :: schedule
     procedure :: first
     procedure :: drop_first
-    procedure, private :: insert_near
-    procedure, private :: insert_far
-    procedure, private :: open_next_window
-    procedure, private :: sweep_far_list
   end type event_queue_t
 
 contains
@@ -80,6 +77,7 @@ contains
       end if
       if (.not. allocated(self%bucket)) allocate (self%bucket(0:length - 1), self%far(n))
       self%bucket%n = 0
+      self%length = length
       self%window = int(min(now*self%per_time, 1.0e9_real64), int32)
       self%window_end = self%width*(self%window + 1)
       self%half_turn = self%window + length/2
@@ -87,7 +85,7 @@ contains
       self%window_end = huge(now)
     end if
     do i = 1, n
-      call self%schedule(disk, tag, i)
+      call schedule(self, disk, tag, i)
     end do
   end subroutine fill
 
@@ -99,6 +97,11 @@ contains
     real(real64), intent(in) :: now
     real(real64) :: width, wait(sample_size), swap
     integer :: i, k, n_waits
+    width = never
+    if (self%n_taken > sample_size .and. self%calendar) then
+      width = events_per_window*(self%window_end - self%filled_at)/self%n_taken
+      return
+    end if
     n_waits = 0
     do i = 1, size(disk), (size(disk) - 1)/sample_size + 1
       if (.not. disk(i)%event_time < never) cycle
@@ -109,13 +112,8 @@ contains
         swap = wait(k); wait(k) = wait(k - 1); wait(k - 1) = swap
       end do
     end do
-    width = never
-    if (self%n_taken > sample_size .and. now > self%filled_at) then
-      width = events_per_window*(now - self%filled_at)/self%n_taken
-    else if (n_waits > 0) then
-      width = events_per_window*max(wait((n_waits + 1)/2), tiny(width)/epsilon(width))/n_waits &
-        *min(1.0_real64, real(sample_size, real64)/size(disk))
-    end if
+    if (n_waits > 0) width = events_per_window*max(wait((n_waits + 1)/2), tiny(width)/epsilon(width)) &
+      /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
   end function window_width
 
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
@@ -126,10 +124,10 @@ contains
     integer(int32), intent(in) :: i
     if (disk(i)%event_time < self%window_end) then
       tag(i)%bucket = in_window
-      call self%insert_near(disk, event_t(disk(i)%event_time, i, disk(i)%partner))
+      call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
     else
       if (self%heap%n > 0) call self%heap%remove(i)
-      call self%insert_far(disk, tag, i)
+      call insert_far(self, disk, tag, i)
     end if
   end subroutine schedule
 
@@ -165,26 +163,25 @@ contains
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
-    integer(int32) :: window, k
+    integer(int32) :: window, k, n
     window = int(min(disk(i)%event_time*self%per_time, 2.0e9_real64), int32)
     if (window == tag(i)%bucket) return
-    window = max(window, self%window + 1)
-    if (window - self%window < size(self%bucket)) then
-      do
-        k = iand(window, size(self%bucket, kind=int32) - 1)
-        if (self%bucket(k)%n < bucket_capacity) then
-          self%bucket(k)%n = self%bucket(k)%n + 1
-          self%bucket(k)%disk(self%bucket(k)%n) = i
-          tag(i)%bucket = window
-          return
-        end if
-        window = window - 1
-        if (window <= self%window) exit
-      end do
+    do while (window - self%window < self%length .and. window > self%window)
+      k = iand(window, self%length - 1)
+      n = self%bucket(k)%n
+      if (n < bucket_capacity) then
+        self%bucket(k)%disk(n + 1) = i
+        self%bucket(k)%n = n + 1
+        tag(i)%bucket = window
+        return
+      end if
+      window = window - 1
+    end do
+    if (window <= self%window) then
       tag(i)%bucket = in_window
-      call self%insert_near(disk, event_t(disk(i)%event_time, i, disk(i)%partner))
+      call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
     else if (tag(i)%bucket /= in_far_list) then
-      if (self%n_far == size(self%far)) call self%sweep_far_list(disk, tag)
+      if (self%n_far == size(self%far)) call sweep_far_list(self, disk, tag)
       self%n_far = self%n_far + 1
       self%far(self%n_far) = i
       tag(i)%bucket = in_far_list
@@ -203,7 +200,7 @@ contains
       i = self%far(k)
       if (tag(i)%bucket /= in_far_list) cycle
       tag(i)%bucket = nowhere
-      call self%schedule(disk, tag, i)
+      call schedule(self, disk, tag, i)
     end do
   end subroutine sweep_far_list
 
@@ -228,7 +225,7 @@ contains
         i = event%disk
         if (event%time < self%window_end) return
       end if
-      call self%open_next_window(disk, tag)
+      call open_next_window(self, disk, tag)
     end do
   end subroutine first
 
@@ -266,13 +263,13 @@ contains
     if (self%window == self%half_turn) then
       if (ill_fitting(self)) then
         k = size(self%far, kind=int32)
-        call self%fill(disk(1:k), tag(1:k), self%width*self%window, calendar=.true.)
+        call fill(self, disk(1:k), tag(1:k), self%width*self%window, calendar=.true.)
         return
       end if
-      self%half_turn = self%window + size(self%bucket, kind=int32)/2
-      call self%sweep_far_list(disk, tag)
+      self%half_turn = self%window + self%length/2
+      call sweep_far_list(self, disk, tag)
     end if
-    k = iand(self%window, size(self%bucket, kind=int32) - 1)
+    k = iand(self%window, self%length - 1)
     opened%n = self%bucket(k)%n
     opened%disk = self%bucket(k)%disk
     self%bucket(k)%n = 0
@@ -280,7 +277,7 @@ contains
       i = opened%disk(k)
       if (tag(i)%bucket /= self%window) cycle
       tag(i)%bucket = nowhere
-      call self%schedule(disk, tag, i)
+      call schedule(self, disk, tag, i)
     end do
   end subroutine open_next_window
 
@@ -289,8 +286,8 @@ contains
     class(event_queue_t), intent(in) :: self
     logical :: yes
     real(real64) :: per_window
-    per_window = self%n_taken*self%width/(self%window_end - self%filled_at)
-    yes = per_window < events_per_window/4 .or. per_window > events_per_window*4
+    per_window = max(self%n_taken, 1_int64)*self%width/(self%window_end - self%filled_at)
+    yes = abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0
   end function ill_fitting
 
 end module event_queue

@@ -55,11 +55,13 @@ contains
   !>
   !> Most candidates fail one combined test: the root is not before the best so far (it needs
   !> c < -2 b (t - late), with a margin above rounding) or not real.
-  pure subroutine earliest_contact(disk, i, n, list, shift, gravity, t, partner)
+  pure subroutine earliest_contact(disk, i, n, list, fresh, bent, shift, gravity, t, partner)
     type(disk_t), intent(in) :: disk(*)       !! all disks
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: n           !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates; i itself is harmless
+    logical, intent(in) :: fresh              !! nobody has a later clock than i
+    logical, intent(in) :: bent               !! `shift` or `gravity` is not zero
     real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
@@ -67,23 +69,29 @@ contains
     real(real64) :: xi, yi, ui, vi, clock, ri, clock_j, late, si, sj, dx, dy, du, dv, sigma2, b, c, disc
     real(real64) :: t_j, gate, in_time
     integer(int32) :: k, j
-    logical :: bent
     xi = disk(i)%x(1); yi = disk(i)%x(2)
     ui = disk(i)%v(1); vi = disk(i)%v(2)
     clock = disk(i)%clock
     ri = disk(i)%radius
-    bent = any(abs(gravity) > 0) .or. any(abs(shift) > 0)
     gate = above(t)
+    si = 0
     do k = 1, n
       j = list(k)
       clock_j = disk(j)%clock
-      late = merge(clock, clock_j, clock > clock_j)
-      si = late - clock
-      sj = late - clock_j
       du = disk(j)%v(1) - ui
       dv = disk(j)%v(2) - vi
-      dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
-      dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
+      if (fresh) then                         ! the same numbers as below, with si = 0
+        late = clock
+        sj = late - clock_j
+        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - xi
+        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - yi
+      else
+        late = merge(clock, clock_j, clock > clock_j)
+        si = late - clock
+        sj = late - clock_j
+        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
+        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
+      end if
       if (bent) then
         dx = dx + (shift(1) + 0.5_real64*gravity(1)*(sj*sj - si*si))
         dy = dy + (shift(2) + 0.5_real64*gravity(2)*(sj*sj - si*si))
