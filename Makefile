@@ -12,7 +12,10 @@
 comma := ,
 BUILD ?= build$(if $(DEBUG),/debug)
 ARCH ?= native
-OPT ?= $(if $(DEBUG),-O0,-O3 -march=$(ARCH) -finline-limit=2000 -fno-backtrace)
+OPT ?= $(if $(DEBUG),-O0,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
+# For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
+hot := -flto -flto-partition=none -finline-limit=2000 -funswitch-loops --param=max-unswitch-insns=300 \
+  -fno-trapping-math
 CHECKS := $(if $(DEBUG),-fcheck=all -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument $(OPT)
 
@@ -37,7 +40,7 @@ objects := $(modules:%=$(BUILD)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-.PHONY: all set-up demo figures test unit-tests check lint bench bench-check coverage docs help clean FORCE
+.PHONY: all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean help FORCE
 
 all: $(BUILD)/ricochet  ## builds the program (default)
 
@@ -91,7 +94,7 @@ endif
 # --- Unit tests: the same .pf files under pFUnit or the substitute, always with all checks on -----------------
 
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
-unit_make = $(MAKE) --no-print-directory DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests) unit-tests
+unit_make = $(sub) DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests) unit-tests
 
 ifneq ($(PFUNIT_DIR),)
 include $(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk) $(PFUNIT_DIR)/PFUNIT.mk)
@@ -131,18 +134,76 @@ $(BUILD)/tests.inc: FORCE | $(BUILD)
 
 # --- What people call ----------------------------------------------------------------------------------------
 
+venv := .venv/bin/python
+sub = $(MAKE) --no-print-directory
+
+demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/demo/
+	@.ci/set-up demo
+	@$(sub) all
+	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force
+	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
+	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
+	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
+	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
+	@echo 'In runs/demo: the crater (crater.png), the speeds of the gas (speeds.png), its last state (gas.png);'
+	@echo 'the data are in crater.h5 and gas.h5.'
+
+figures:  ## reproduces the figures of every system into runs/figures/ (long)
+	@.ci/set-up demo
+	@$(sub) all
+	@runs/figures.sh
+
+test:  ## sets up, then unit tests and whole runs (two minutes)
+	@.ci/set-up demo test
+	@$(unit_make)
+	@$(sub) all
+	@RICOCHET='$(abspath $(BUILD))/ricochet' $(venv) -m pytest -q tests
+
+check:  ## validates the physics and provokes faults (minutes)
+	@.ci/set-up demo test
+	@$(sub) all
+	@RICOCHET='$(abspath $(BUILD))/ricochet' $(venv) -m pytest -q -m check tests
+
+bench: all  ## measures collisions per second
+	@runs/bench.sh
+
+bench-check: all  ## the same against the floor that the project promises
+	@runs/bench.sh --check
+
+lint:  ## compiler warnings, fortitude, fprettify, ruff, shellcheck, and the rules of the design
+	@.ci/set-up lint
+	@$(sub) --keep-going lint-compiler lint-fortran lint-python lint-shell lint-design
+
+.PHONY: lint-compiler lint-fortran lint-python lint-shell lint-design
+lint-compiler:
+	@$(sub) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
+lint-fortran:
+	@$(venv) -m fortitude --quiet check --output-format concise src
+	@! $(venv) -m fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
+lint-python:
+	@$(venv) -m ruff check --quiet --output-format concise post tests
+lint-shell:
+	@shellcheck --format gcc .ci/run .ci/set-up $(wildcard runs/*.sh tests/*.sh tests/support/*.sh)
+lint-design:
+	@$(venv) tests/support/check_style.py
+
+coverage:  ## which lines of src/ the tests reach
+	@.ci/set-up demo test coverage
+	@$(sub) BUILD=$(BUILD)/coverage OPT='-O0 --coverage' unit-tests all
+	@RICOCHET='$(abspath $(BUILD))/coverage/ricochet' $(venv) -m pytest -q tests
+	@$(venv) -m gcovr --root . --filter src/ $(BUILD)/coverage
+
+docs:  ## pages of the source, with FORD, into build/docs
+	@.ci/set-up docs
+	@$(venv) -m ford --quiet --src_dir src --output_dir $(BUILD)/docs README.md
+
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 	@.ci/set-up demo test
 
-test:  ## unit tests, then whole runs and scripts (two minutes)
-	@.ci/set-up demo test
-	@$(unit_make)
-	@$(MAKE) --no-print-directory all
-	@RICOCHET='$(abspath $(BUILD))/ricochet' .venv/bin/python -m pytest -q tests
-
-clean:  ## removes everything generated, but .venv and runs/
-	rm -rf $(BUILD)
+clean:  ## removes what was built; runs/ and .venv stay
+	rm -rf '$(BUILD)'
 
 help:  ## this list
-	@awk -F ':.*##' '/^[a-z-]+:.*##/ { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@echo
 	@sed -n 's/^#   /  /p' Makefile

@@ -13,6 +13,7 @@ module stop_rules
     real(real64) :: wall_clock = never       !! [s]
   contains
     procedure :: met
+    procedure :: share
   end type stop_rule_t
 
   interface stop_rule_t
@@ -46,5 +47,15 @@ contains
     yes = sim%time() >= self%limits%time .or. sim%collisions >= self%limits%collisions &
       .or. sim%events >= self%limits%events .or. sim%dissipated >= self%limits%dissipated
   end function met
+
+  !> How much of the run is done, from 0 to 1, by the rule that is nearest to its end.
+  pure function share(self, sim) result(done)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: done
+    done = max(sim%time()/self%limits%time, real(sim%collisions, real64)/self%limits%collisions, &
+      real(sim%events, real64)/self%limits%events, sim%dissipated/max(self%limits%dissipated, tiny(done)))
+    done = min(max(done, 0.0_real64), 1.0_real64)
+  end function share
 
 end module stop_rules
