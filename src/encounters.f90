@@ -5,12 +5,44 @@ module encounters
   use box_geometry, only: box_t, first_obstacle
   use collisions, only: pair_impulse, wall_rebound
   use disks, only: disk_t
+  use event_log, only: event_log_t
+  use free_flight, only: flight_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: collide_pair, collide_wall, nearest_image, pass_side, passes, wall_normal
+  public :: collide, collide_pair, collide_wall, nearest_image, pass_side, passes, wall_normal
 
 contains
+
+  !> Lets disk i collide at the time t with what `code` names, and lists the collision if the log is on.
+  subroutine collide(sim, i, code, t, log)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code           !! a disk (> 0), or a wall: see `box_geometry`
+    real(real64), intent(in) :: t
+    type(event_log_t), intent(inout) :: log
+    real(real64) :: v(2)
+    if (log%is_on()) v = flight_velocity(sim%disk(i)%v, sim%box%gravity, t - sim%disk(i)%clock)
+    if (code > 0) then
+      call collide_pair(sim, min(i, code), max(i, code), t)
+    else
+      call collide_wall(sim, i, code, t)
+    end if
+    if (.not. log%is_on()) return
+    associate (tag => sim%tag(i), impulse => norm2(sim%disk(i)%v - v))
+      call log%append(sim%epoch + t, tag%id, name_of(sim, code), &
+        impulse*sim%species(tag%species)%mass)
+    end associate
+  end subroutine collide
+
+  !> What `code` names in the order of the input file.
+  pure function name_of(sim, code) result(id)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: code
+    integer(int32) :: id
+    id = code
+    if (code > 0) id = sim%tag(code)%id
+  end function name_of
 
   !> Brings a disk's own state to the time t: `flight` and `flight_velocity`, in place.
   pure subroutine land(disk, gravity, t)

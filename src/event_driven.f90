@@ -6,7 +6,7 @@
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: first_obstacle
-  use encounters, only: collide_pair, collide_wall, pass_side, passes
+  use encounters, only: collide, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
@@ -85,7 +85,7 @@ contains
     integer(int32) :: i
     do turn = 1, limits%turns
       if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
-        .or. sim%dissipated >= limits%dissipated) return
+        .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()) return
       if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
@@ -113,7 +113,7 @@ contains
     code = sim%disk(i)%partner
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        call collide_pair(sim, min(i, code), max(i, code), sim%disk(i)%event_time)
+        call collide(sim, i, code, sim%disk(i)%event_time, self%log)
         call predict(self, sim, i)
         call predict(self, sim, code)
       else
@@ -129,7 +129,7 @@ contains
       call self%search%cross(sim, i, code)
       call predict(self, sim, i)
     else
-      call collide_wall(sim, i, code, sim%disk(i)%event_time)
+      call collide(sim, i, code, sim%disk(i)%event_time, self%log)
       call predict(self, sim, i)
     end if
     if (self%search%everyone) then

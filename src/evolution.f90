@@ -2,6 +2,7 @@
 module evolution
   use kinds, only: int64, never, real64
   use errors, only: error_t
+  use event_log, only: event_log_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -18,6 +19,7 @@ module evolution
 
   type, abstract :: evolution_t
     logical :: idle = .false.     !! nothing will ever happen again
+    type(event_log_t) :: log      !! collisions to be written; the caller empties it
   contains
     procedure(start_evolution), deferred :: start
     procedure(advance_evolution), deferred :: advance
@@ -31,7 +33,7 @@ module evolution
       type(simulation_t), intent(inout) :: sim
     end subroutine start_evolution
 
-    !> Moves on until a limit is met. Where it pauses leaves no trace in the trajectory.
+    !> Moves on until a limit is met or the log is full. Where it pauses leaves no trace in the trajectory.
     subroutine advance_evolution(self, sim, limits, error)
       import :: error_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
