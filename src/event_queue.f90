@@ -62,7 +62,7 @@ contains
     self%n_far = 0
     call self%heap%initialise(n)
     tag%bucket = nowhere
-    self%width = window_width(self, disk, now)
+    self%width = max(window_width(self, disk, now), 1.0e-9_real64*now)   ! numbers of windows fit int32
     self%per_time = 1/self%width
     self%calendar = calendar .and. self%width < never
     self%n_taken = 0
@@ -78,7 +78,7 @@ contains
       if (.not. allocated(self%bucket)) allocate (self%bucket(0:length - 1), self%far(n))
       self%bucket%n = 0
       self%length = length
-      self%window = int(min(now*self%per_time, 1.0e9_real64), int32)
+      self%window = int(now*self%per_time, int32)
       self%window_end = self%width*(self%window + 1)
       self%half_turn = self%window + length/2
     else
@@ -112,12 +112,12 @@ contains
         swap = wait(k); wait(k) = wait(k - 1); wait(k - 1) = swap
       end do
     end do
-    if (n_waits > 0) width = events_per_window*max(wait((n_waits + 1)/2), tiny(width)/epsilon(width)) &
+    if (n_waits > 0) width = events_per_window*max(wait((n_waits + 1)/2), 1/never) &
       /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
   end function window_width
 
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
-  subroutine schedule(self, disk, tag, i)
+  recursive subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
@@ -158,7 +158,7 @@ contains
   end subroutine insert_near
 
   !> Into a bucket, or the far list. A full bucket spills into an earlier one: opened too soon does no harm.
-  subroutine insert_far(self, disk, tag, i)
+  recursive subroutine insert_far(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
@@ -189,17 +189,22 @@ contains
   end subroutine insert_far
 
   !> Drops void entries of the far list and files those that have come near.
-  subroutine sweep_far_list(self, disk, tag)
+  recursive subroutine sweep_far_list(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32) :: k, i, n
-    n = self%n_far
-    self%n_far = 0
-    do k = 1, n                                    ! refiling appends at most where it has read
+    n = 0
+    do k = 1, self%n_far                           ! a disk that came and went may be entered twice
       i = self%far(k)
       if (tag(i)%bucket /= in_far_list) cycle
       tag(i)%bucket = nowhere
+      n = n + 1
+      self%far(n) = i
+    end do
+    self%n_far = 0
+    do k = 1, n                                    ! refiling appends at most where it has read
+      i = self%far(k)
       call schedule(self, disk, tag, i)
     end do
   end subroutine sweep_far_list
