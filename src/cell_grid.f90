@@ -271,7 +271,7 @@ contains
     real(real64) :: to_face, to_side, sense, inset, speed
     integer(int32) :: up
     up = merge(1, 0, disk%v(axis) > 0)
-    sense = sign(1.0_real64, disk%v(axis))
+    sense = 2*up - 1
     inset = self%walled(axis)*disk%radius
     to_face = sense*((self%side(0, axis) + self%width(axis)*(cell(axis) - 1 + up)) - disk%x(axis))
     to_side = sense*((self%side(up, axis) - sense*inset) - disk%x(axis))
@@ -280,7 +280,7 @@ contains
     to_face = merge(to_face, 0.0_real64, to_face > 0)
     speed = abs(disk%v(axis))
     t = disk%clock + to_face/merge(speed, slowest, speed > slowest)
-    t = merge(t, never, t < never)
+    t = merge(t, never, speed > slowest)
   end subroutine next_face_straight
 
   !> The same on a parabola: each of the two faces can be the one, and the root before `now`, where the disk
