@@ -9,6 +9,7 @@
 #
 # Modules and their order are derived from src/*.f90: file name = module name.
 
+MAKEFLAGS += --no-print-directory
 comma := ,
 BUILD ?= build$(if $(DEBUG),/debug)
 ARCH ?= native
@@ -23,7 +24,7 @@ FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argum
 H5FC ?= h5fc
 hdf5 := $(shell $(H5FC) -show 2>/dev/null)
 ifeq ($(origin FC),default)
-FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): HDF5 for Fortran is missing. `make set-up` installs it on Debian and Ubuntu))
+FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): gfortran or HDF5 for Fortran is missing; `make set-up` installs them on Debian and Ubuntu))
 endif
 hdf5_flags := $(filter -I%,$(hdf5))
 hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
@@ -62,7 +63,7 @@ $(BUILD)/flags: FORCE | $(BUILD)
 	@echo '$(FC) $(flags)' | { $(keep); }
 
 commit = $(shell git describe --always --abbrev=12 --exclude='*' 2>/dev/null || echo unknown)
-changed = $(shell git diff --quiet HEAD -- src Makefile 2>/dev/null || echo +changes)
+changed = $(if $(shell git status --porcelain -- src Makefile 2>/dev/null),+changes)
 $(BUILD)/build_info.f90: FORCE | $(BUILD)
 	@{ echo '!> Where this program comes from. Written by the Makefile.'; \
 	  echo 'module build_info'; \
@@ -78,11 +79,11 @@ $(BUILD)/build_info.f90: FORCE | $(BUILD)
 # Who uses whom: `x.o: y.o` for every `use y` in src/x.f90 or tests/x.pf.
 suites := tests
 tests := $(wildcard $(suites)/test_*.pf)
-$(BUILD)/deps.mk: $(sources) $(tests) Makefile | $(BUILD)
+$(BUILD)/deps.mk: FORCE | $(BUILD)
 	@awk -v build='$(BUILD)' -v known='$(modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
 	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
 	  tolower($$1) == "use" { sub(/,.*/, "", $$2); if ($$2 in own && $$2 != me) print build "/" me ".o: " build "/" $$2 ".o" }' \
-	  $(sources) $(tests) | sort -u > $@
+	  $(sources) $(tests) /dev/null | sort -u | { $(keep); }
 
 $(BUILD):
 	@mkdir -p $@
@@ -94,7 +95,7 @@ endif
 # --- Unit tests: the same .pf files under pFUnit or the substitute, always with all checks on -----------------
 
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
-unit_make = $(sub) DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests) unit-tests
+unit_build := DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests)
 
 ifneq ($(PFUNIT_DIR),)
 include $(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk) $(PFUNIT_DIR)/PFUNIT.mk)
@@ -135,11 +136,11 @@ $(BUILD)/tests.inc: FORCE | $(BUILD)
 # --- What people call ----------------------------------------------------------------------------------------
 
 venv := .venv/bin/python
-sub = $(MAKE) --no-print-directory
+jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
 demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/demo/
 	@.ci/set-up demo
-	@$(sub) all
+	@$(MAKE) $(jobs) all
 	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
 	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
@@ -150,19 +151,19 @@ demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/dem
 
 figures:  ## reproduces the figures of every system into runs/figures/ (long)
 	@.ci/set-up demo
-	@$(sub) all
+	@$(MAKE) $(jobs) all
 	@runs/figures.sh
 
 test:  ## sets up, then unit tests and whole runs (two minutes)
 	@.ci/set-up demo test
-	@$(unit_make)
-	@$(sub) all
-	@RICOCHET='$(abspath $(BUILD))/ricochet' $(venv) -m pytest -q tests
+	@$(MAKE) $(jobs) $(unit_build) unit-tests
+	@$(MAKE) $(jobs) all
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
 
 check:  ## validates the physics and provokes faults (minutes)
 	@.ci/set-up demo test
-	@$(sub) all
-	@RICOCHET='$(abspath $(BUILD))/ricochet' $(venv) -m pytest -q -m check tests
+	@$(MAKE) $(jobs) all
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 
 bench: all  ## measures collisions per second
 	@runs/bench.sh
@@ -172,11 +173,11 @@ bench-check: all  ## the same against the floor that the project promises
 
 lint:  ## compiler warnings, fortitude, fprettify, ruff, shellcheck, and the rules of the design
 	@.ci/set-up lint
-	@$(sub) --keep-going lint-compiler lint-fortran lint-python lint-shell lint-design
+	@$(MAKE) $(jobs) --keep-going --output-sync lint-compiler lint-fortran lint-python lint-shell lint-design
 
 .PHONY: lint-compiler lint-fortran lint-python lint-shell lint-design
 lint-compiler:
-	@$(sub) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
+	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src
 	@! $(venv) -m fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
@@ -189,8 +190,8 @@ lint-design:
 
 coverage:  ## which lines of src/ the tests reach
 	@.ci/set-up demo test coverage
-	@$(sub) BUILD=$(BUILD)/coverage OPT='-O0 --coverage' unit-tests all
-	@RICOCHET='$(abspath $(BUILD))/coverage/ricochet' $(venv) -m pytest -q tests
+	@$(MAKE) $(jobs) BUILD=$(BUILD)/coverage OPT='-O0 --coverage' unit-tests all
+	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
 	@$(venv) -m gcovr --root . --filter src/ $(BUILD)/coverage
 
 docs:  ## pages of the source, with FORD, into build/docs
