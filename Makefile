@@ -76,14 +76,23 @@ $(BUILD)/build_info.f90: FORCE | $(BUILD)
 	  echo "    // ''"; \
 	  echo 'end module build_info'; } | { $(keep); }
 
-# Who uses whom: `x.o: y.o` for every `use y` in src/x.f90 or tests/x.pf.
+PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
+
+# What tests share, among it the substitute for pFUnit, which pFUnit itself replaces.
 suites := tests
 tests := $(wildcard $(suites)/test_*.pf)
+shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
+test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
+shared_objects := $(shared:tests/support/%.f90=$(BUILD)/%.o)
+
+# Who uses whom: `x.o: y.o` for every `use y` in x.f90 or x.pf.
+aids := $(filter-out %/funit.f90,$(wildcard tests/support/*.f90))
+aid_modules := $(notdir $(aids:.f90=))
 $(BUILD)/deps.mk: FORCE | $(BUILD)
-	@awk -v build='$(BUILD)' -v known='$(modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
+	@awk -v build='$(BUILD)' -v known='$(modules) $(aid_modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
 	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
 	  tolower($$1) == "use" { sub(/,.*/, "", $$2); if ($$2 in own && $$2 != me) print build "/" me ".o: " build "/" $$2 ".o" }' \
-	  $(sources) $(tests) /dev/null | sort -u | { $(keep); }
+	  $(sources) $(tests) $(aids) /dev/null | sort -u | { $(keep); }
 
 $(BUILD):
 	@mkdir -p $@
@@ -94,7 +103,6 @@ endif
 
 # --- Unit tests: the same .pf files under pFUnit or the substitute, always with all checks on -----------------
 
-PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
 unit_build := DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests)
 
 ifneq ($(PFUNIT_DIR),)
@@ -109,25 +117,23 @@ runner := the substitute for pFUnit
 translate = $(PYTHON) tests/support/translate_pf.py $< $@
 driver := tests/support/driver.F90
 test_flags = -cpp -I$(BUILD)
-funit := $(BUILD)/funit.o
 endif
-test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
 
 unit-tests: $(BUILD)/unit_tests
 	@tests/support/run_unit_tests.sh "$(runner)" $< $(tests)
 
-$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(objects) $(funit)
+$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(aid_modules:%=$(BUILD)/%.o) $(objects) $(funit)
 	@echo "link    $@"
 	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(hdf5_libs)
 
 $(BUILD)/test_%.F90: $(suites)/test_%.pf tests/support/translate_pf.py
 	$(Q)$(translate)
 
-$(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags $(funit)
+$(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags
 	@echo "compile $(<:$(BUILD)/%.F90=$(suites)/%.pf)"
 	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
-$(BUILD)/funit.o: tests/support/funit.f90 $(BUILD)/flags
+$(funit) $(aid_modules:%=$(BUILD)/%.o): $(BUILD)/%.o: tests/support/%.f90 $(BUILD)/flags
 	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
 
 $(BUILD)/tests.inc: FORCE | $(BUILD)
