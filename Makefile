@@ -86,13 +86,11 @@ test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
 shared_objects := $(shared:tests/support/%.f90=$(BUILD)/%.o)
 
 # Who uses whom: `x.o: y.o` for every `use y` in x.f90 or x.pf.
-aids := $(filter-out %/funit.f90,$(wildcard tests/support/*.f90))
-aid_modules := $(notdir $(aids:.f90=))
 $(BUILD)/deps.mk: FORCE | $(BUILD)
-	@awk -v build='$(BUILD)' -v known='$(modules) $(aid_modules)' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
+	@awk -v build='$(BUILD)' -v known='$(modules) $(basename $(notdir $(shared)))' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
 	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
 	  tolower($$1) == "use" { sub(/,.*/, "", $$2); if ($$2 in own && $$2 != me) print build "/" me ".o: " build "/" $$2 ".o" }' \
-	  $(sources) $(tests) $(aids) /dev/null | sort -u | { $(keep); }
+	  $(sources) $(tests) $(shared) /dev/null | sort -u | { $(keep); }
 
 $(BUILD):
 	@mkdir -p $@
@@ -122,7 +120,7 @@ endif
 unit-tests: $(BUILD)/unit_tests
 	@tests/support/run_unit_tests.sh "$(runner)" $< $(tests)
 
-$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(aid_modules:%=$(BUILD)/%.o) $(objects) $(funit)
+$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(shared_objects) $(objects)
 	@echo "link    $@"
 	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(hdf5_libs)
 
@@ -133,8 +131,9 @@ $(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags
 	@echo "compile $(<:$(BUILD)/%.F90=$(suites)/%.pf)"
 	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
-$(funit) $(aid_modules:%=$(BUILD)/%.o): $(BUILD)/%.o: tests/support/%.f90 $(BUILD)/flags
-	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
+$(shared_objects): $(BUILD)/%.o: tests/support/%.f90 $(BUILD)/flags
+	@echo "compile $<"
+	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
 $(BUILD)/tests.inc: FORCE | $(BUILD)
 	@printf 'ADD_TEST_SUITE(%s_suite)\n' $(basename $(notdir $(tests))) | { $(keep); }
