@@ -21,13 +21,12 @@ contains
   !> Fills the settings. Values that follow from others are also put back into the groups, so that
   !> these hold everything as it is used.
   subroutine resolve_settings(groups, settings, problems)
-    type(parameter_group_t), intent(inout) :: groups(:)
+    type(parameter_group_t), intent(inout) :: groups(:)   !! those of one name side by side
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    integer, allocatable :: obstacles(:), species(:)
-    integer :: k
-    obstacles = pack([(k, k=1, size(groups))], groups%name == 'obstacle')
-    species = pack([(k, k=1, size(groups))], groups%name == 'species')
+    integer :: k, o(2), s(2)
+    o = range_of(groups, 'obstacle')
+    s = range_of(groups, 'species')
     do k = 1, size(groups)
       select case (groups(k)%name)
       case ('run')
@@ -38,17 +37,24 @@ contains
         call take_stop(groups(k), settings%stop, problems)
       case ('output')
         call take_output(groups(k), settings%output)
+        call check_cadences(groups(k), settings, problems)
       end select
     end do
-    call take_obstacles(groups(obstacles), settings%obstacles, problems)
-    call take_species(groups, species, settings%box, settings%species, problems)
-    do k = 1, size(groups)
-      if (groups(k)%name == 'contact') &
-        call take_contact(groups(k), settings%species, settings%contact, problems)
-      if (groups(k)%name == 'output') call check_cadences(groups(k), settings, problems)
-    end do
-    call check_geometry(groups(obstacles), groups(species), settings, problems)
+    call take_obstacles(groups(o(1):o(2)), settings%obstacles, problems)
+    call take_species(groups(s(1):s(2)), settings%box, settings%species, problems)
+    k = findloc(groups%name, 'contact', dim=1)
+    call take_contact(groups(k), settings%species, settings%contact, problems)
+    call check_geometry(groups(o(1):o(2)), groups(s(1):s(2)), settings, problems)
   end subroutine resolve_settings
+
+  !> First and last of the groups of one name; the last before the first if there are none.
+  pure function range_of(groups, name) result(range)
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=*), intent(in) :: name
+    integer :: range(2)
+    range(1) = max(1, findloc(groups%name, name, dim=1))
+    range(2) = range(1) + count(groups%name == name) - 1
+  end function range_of
 
   subroutine take_run(group, run, problems)
     type(parameter_group_t), intent(in) :: group

@@ -22,25 +22,24 @@ module input_species
 contains
 
   !> Fills the settings of all species; derived values go back into the groups.
-  subroutine take_species(groups, which, box, species, problems)
-    type(parameter_group_t), intent(inout) :: groups(:)
-    integer, intent(in) :: which(:)                 !! the groups that are species
+  subroutine take_species(groups, box, species, problems)
+    type(parameter_group_t), intent(inout) :: groups(:)   !! the species
     type(box_settings_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     integer :: k
-    allocate (species(size(which)))
-    if (size(which) == 0) call problems%add(0, 'species', 'there is none; give at least one')
-    do k = 1, size(which)
-      call check_name(groups(which), k, problems)
-      call take_placement(groups(which(k)), species(k), box, problems)
-      call take_velocities(groups(which(k)), species(k), problems)
+    allocate (species(size(groups)))
+    if (size(groups) == 0) call problems%add(0, 'species', 'there is none; give at least one')
+    do k = 1, size(groups)
+      call check_name(groups, k, problems)
+      call take_placement(groups(k), species(k), box, problems)
+      call take_velocities(groups(k), species(k), problems)
     end do
-    call resolve_sizes(groups(which), species, problems)
+    call resolve_sizes(groups, species, problems)
     if (sum(int(species%count, int64)) > most_disks) call problems%add(0, 'species.count', &
       written(sum(int(species%count, int64)))//' disks; allowed: up to '//written(most_disks))
-    do k = 1, size(which)
-      associate (group => groups(which(k)), s => species(k))
+    do k = 1, size(groups)
+      associate (group => groups(k), s => species(k))
         call group%set_integer('count', int(s%count, int64))
         call group%set_reals('mass', [s%mass])
         call group%set_reals('radius', [s%radius])

@@ -58,7 +58,7 @@ contains
       call override(reading, overrides(k)%text, -k)
       call name_instances(reading)
     end do
-    groups = reading%groups(:reading%count)
+    groups = in_order(reading)
     call resolve_settings(groups, settings, reading%problems)
     if (reading%problems%count > 0) then
       call fail(error, exit_usage, reading%problems%report(path, overrides))
@@ -139,6 +139,22 @@ contains
       if (.not. is_repeated(group_names(k))) call add_group(reading, group_names(k), 0)
     end do
   end subroutine open_reading
+
+  !> The groups in the order of the table, those of one name side by side.
+  pure function in_order(reading) result(groups)
+    type(reading_t), intent(in) :: reading
+    type(parameter_group_t), allocatable :: groups(:)
+    integer :: j, k, n
+    allocate (groups(reading%count))
+    n = 0
+    do j = 1, size(group_names)
+      do k = 1, reading%count
+        if (reading%groups(k)%name /= group_names(j)) cycle
+        n = n + 1
+        groups(n) = reading%groups(k)
+      end do
+    end do
+  end function in_order
 
   !> Adds a group with the defaults of the table, which are written there as in a file.
   subroutine add_group(reading, name, line)

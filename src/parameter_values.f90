@@ -3,9 +3,10 @@
 module parameter_values
   use kinds, only: int64, real64
   use parameters, only: name_length, row_of
+  use texts, only: written, written_exactly
   implicit none
   private
-  public :: parameter_value_t, parameter_group_t, text_length
+  public :: parameter_value_t, parameter_group_t, text_length, values_text
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
 
@@ -160,5 +161,58 @@ contains
       if (allocated(slot%texts)) deallocate (slot%texts)
     end associate
   end subroutine unset
+
+  !> Every value as it is used, one variable to a line: `species.bed.radius = 0.005`.
+  pure function values_text(groups) result(text)
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: prefix, values
+    integer :: g, v
+    text = ''
+    do g = 1, size(groups)
+      prefix = trim(groups(g)%name)//'.'
+      if (groups(g)%instance /= '') prefix = prefix//trim(groups(g)%instance)//'.'
+      do v = 1, size(groups(g)%values)
+        values = value_text(groups(g)%values(v))
+        if (values /= '') text = text//prefix//trim(groups(g)%values(v)%name)//' = '//values &
+          //new_line('a')
+      end do
+    end do
+  end function values_text
+
+  !> The values of a variable as one would write them in a file; empty if it has none.
+  pure function value_text(value) result(text)
+    type(parameter_value_t), intent(in) :: value
+    character(len=:), allocatable :: text
+    integer, parameter :: most = 100               !! longer lists are cut
+    integer :: k, n
+    n = 0
+    text = ''
+    if (allocated(value%integers)) n = size(value%integers)
+    if (allocated(value%reals)) n = size(value%reals)
+    if (allocated(value%logicals)) n = size(value%logicals)
+    if (allocated(value%texts)) n = size(value%texts)
+    do k = 1, min(n, most)
+      if (k > 1) text = text//', '
+      if (allocated(value%integers)) text = text//written(value%integers(k))
+      if (allocated(value%reals)) text = text//written_exactly(value%reals(k))
+      if (allocated(value%logicals)) text = text//trim(merge('.true. ', '.false.', value%logicals(k)))
+      if (allocated(value%texts)) text = text//quoted(trim(value%texts(k)))
+    end do
+    if (n > most) text = text//', ... ! '//written(n)//' values'
+  end function value_text
+
+  !> In quotes, with quotes inside doubled.
+  pure function quoted(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+    integer :: i
+    quoted = ''''
+    do i = 1, len(text)
+      quoted = quoted//text(i:i)
+      if (text(i:i) == '''') quoted = quoted//''''
+    end do
+    quoted = quoted//''''
+  end function quoted
 
 end module parameter_values

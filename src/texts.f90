@@ -3,7 +3,7 @@ module texts
   use kinds, only: int64, real64
   implicit none
   private
-  public :: text_t, written, lower_case, shown, joined, nearest_word, suggestion
+  public :: text_t, written, written_exactly, lower_case, shown, joined, nearest_word, suggestion
 
   !> A text of its own length, as an element of a list.
   type :: text_t
@@ -49,6 +49,19 @@ contains
       text = written_real(number/10.0_real64**exponent)//'e'//written_integer(exponent)
     end if
   end function written_real
+
+  !> With as many digits as it takes to read the same number back.
+  pure function written_exactly(number) result(text)
+    real(real64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=24) :: buffer
+    real(real64) :: again
+    text = written_real(number)
+    read (text, *) again
+    if (again == number) return
+    write (buffer, '(es24.16e3)') number
+    text = trim(adjustl(buffer))
+  end function written_exactly
 
   !> ASCII letters in lower case; every other byte as it is.
   pure function lower_case(text) result(lower)
