@@ -44,8 +44,8 @@ contains
 
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` to bounce off and a
-  !> `round` container; `mixture` of two species; a `giant` among the small; `inelastic`; `smooth` walls;
-  !> `contact` time; `few`, `dilute` or `dense`.
+  !> `round` container; `mixture` of two species; a `giant` among the small; a `bed` at rest that the first
+  !> disk hits; `inelastic`; `smooth` walls; `contact` time; `few`, `dilute` or `dense`.
   function system(words, seed) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
@@ -78,6 +78,7 @@ contains
     sim%law%smooth_walls = has("smooth")
     if (has("contact")) sim%law%contact_time = 0.01_dp
     call fill_lattice(sim, spacing, has("giant"), stream)
+    if (has("bed")) call lay_to_rest(sim%disk(2:))
     sim%start_energy = sim%kinetic_energy()
 
   contains
@@ -115,6 +116,7 @@ contains
     allocate (sim%disk(0), sim%tag(0))
     if (giant) then
       disk%x = [0.1_dp, 1.7_dp]
+      disk%v = [0.7_dp, -1.5_dp]
       disk%radius = sim%species(3)%radius
       sim%disk = [disk]
       tag%id = 1
@@ -138,6 +140,12 @@ contains
       end do
     end do
   end subroutine fill_lattice
+
+  pure subroutine lay_to_rest(disk)
+    type(disk_t), intent(inout) :: disk(:)
+    disk%v(1) = 0
+    disk%v(2) = 0
+  end subroutine lay_to_rest
 
   !> Whether a circle at a site keeps off the obstacles and the giant, the disk of species 3.
   pure function clear(sim, site, radius) result(yes)
