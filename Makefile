@@ -184,7 +184,7 @@ lint:  ## compiler warnings, fortitude, fprettify, ruff, shellcheck, and the rul
 lint-compiler:
 	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
 lint-fortran:
-	@$(venv) -m fortitude --quiet check --output-format concise src
+	@$(venv) -m fortitude --quiet check --output-format concise src tests/support
 	@! $(venv) -m fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests

@@ -1,4 +1,4 @@
-"""The tools behind the tests: the substitute for pFUnit, and the script that judges a unit run."""
+"""The tools behind the tests: the substitute for pFUnit, the judge of its runs, the style rules."""
 
 import os
 import re
@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SUPPORT = ROOT / "tests" / "support"
 sys.path.insert(0, str(SUPPORT))
 
+from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
 
 RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
@@ -28,8 +29,9 @@ end module test_it
 
 @pytest.mark.parametrize("pfunit", RUNNERS, ids=["substitute", "pFUnit"][: len(RUNNERS)])
 def test_every_verdict_is_the_name_of_its_test(tmp_path, pfunit):
+    shared = "" if pfunit else "tests/support/funit.f90"
     command = ["make", "unit-tests", "sources=", "suites=tests/support/verdicts", "DEBUG=1",
-               f"BUILD={tmp_path}", f"PFUNIT_DIR={pfunit}"]  # fmt: skip
+               f"shared={shared}", f"BUILD={tmp_path}", f"PFUNIT_DIR={pfunit}"]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     suite = (SUPPORT / "verdicts" / "test_verdicts.pf").read_text()
@@ -127,3 +129,57 @@ def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict)
     suites.write_text("  @test\n  !@test\n  @Test\n  ! about @test\n")
     command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suites]
     assert subprocess.run(command, capture_output=True).returncode == verdict
+
+
+MODULE = """!> A module. It says: use nothing, private, get_it.
+module upper
+  use lower, only: value
+  use, intrinsic :: iso_fortran_env, only: real64
+  implicit none
+  private
+contains
+  pure real(real64) function twice(x)
+    twice = 2*x
+  end function twice
+end module upper
+"""
+
+
+def style_problems(root: Path, text: str, table: str = "| 0 | `lower` |\n| 1 | `upper` |\n"):
+    subprocess.run(["git", "init", "-q", root], check=True)
+    (root / "src").mkdir()
+    (root / "src" / "README.md").write_text(table)
+    (root / "src" / "lower.f90").write_text("module lower\n  private\nend module lower\n")
+    (root / "src" / "upper.f90").write_text(text)
+    return [str(problem) for problem in problems_of(root)]
+
+
+def test_a_module_in_order_has_no_style_problem(tmp_path):
+    assert style_problems(tmp_path, MODULE) == []
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "line", "words"),
+    [
+        ("lower, only: value", "lower", 3, "without only"),
+        ("lower, only: value", "upper, only: value", 3, "layer 1 uses upper of layer 1"),
+        ("  private\n", "  public\n", 1, "no private"),
+        ("module upper", "module uppermost", 1, "instead of upper"),
+        ("    twice = 2*x\n", "    twice = 2*x\n" * 59, 8, "longer than 60 lines"),
+        ("function twice", "function get_twice", 8, "says nothing"),
+        ("contains\n", "#include 'x'\ncontains\n", 7, "pre-processor"),
+        ("contains\n", "contains\n" + "! a line\n" * 490, 501, "more than 500 lines"),
+        ("It says:", "It says: '/ho" "me/me'", 1, "path of one machine"),
+    ],
+)
+def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, words):
+    assert before in MODULE
+    (problem,) = style_problems(tmp_path, MODULE.replace(before, after, 1))
+    assert problem.startswith(f"src/upper.f90:{line}: ")
+    assert words in problem
+
+
+def test_the_table_of_layers_and_the_modules_belong_together(tmp_path):
+    problems = style_problems(tmp_path, MODULE, "| 0 | `lower` |\n| 1 | `lost` |\n")
+    assert any("upper is missing in the table" in problem for problem in problems)
+    assert any("there is no src/lost.f90" in problem for problem in problems)
