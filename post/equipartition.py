@@ -71,9 +71,9 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
 
 
 def start_width(run: Run) -> float:
-    """v0: the largest velocity component at the start, to the digits of the scan."""
-    asked = np.ravel(run.parameter("species", "speed", 0.0))
-    return float(np.max(asked)) or float(f"{np.abs(run.velocity[0]).max():.1g}")
+    """v0: the largest `speed` that the input asks for."""
+    species = run.parameters.get("species", {})
+    return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
 
 def draw(groups: list, results: list[Approach], until: float) -> plt.Figure:

@@ -164,7 +164,9 @@ class Run:
     @property
     def restitution(self) -> float:
         """Restitution of disk on disk; NaN if it differs between pairs of species."""
-        values = np.unique(np.asarray(self.parameter("contact", "restitution", 1.0), dtype=float))
+        one = self.parameter("contact", "restitution", 1.0)
+        pairs = self.parameter("contact", "pair_restitution", one)
+        values = np.unique(np.asarray(pairs, dtype=float))
         return float(values[0]) if len(values) == 1 else np.nan
 
     @property

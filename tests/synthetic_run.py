@@ -87,7 +87,7 @@ def write_observables(file, time, observables):
 
 
 def write_parameters(file, parameters, names, species, obstacles):
-    """`parameters` as group -> variable -> value."""
+    """`parameters` as group -> variable -> value; a species is the group species/NAME."""
     root = file.create_group("parameters")
     root["input"] = text("&run\n/\n")
     for group, variables in (parameters or {}).items():

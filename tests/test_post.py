@@ -387,7 +387,8 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
             "run": {"seed": seed, "dynamics": dynamics, "dt": 0.004},
             "box": {"gravity": [0.0, -9.81]},
             "contact": {"restitution": 1.0},
-            "species": {"speed": [0.5, 0.5]},
+            "species/A": {"speed": 0.5},
+            "species/B": {"speed": 0.25},
         },
     )
 
@@ -402,6 +403,11 @@ def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
         np.testing.assert_allclose(ratio, 1, atol=0.05)
     np.testing.assert_allclose(result["height_slope_law"], [0.025 * 9.81 / 0.7, 0.05 * 9.81 / 0.7])
     np.testing.assert_allclose(result["K"], 0.7, rtol=0.03)
+
+
+def test_runs_are_put_together_by_the_largest_start_speed(tmp_path, rng):
+    run = read_run(falling(tmp_path / "run.h5", rng, frames=2))
+    assert equipartition.start_width(run) == 0.5
 
 
 def test_total_change_of_the_energy(tmp_path, rng):

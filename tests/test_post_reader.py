@@ -119,8 +119,9 @@ def test_single_precision_is_computed_in_double(tmp_path):
 
 def test_restitution_per_pair_of_species(tmp_path):
     x = np.zeros((1, 1, 2))
-    for matrix, expected in (([[0.5, 0.5], [0.5, 0.5]], 0.5), ([[0.5, 0.9], [0.9, 0.5]], np.nan)):
-        path = write_run(tmp_path / "run.h5", x, x, parameters={"contact": {"restitution": matrix}})
+    for pairs, expected in (([0.5, 0.5, 0.5, 0.5], 0.5), ([0.5, 0.9, 0.9, 0.5], np.nan)):
+        contact = {"restitution": 0.7, "pair_restitution": pairs}
+        path = write_run(tmp_path / "run.h5", x, x, parameters={"contact": contact})
         np.testing.assert_equal(read_run(path).restitution, expected)
 
 
