@@ -184,7 +184,7 @@ lint:  ## compiler warnings, fortitude, fprettify, ruff, shellcheck, and the rul
 lint-compiler:
 	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
 lint-fortran:
-	@$(venv) -m fortitude --quiet check --output-format concise src tests/support
+	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(venv) -m fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests
@@ -201,7 +201,9 @@ coverage:  ## which lines of src/ the tests reach
 
 docs:  ## pages of the source, with FORD, into build/docs
 	@.ci/set-up docs
-	@$(venv) -m ford --quiet --src_dir src --output_dir $(BUILD)/docs README.md
+	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
+	  'project = "Ricochet"; display = ["public", "private"]; print_creation_date = false' src/README.md
+	@echo 'open $(BUILD)/docs/index.html'
 
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 	@.ci/set-up demo test
