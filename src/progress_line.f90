@@ -1,5 +1,5 @@
 !> Tells how far a run is: a line that renews itself on a terminal, else one now and then.
-module progress
+module progress_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int64, never, real64
   use simulation_state, only: simulation_t
@@ -7,12 +7,12 @@ module progress
   use system, only: is_terminal, seconds
   implicit none
   private
-  public :: progress_t
+  public :: progress_line_t
 
   real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
   integer, parameter :: window = 20                !! reports over which rates are taken
 
-  type :: progress_t
+  type :: progress_line_t
     private
     logical :: quiet = .false.
     logical :: terminal = .false.
@@ -26,12 +26,12 @@ module progress
     procedure :: start
     procedure :: report
     procedure :: clear
-  end type progress_t
+  end type progress_line_t
 
 contains
 
   subroutine start(self, sim, stop_rule, quiet)
-    class(progress_t), intent(inout) :: self
+    class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
     logical, intent(in) :: quiet
@@ -45,7 +45,7 @@ contains
 
   !> Writes a line if it is time.
   subroutine report(self, sim, stop_rule)
-    class(progress_t), intent(inout) :: self
+    class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
     character(len=160) :: line
@@ -74,14 +74,14 @@ contains
 
   !> Wipes the line from the terminal, so that what follows stands alone.
   subroutine clear(self)
-    class(progress_t), intent(in) :: self
+    class(progress_line_t), intent(in) :: self
     if (self%terminal .and. self%n > 1) write (error_unit, '(a)', advance='no') achar(13)//achar(27)//'[K'
     flush (error_unit)
   end subroutine clear
 
   !> Keeps the present moment for rates over the last reports.
   subroutine remember(self, sim, stop_rule)
-    class(progress_t), intent(inout) :: self
+    class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
     integer :: k
@@ -124,4 +124,4 @@ contains
     text = trim(line)
   end function clock_text
 
-end module progress
+end module progress_line

@@ -1,0 +1,35 @@
+!> Ricochet: event-driven simulation of hard disks.
+program main
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use command_line, only: answer, command_t, read_command_line
+  use errors, only: error_t, exit_finished
+  use run, only: perform_run
+  use system, only: leave
+  implicit none
+  call serve()
+
+contains
+
+  !> Answers a question or performs a run. All variables live here, not in the main program, so that they
+  !> are freed.
+  subroutine serve()
+    type(command_t) :: command
+    type(error_t), allocatable :: error
+    integer :: code
+    code = exit_finished
+    call read_command_line(command, error)
+    if (.not. allocated(error)) then
+      if (command%question /= '') then
+        call answer(command, error)
+      else
+        call perform_run(command, error)
+      end if
+    end if
+    if (allocated(error)) then
+      if (error%message /= '') write (error_unit, '(a)') error%message
+      code = error%code
+    end if
+    call leave(code)
+  end subroutine serve
+
+end program main
