@@ -62,7 +62,7 @@ contains
     self%n_far = 0
     call self%heap%initialise(n)
     tag%bucket = nowhere
-    self%width = max(window_width(self, disk, now), 1.0e-9_real64*now)   ! numbers of windows fit int32
+    self%width = max(window_width(self, disk, now), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
     self%per_time = 1/self%width
     self%calendar = calendar .and. self%width < never
     self%n_taken = 0
@@ -112,7 +112,7 @@ contains
         swap = wait(k); wait(k) = wait(k - 1); wait(k - 1) = swap
       end do
     end do
-    if (n_waits > 0) width = events_per_window*max(wait((n_waits + 1)/2), 1/never) &
+    if (n_waits > 0) width = events_per_window*wait((n_waits + 1)/2) &
       /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
   end function window_width
 
