@@ -12,9 +12,17 @@ module test_systems
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: few_disks, system, prepare, run, difference
+  public :: few_disks, system, systems, prepare, run, difference
   public :: total_energy, momentum, angular_momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, disk_named
+
+  !> What has to hold in every system holds in these, each feature with and without most others.
+  character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
+    "walls dense mixture", "walls few", "walls giant bed inelastic", "walls mixture smooth inelastic", &
+    "walls gravity mixture", "walls gravity pegs inelastic contact", "walls round mixture", &
+    "walls round pegs gravity smooth", "walls pegs inelastic", "channel", "channel gravity pegs mixture", &
+    "channel inelastic contact", "periodic", "periodic few", "periodic dense mixture", &
+    "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture"]
 
 contains
 
