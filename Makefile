@@ -202,7 +202,7 @@ coverage:  ## which lines of src/ the tests reach
 docs:  ## pages of the source, with FORD, into build/docs
 	@.ci/set-up docs
 	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
-	  'project = "Ricochet"; display = ["public", "private"]; print_creation_date = false' src/README.md
+	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
 	@echo 'open $(BUILD)/docs/index.html'
 
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
