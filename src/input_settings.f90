@@ -42,8 +42,10 @@ contains
     end do
     call take_obstacles(groups(o(1):o(2)), settings%obstacles, problems)
     call take_species(groups(s(1):s(2)), settings%box, settings%species, problems)
-    k = findloc(groups%name, 'contact', dim=1)
-    call take_contact(groups(k), settings%species, settings%contact, problems)
+    do k = 1, size(groups)
+      if (groups(k)%name == 'contact') &
+        call take_contact(groups(k), settings%species, settings%contact, problems)
+    end do
     call check_geometry(groups(o(1):o(2)), groups(s(1):s(2)), settings, problems)
   end subroutine resolve_settings
 
@@ -52,8 +54,12 @@ contains
     type(parameter_group_t), intent(in) :: groups(:)
     character(len=*), intent(in) :: name
     integer :: range(2)
-    range(1) = max(1, findloc(groups%name, name, dim=1))
-    range(2) = range(1) + count(groups%name == name) - 1
+    integer :: k
+    range = [1, count(groups%name == name)]
+    do k = 1, size(groups)
+      if (groups(k)%name == name) exit
+      range = range + 1
+    end do
   end function range_of
 
   subroutine take_run(group, run, problems)

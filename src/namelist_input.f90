@@ -58,7 +58,7 @@ contains
       call override(reading, overrides(k)%text, -k)
       call name_instances(reading)
     end do
-    groups = in_order(reading)
+    call put_in_order(reading, groups)
     call resolve_settings(groups, settings, reading%problems)
     if (reading%problems%count > 0) then
       call fail(error, exit_usage, reading%problems%report(path, overrides))
@@ -116,11 +116,12 @@ contains
     character(len=:), allocatable :: lines
     character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
     character(len=*), parameter :: carriage_return = achar(13)
-    integer :: i, n
+    integer :: i, n, first
     allocate (character(len=len(text) + 1) :: lines)
+    first = 1
+    if (text(:min(3, len(text))) == byte_order_mark) first = 4
     n = 0
-    do i = 1, len(text)
-      if (i <= 3 .and. index(text, byte_order_mark) == 1) cycle
+    do i = first, len(text)
       if (i > 1 .and. text(i:i) == eol) then
         if (text(i - 1:i - 1) == carriage_return) cycle
       end if
@@ -141,9 +142,9 @@ contains
   end subroutine open_reading
 
   !> The groups in the order of the table, those of one name side by side.
-  pure function in_order(reading) result(groups)
+  pure subroutine put_in_order(reading, groups)
     type(reading_t), intent(in) :: reading
-    type(parameter_group_t), allocatable :: groups(:)
+    type(parameter_group_t), allocatable, intent(out) :: groups(:)
     integer :: j, k, n
     allocate (groups(reading%count))
     n = 0
@@ -154,7 +155,7 @@ contains
         groups(n) = reading%groups(k)
       end do
     end do
-  end function in_order
+  end subroutine put_in_order
 
   !> Adds a group with the defaults of the table, which are written there as in a file.
   subroutine add_group(reading, name, line)
