@@ -12,7 +12,7 @@ module test_systems
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: few_disks, system, systems, prepare, run, difference
+  public :: few_disks, system, systems, prepare, evolve, difference
   public :: total_energy, momentum, angular_momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, disk_named
 
@@ -189,7 +189,7 @@ contains
   end subroutine prepare
 
   !> Takes a simulation up, as after a restart, and follows it to a limit.
-  subroutine run(sim, method, time, collisions, events, failure)
+  subroutine evolve(sim, method, time, collisions, events, failure)
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: method                      !! as for `prepare`
     real(dp), intent(in), optional :: time                      !! since the start of the run [time]
@@ -206,7 +206,7 @@ contains
     if (.not. present(failure)) return
     failure = ""
     if (allocated(error)) failure = error%message
-  end subroutine run
+  end subroutine evolve
 
   !> The first difference between two states, to the last bit; '' if there is none. What the search and the
   !> queue note in the disks does not count.
@@ -298,8 +298,7 @@ contains
           dx = dx - merge(sim%box%edges()*anint(dx/sim%box%edges()), 0.0_dp, sim%box%periodic)
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
-        gap = min(gap, minval(pack(x - sim%box%lower - r, .not. sim%box%periodic))/(2*r), &
-          minval(pack(sim%box%upper - r - x, .not. sim%box%periodic))/(2*r))
+        gap = min(gap, minval(merge(never, min(x - sim%box%lower, sim%box%upper - x) - r, sim%box%periodic))/(2*r))
         do m = 1, n_obstacles(sim)
           reach = obstacle_reach(sim%box%obstacle(m), r)
           dx(1) = norm2(x - sim%box%obstacle(m)%centre) - reach
