@@ -217,6 +217,7 @@ contains
       call find_base(groups, k, base(k), problems)
       mass(k) = groups(k)%real_of('mass', 1.0_real64)
       call own_radius(groups(k), species(k), radius(k), problems)
+      if (groups(k)%given('relative_to') .and. base(k) == 0) radius(k) = 0
     end do
     do k = 1, size(species)
       species(k)%mass = 1
