@@ -3,7 +3,8 @@
     python post/animate.py runs/gas.h5 -o gas.mp4              mp4 needs ffmpeg; else write .gif
     python post/animate.py runs/crater.h5 --colour speed --frames 300 --fps 30
 
-Without -o the name is that of the run, ending in .mp4 if ffmpeg is there and in .gif if not.
+A name without an ending gets .mp4 if ffmpeg is there, and .gif if not; without -o it is that of
+the run.
 """
 
 from pathlib import Path
@@ -18,9 +19,11 @@ from snapshot import LABELS, chosen_frames, default_colour, values_of
 
 
 def film_path(asked: Path | None, run: Run) -> Path:
-    """Where to write: as asked, or beside the caller under the name of the run."""
+    """Where to write: as asked, or in the current folder under the name of the run."""
     ffmpeg = animation.FFMpegWriter.isAvailable()
-    path = asked or Path(run.path.name).with_suffix(".mp4" if ffmpeg else ".gif")
+    path = asked or Path(run.path.stem)
+    if not path.suffix:
+        path = path.with_suffix(".mp4" if ffmpeg else ".gif")
     if path.suffix == ".mp4" and not ffmpeg:
         raise RunError(f"{path}: mp4 needs ffmpeg, which is not installed; ask for .gif")
     if path.suffix not in (".mp4", ".gif"):
@@ -54,7 +57,7 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
     writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(fps=fps)
     path.parent.mkdir(parents=True, exist_ok=True)
     with writer.saving(figure, str(path), dpi=100):
-        for frame in tqdm(frames, unit="frame", desc=path.name):
+        for frame in tqdm(frames, unit="frame", desc=path.name, disable=None):
             disks.set_offsets(run.position[frame])
             if colour != "species":
                 disks.set_array(values_of(run, frame, colour))

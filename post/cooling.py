@@ -101,7 +101,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
     axes.legend(ncols=2)
     runs = [run for _, members in groups for run in members]
     figure.suptitle(
-        f"{caption(runs)}, walls: {runs[0].parameter('contact', 'wall_rule', '')}", fontsize=10
+        f"{caption(runs)}, wall rule: {runs[0].parameter('contact', 'wall_rule', '')}", fontsize=10
     )
     return figure
 

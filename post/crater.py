@@ -42,6 +42,7 @@ class Crater(NamedTuple):
     energy_left: float  # over the energy at the start
     time: float
     collisions: int
+    wall_collisions: int
 
 
 def projectile(run: Run) -> int:
@@ -82,6 +83,7 @@ def crater(run: Run) -> Crater:
         energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
         time=float(run.time[-1]),
         collisions=int(run.observable("collisions").value[-1]),
+        wall_collisions=int(run.observable("wall_collisions").value[-1].sum()),
     )
 
 

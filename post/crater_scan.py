@@ -5,8 +5,9 @@
 Every run tells its own four parameters.  The most frequent value of each is the base; a run
 belongs to the scan of a parameter if the other three are at the base.  Points: means over the
 runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
-restitution, the fraction of normal energy lost in a collision).  Open symbols: some of the runs
-ended by time, with more energy left than the fraction asked for.
+restitution, the fraction of normal energy lost in a collision).  Open symbols are left out of
+the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
+runs ended by time, with more energy left than the fraction asked for.
 """
 
 from typing import NamedTuple
@@ -44,7 +45,9 @@ class Point(NamedTuple):
     runs: int
     sizes: dict[str, Estimate]
     energy_left: float
+    wall_collisions: float  # per run
     by_time: bool  # some runs ended before the energy fraction was reached
+    free: bool  # neither time nor walls cut it short
 
 
 def key_of(run: Run) -> tuple[float, ...]:
@@ -69,7 +72,9 @@ def base_of(keys: list[tuple[float, ...]]) -> tuple[float, ...]:
     return tuple(max(sorted(set(column)), key=column.count) for column in zip(*keys, strict=True))
 
 
-def scan_points(keys: list, craters: list[Crater], axis: int, fraction: float) -> list[Point]:
+def scan_points(
+    keys: list, craters: list[Crater], axis: int, fraction: float, few_hits: float
+) -> list[Point]:
     """The scan along one parameter, all others at the base, in ascending order."""
     base = base_of(keys)
     along = [
@@ -80,14 +85,14 @@ def scan_points(keys: list, craters: list[Crater], axis: int, fraction: float) -
     points = []
     for x in sorted({keys[k][axis] for k in along}):
         here = [craters[k] for k in along if keys[k][axis] == x]
-        sizes = {
-            name: estimate([getattr(c, name) for c in here])
-            for name in ("hit", "displaced", "width", "depth")
-        }
-        left = [c.energy_left for c in here]
-        points.append(
-            Point(x, len(here), sizes, float(np.mean(left)), max(left) > fraction * (1 + 1e-9))
+        sizes = {name: estimate([getattr(c, name) for c in here]) for name in SIZES | EXTENTS}
+        left, hits = (
+            np.array([getattr(c, name) for c in here])
+            for name in ("energy_left", "wall_collisions")
         )
+        by_time = bool(left.max() > fraction * (1 + 1e-9))
+        free = bool(not by_time and hits.mean() <= few_hits)
+        points.append(Point(x, len(here), sizes, left.mean(), hits.mean(), by_time, free))
     return points
 
 
@@ -98,12 +103,13 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 
 def fits_of(axis: str, points: list[Point]) -> dict[str, PowerLaw | None]:
     """A power law for each size."""
+    points = [p for p in points if p.free]
     x = abscissa(axis, [p.x for p in points])
     return {
         name: fit_power_law(
             x, [p.sizes[name].mean for p in points], [p.sizes[name].error for p in points]
         )
-        for name in points[0].sizes
+        for name in SIZES | EXTENTS
     }
 
 
@@ -113,7 +119,7 @@ def draw_sizes(
     """Some of the sizes with their fits on one pair of axes."""
     x = np.array([p.x for p in points])
     base = "(1-ξ^2)" if axis == "restitution" else "x"
-    reached = np.array([not p.by_time for p in points])
+    free = np.array([p.free for p in points])
     for (name, title), colour, marker in zip(names.items(), colours, "osD^", strict=False):
         y = np.array([p.sizes[name].mean for p in points])
         error = np.nan_to_num([p.sizes[name].error for p in points])
@@ -122,21 +128,12 @@ def draw_sizes(
         if fit:
             power = f"{fit.exponent:.2f} \\pm {fit.exponent_error:.2f}"
             label += f", $\\propto {base}^{{{power}}}$"
-            inside = np.linspace(x.min(), x.max(), 200)
+            inside = np.linspace(x[free].min(), x[free].max(), 200)
             inside = inside[abscissa(axis, inside) > 0]
             axes.plot(inside, fit(abscissa(axis, inside)), color=colour, lw=1, ls="-")
-        axes.errorbar(
-            x[reached], y[reached], error[reached], ls="", marker=marker, color=colour, label=label
-        )
-        axes.errorbar(
-            x[~reached],
-            y[~reached],
-            error[~reached],
-            ls="",
-            marker=marker,
-            color=colour,
-            mfc="white",
-        )
+        style = {"ls": "", "marker": marker, "color": colour}
+        axes.errorbar(x[free], y[free], error[free], label=label, **style)
+        axes.errorbar(x[~free], y[~free], error[~free], mfc="white", **style)
 
 
 def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list[Run]):
@@ -172,11 +169,12 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
             axes.legend(loc="upper left", fontsize=8)
     per_point = {p.runs for points in scans.values() for p in points}
     number = "-".join(map(str, sorted({min(per_point), max(per_point)})))
-    ended = any(p.by_time for points in scans.values() for p in points)
+    ended = any(not p.free for points in scans.values() for p in points)
     figure.suptitle(
         f"Crater size,  N = {', '.join(str(n) for n in sorted({r.count for r in runs}))},  "
         f"{number} runs per point,  ended at "
-        f"{100 * fraction:g} % of the energy" + (" (open: at a set time)" if ended else ""),
+        f"{100 * fraction:g} % of the energy"
+        + (" (open: the box takes part, or ended by time)" if ended else ""),
         fontsize=10,
     )
     return figure
@@ -190,7 +188,15 @@ def table(scans: dict[str, list[Point]]) -> dict[str, list]:
             row = {"scan": axis, "value": p.x, "runs": p.runs}
             for name, (mean, error) in p.sizes.items():
                 row |= {name: float(mean), f"{name}_error": float(error)}
-            rows.append(row | {"energy_left": p.energy_left, "ended_by_time": int(p.by_time)})
+            rows.append(
+                row
+                | {
+                    "energy_left": float(p.energy_left),
+                    "wall_collisions": float(p.wall_collisions),
+                    "ended_by_time": int(p.by_time),
+                    "in_fit": int(p.free),
+                }
+            )
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
@@ -199,7 +205,8 @@ def main() -> None:
     runs = distinct(read_all(args.runs))
     keys, craters = [key_of(run) for run in runs], [crater(run) for run in runs]
     fraction = float(runs[0].parameter("stop", "energy_fraction", 0.1))
-    scans = {axis: scan_points(keys, craters, k, fraction) for k, axis in enumerate(AXES)}
+    few_hits = 0.01 * runs[0].count
+    scans = {axis: scan_points(keys, craters, k, fraction, few_hits) for k, axis in enumerate(AXES)}
     print_table(table(scans))
     for axis, points in scans.items():
         for name, fit in fits_of(axis, points).items():

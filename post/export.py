@@ -63,7 +63,7 @@ def exported(run: Run, suffix: str, step: int) -> Iterator[str]:
     if suffix == ".csv":
         yield "time,id,species,x,y,vx,vy,radius,mass\n"
     one = csv_frame if suffix == ".csv" else xyz_frame
-    for frame in tqdm(np.arange(0, run.frames, step), unit="frame", desc="export"):
+    for frame in tqdm(np.arange(0, run.frames, step), unit="frame", desc="export", disable=None):
         yield one(run, int(frame))
 
 

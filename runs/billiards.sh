@@ -13,4 +13,4 @@ done
 "$python" post/snapshot.py "$data/container/seed_1.h5" --frames 0,-1 --quiver \
   -o "$figures/container.png"
 "$python" post/trajectory.py "$data/brownian/seed_1.h5" --disks 2001 -o "$figures/brownian.png"
-"$python" post/animate.py "$data/container/seed_1.h5" -o "$figures/container.gif"
+"$python" post/animate.py "$data/container/seed_1.h5" -o "$figures/container_film"

@@ -18,16 +18,19 @@ member() { # mass speed radius restitution seed
   printf -- '--set run.seed=%s --set contact.contact_time=%s\n' "$5" "$contact_time"
 }
 for seed in {1..8}; do
-  for mass in 5 10 15 20 25 30 35 40 45 50; do member "$mass" 5 5 0.5 "$seed"; done
+  for mass in 2.5 5 7.5 10 12.5 15 17.5 20 22.5 25; do member "$mass" 5 5 0.5 "$seed"; done
   for speed in 1 2 3 4 5 6 7 8 9 10; do member 25 "$speed" 5 0.5 "$seed"; done
   for radius in 1 2 3 4 5 6 7 8 9 10; do member 25 5 "$radius" 0.5 "$seed"; done
-  for restitution in 0 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9; do
+  for restitution in 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 0.95; do
     member 25 5 5 "$restitution" "$seed"
   done
 done | sort -u >"$data/members.txt"
 
+runs/ensemble.sh input/crater.nml -d "$data/one" --seeds 1 \
+  --set output.frames_every_time=0.002 --set output.observables_every_time=0.001 "$@"
+"$python" post/crater.py "$data/one/seed_1.h5" -o "$figures/crater.png"
+"$python" post/animate.py "$data/one/seed_1.h5" --colour speed -o "$figures/crater_film"
+
 runs/ensemble.sh input/crater.nml -d "$data" --manifest "$data/members.txt" "$@"
-"$python" post/crater.py "$data/mass_25_speed_5_radius_5_restitution_0.5_seed_1.h5" \
-  -o "$figures/crater.png"
 "$python" post/crater_scan.py "$data"/*.h5 -o "$figures/crater_scan.png" \
   --csv "$figures/crater_scan.csv"

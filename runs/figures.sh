@@ -32,16 +32,22 @@ for system in "${systems[@]}"; do
   esac
 done
 
-# One section per figure that is there: file, title, the script that makes it.
+# One section per figure that is there: name, title, the script that makes it.
 section() {
-  local file=$1 title=$2 script=$3 table
-  [[ -e $figures/$file ]] || return 0
-  table=${file%.*}.csv
-  printf '<figure id="%s">\n<a href="%s"><img src="%s" alt="%s" loading="lazy"></a>\n' \
-    "${file%.*}" "$file" "$file" "$title"
-  printf '<figcaption><b>%s</b> <code>runs/%s.sh</code>' "$title" "$script"
-  [[ ! -e $figures/$table ]] || printf ' <a href="%s">numbers</a>' "$table"
-  printf '</figcaption>\n</figure>\n'
+  local name=$1 title=$2 script=$3 file
+  for file in "$name".{png,mp4,gif}; do
+    [[ -e $figures/$file ]] || continue
+    printf '<figure id="%s">\n' "$name"
+    if [[ $file == *.mp4 ]]; then
+      printf '<video src="%s" controls loop muted preload="metadata"></video>\n' "$file"
+    else
+      printf '<a href="%s"><img src="%s" alt="%s" loading="lazy"></a>\n' "$file" "$file" "$title"
+    fi
+    printf '<figcaption><b>%s</b> <code>runs/%s.sh</code>' "$title" "$script"
+    [[ ! -e $figures/$name.csv ]] || printf ' <a href="%s.csv">numbers</a>' "$name"
+    printf '</figcaption>\n</figure>\n'
+    return
+  done
 }
 
 mkdir -p "$figures"
@@ -56,32 +62,33 @@ mkdir -p "$figures"
   body { font: 16px/1.4 system-ui, sans-serif; margin: 2rem; }
   main { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 34rem), 1fr)); gap: 2rem; }
   figure { margin: 0; }
-  img { width: 100%; height: 30rem; object-fit: contain; object-position: left top; background: white; }
+  img, video { width: 100%; height: 30rem; object-fit: contain; object-position: left top; background: white; }
 </style>
 <h1>Ricochet: figures</h1>
 <main>
 HTML
-  section scattering.png 'Scattering angle against impact parameter' scattering
-  section gas_frames.png 'A gas: first and last frame' gas
-  section gas.png 'A gas: speeds from equal to Maxwellian' gas
-  section mixture.png 'A mixture: speeds and energies' mixture
-  section cooling_velocity.png 'Cooling; walls slow both components' cooling
-  section cooling_normal.png 'Cooling; walls slow the normal component' cooling
-  section crater.png 'A crater' crater
-  section crater_scan.png 'Crater size against four parameters' crater
-  section lab_frames.png '10 x 10 disks on a grid: events 0, 50, 100, 300' lab
-  section lab_speeds.png '10 x 10 disks: speeds' lab
-  section lab.gif '10 x 10 disks: event by event' lab
-  section cost.png 'Cost of a collision' cost
-  section billiards.png 'Billiards: Sinai, Lorentz' billiards
-  section container.png 'A round container' billiards
-  section container.gif 'A round container, film' billiards
-  section brownian.png 'Brownian motion' billiards
-  section gravity_energy.png 'Gravity: energies, time steps and events' gravity
-  section gravity_equipartition.png 'Gravity: equipartition' gravity
-  section gravity_laws.png 'Gravity: speeds and heights' gravity
-  section gravity_frames.png 'Gravity: frames' gravity
-  section gravity.gif 'Gravity, film' gravity
+  section scattering 'Scattering angle against impact parameter' scattering
+  section gas_frames 'A gas: first and last frame' gas
+  section gas 'A gas: speeds from equal to Maxwellian' gas
+  section mixture 'A mixture: speeds and energies' mixture
+  section cooling_velocity 'Cooling; walls slow both components' cooling
+  section cooling_normal 'Cooling; walls slow the normal component' cooling
+  section crater 'A crater' crater
+  section crater_film 'A crater, film' crater
+  section crater_scan 'Crater size against four parameters' crater
+  section lab_frames '10 x 10 disks on a grid: events 0, 50, 100, 300' lab
+  section lab_speeds '10 x 10 disks: speeds' lab
+  section lab_film '10 x 10 disks: event by event' lab
+  section cost 'Cost of a collision' cost
+  section billiards 'Billiards: Sinai, Lorentz' billiards
+  section container 'A round container' billiards
+  section container_film 'A round container, film' billiards
+  section brownian 'Brownian motion' billiards
+  section gravity_energy 'Gravity: energies, time steps and events' gravity
+  section gravity_equipartition 'Gravity: equipartition' gravity
+  section gravity_laws 'Gravity: speeds and heights' gravity
+  section gravity_frames 'Gravity: frames' gravity
+  section gravity_film 'Gravity, film' gravity
   printf '</main>\n</html>\n'
 } >"$figures/index.html"
 printf 'figures = %s/index.html\n' "$figures"

@@ -32,4 +32,4 @@ runs/ensemble.sh input/gravity.nml -d "$data/long" --seeds 1 --set stop.time=520
 # G4: start, end and ten times between; a film of the first twelve time units.
 "$python" post/snapshot.py "$data/events/seed_1.h5" --count 12 --quiver \
   -o "$figures/gravity_frames.png"
-"$python" post/animate.py "$data/events/seed_1.h5" --frames 300 -o "$figures/gravity.gif"
+"$python" post/animate.py "$data/events/seed_1.h5" --frames 300 -o "$figures/gravity_film"

@@ -13,4 +13,4 @@ runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 
   --set output.frames_every_events=1 "$@"
 "$python" post/snapshot.py "$data/start/seed_1.h5" --frames 0,50,100,300 --quiver \
   -o "$figures/lab_frames.png"
-"$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab.gif"
+"$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab_film"

@@ -260,7 +260,7 @@ def test_scattering_needs_one_moving_disk(tmp_path):
 # --- crater ---
 
 
-def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=True):
+def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=True, walls=0):
     """A bed of 4 x 20 disks; the `moved` first ones of the upper row pushed aside."""
     r = 0.02
     xs, ys = np.meshgrid(np.arange(20) * 0.05 + 0.025, [0.35, 0.3, 0.25, 0.2])
@@ -281,7 +281,11 @@ def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=
         species=np.r_[1, np.full(80, 2)],
         names=("projectile" if names else "tip", "bed"),
         collisions=hit,
-        observables={"collisions": [0, 90], "all/kinetic_energy": [1.0, left]},
+        observables={
+            "collisions": [0, 90],
+            "wall_collisions": [[0] * 4, [0, 0, walls, 0]],
+            "all/kinetic_energy": [1.0, left],
+        },
         parameters={
             "run": {"seed": seed},
             "contact": {"restitution": xi},
@@ -313,7 +317,7 @@ def test_packing_field_holds_the_area_of_the_bed(tmp_path):
 
 def test_scan_finds_its_base_and_its_points(tmp_path):
     paths = [
-        impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=int(m) // 5 + s)
+        impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=m // 5 + s, walls=(m == 5) * s)
         for m in (5, 10, 15, 20, 25)
         for s in (1, 2)
     ]
@@ -326,10 +330,13 @@ def test_scan_finds_its_base_and_its_points(tmp_path):
     assert len(runs) == len(paths) - 2, "mass 25 and xi 0.5 is the base, once per seed"
     keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
     assert crater_scan.base_of(keys) == (25, 5, 5, 0.5)
-    mass, speed, _, xi = (crater_scan.scan_points(keys, sizes, k, 0.1) for k in range(4))
+    mass, speed, _, xi = (crater_scan.scan_points(keys, sizes, k, 0.1, 1) for k in range(4))
     assert [p.x for p in mass] == [5, 10, 15, 20, 25] and [p.x for p in speed] == [5]
     assert mass[1].sizes["displaced"] == (3.5, 0.5) and mass[1].runs == 2
-    assert [p.by_time for p in xi] == [False, False, True]
+    assert [p.by_time for p in xi] == [False, False, True] == [not p.free for p in xi]
+    assert [p.wall_collisions for p in mass] == [1.5, 0, 0, 0, 0]
+    assert [p.free for p in mass] == [False, True, True, True, True]
+    assert crater_scan.fits_of("mass", mass[:3])["displaced"] is None, "two free points"
 
 
 # --- gravity ---
