@@ -38,7 +38,8 @@ contains
     type(output_t) :: output
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: stop_rule
-    real(real64) :: started
+    real(real64) :: started, cpu(2)                   ! [s]
+    integer(int64) :: before
     started = seconds()
     input_text = ''
     call watch_signals()
@@ -61,10 +62,14 @@ contains
     call choose_evolution(settings%run, evolution)
     if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
     stop_rule = stop_rule_t(settings%stop, sim)
+    before = sim%collisions
+    call cpu_time(cpu(1))
     call evolution%start(sim)
     call main_loop(command, settings, groups, sim, evolution, stop_rule, output, started, error)
+    call cpu_time(cpu(2))
     if (.not. allocated(error)) call output%finish(sim, seconds() - started, error)
-    if (.not. allocated(error)) call write_summary(command%output, sim, stop_rule, seconds() - started)
+    if (.not. allocated(error)) call write_summary(command%output, sim, stop_rule, &
+      seconds() - started, (sim%collisions - before)/max(cpu(2) - cpu(1), 1.0e-9_real64))
     call output%release()
   end subroutine perform_run
   !> Lets the simulation move from one thing that is due to the next, until its end.
@@ -148,11 +153,12 @@ contains
   end subroutine warn
 
   !> What the run came to, as lines `key = value`.
-  subroutine write_summary(path, sim, stop_rule, elapsed)
+  subroutine write_summary(path, sim, stop_rule, elapsed, rate)
     character(len=*), intent(in) :: path
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
-    real(real64), intent(in) :: elapsed               !! wall time [s]
+    real(real64), intent(in) :: elapsed               !! wall time of the whole run [s]
+    real(real64), intent(in) :: rate                  !! collisions per processor time of the simulation [1/s]
     write (output_unit, '(a)') "output = "//path
     write (output_unit, '(a,i0)') "disks = ", sim%n_disks(), "collisions = ", sim%collisions, &
       "wall_collisions = ", sum(sim%wall_collisions), "obstacle_collisions = ", sim%obstacle_collisions
@@ -160,7 +166,7 @@ contains
       "kinetic_energy = "//written(sim%kinetic_energy()), &
       "dissipated_energy = "//written(sim%dissipated), &
       "wall_time = "//written(elapsed), &
-      "collisions_per_second = "//written(sim%collisions/max(elapsed, 1.0e-9_real64))
+      "collisions_per_second = "//written(rate)
     if (.not. stop_rule%met(sim)) write (output_unit, '(a)') &
       "note = nothing will ever happen any more: the run ended before its stop rule was met"
   end subroutine write_summary
