@@ -255,7 +255,7 @@ contains
       call next_face_straight(self, disk, cell, 1, t, code)
       call next_face_straight(self, disk, cell, 2, t_y, code_y)
     end if
-    code = merge(code_y, code, t_y < t)
+    code = code + (code_y - code)*merge(1, 0, t_y < t)   ! which axis is a toss-up: no branch
     t = merge(t_y, t, t_y < t)
   end subroutine next_face
 

@@ -30,8 +30,8 @@ module event_driven
     logical :: calendar = .true.                   !! the queue is a calendar, else the heap alone
     ! Watch over the clock: a collapse is an endless series of events in no time.
     real(real64), private :: blink = 0.0_real64    !! a time in which nothing can move visibly [time]
-    real(real64), private :: last_look = 0.0_real64  !! [time]
-    integer(int64), private :: events_since = 0    !! the last look
+    real(real64), private :: last_look = 0.0_real64  !! when we looked at the clock [time]
+    integer(int64), private :: last_events = 0       !! events at that look
   contains
     procedure :: start
     procedure :: advance
@@ -51,7 +51,7 @@ contains
     end do
     self%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
     self%last_look = sim%now
-    self%events_since = 0
+    self%last_events = sim%events
     self%idle = .false.
     if (sim%next_epoch == 0) sim%next_epoch = events_per_epoch(sim)
   end subroutine start
@@ -80,16 +80,17 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
-    real(real64) :: t
+    real(real64) :: t, t_limit
     integer(int64) :: turn
     integer(int32) :: i
+    logical :: met
+    if (reached(self, sim, limits)) return
+    if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
+    t_limit = min(limits%time - sim%epoch, last_time)
     do turn = 1, limits%turns
-      if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
-        .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()) return
-      if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
-      if (.not. t <= min(limits%time - sim%epoch, last_time)) then
+      if (.not. t <= t_limit) then
         if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i))
         self%idle = t > last_time
         if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
@@ -97,42 +98,53 @@ contains
       end if
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
-      call react(self, sim, i)
-      self%events_since = self%events_since + 1
-      if (self%events_since > patience) call watch(self, sim, i, error)
-      if (allocated(error)) return
+      call react(self, sim, i, met)
+      if (.not. met) cycle
+      if (sim%events - self%last_events > patience) call watch(self, sim, i, error)
+      if (allocated(error) .or. reached(self, sim, limits)) return
+      if (sim%events >= sim%next_epoch) then
+        call move_epoch(self, sim)
+        t_limit = min(limits%time - sim%epoch, last_time)
+      end if
     end do
   end subroutine advance
 
+  !> Whether the run is to pause here, time aside.
+  pure function reached(self, sim, limits) result(yes)
+    class(event_driven_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    logical :: yes
+    yes = sim%events >= limits%events .or. sim%collisions >= limits%collisions &
+      .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()
+  end function reached
+
   !> Executes what disk i expects, now.
-  subroutine react(self, sim, i)
+  subroutine react(self, sim, i, met)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
+    logical, intent(out) :: met                    !! it was a collision, not a mere passage or stale
     integer(int32) :: code, k
     code = sim%disk(i)%partner
+    met = .false.
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         call collide(sim, i, code, sim%disk(i)%event_time, self%log)
-        call predict(self, sim, i)
+        met = .true.
         call predict(self, sim, code)
-      else
-        call predict(self, sim, i)
-        return
       end if
     else if (code <= first_crossing) then
       call self%search%cross(sim, i, code)
-      call predict(self, sim, i)
-      return
     else if (passes(sim, code)) then
       call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
-      call predict(self, sim, i)
     else
       call collide(sim, i, code, sim%disk(i)%event_time, self%log)
-      call predict(self, sim, i)
+      met = .true.
     end if
-    if (self%search%everyone) then
+    call predict(self, sim, i)
+    if (self%search%everyone .and. met) then
       do k = 1, sim%n_disks()
         call predict(self, sim, k)
       end do
@@ -153,11 +165,11 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     type(error_t), allocatable, intent(inout) :: error
-    if (self%events_since < 20*int(sim%n_disks(), int64)) return
+    if (sim%events - self%last_events < 20*int(sim%n_disks(), int64)) return
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
       "inelastic collapse, the clock stands still: "//moment(sim, i)//"; set contact.contact_time " &
       //"(TC model), well below the mean time between collisions, or raise contact.restitution")
-    self%events_since = 0
+    self%last_events = sim%events
     self%last_look = sim%now
   end subroutine watch
 

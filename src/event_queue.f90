@@ -15,6 +15,7 @@ module event_queue
   integer(int32), parameter :: list_capacity = 64
   integer(int32), parameter :: bucket_capacity = 15
   integer(int32), parameter :: in_window = -1, nowhere = -2, in_far_list = -3   !! values of tag%bucket
+  real(real64), parameter :: last_window = 2.0e9_real64
   real(real64), parameter :: events_per_window = 4.0_real64
   integer, parameter :: sample_size = 100
 
@@ -122,14 +123,37 @@ contains
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
+    integer(int32) :: window, k, n
     if (disk(i)%event_time < self%window_end) then
       tag(i)%bucket = in_window
       call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
-    else
-      if (self%heap%n > 0) call self%heap%remove(i)
-      call insert_far(self, disk, tag, i)
+      return
     end if
+    if (self%heap%n > 0) call self%heap%remove(i)
+    window = window_number(self, disk(i)%event_time)
+    if (window == tag(i)%bucket) return
+    if (window > self%window .and. window - self%window < self%length) then
+      k = iand(window, self%length - 1)
+      n = self%bucket(k)%n
+      if (n < bucket_capacity) then
+        self%bucket(k)%disk(n + 1) = i
+        self%bucket(k)%n = n + 1
+        tag(i)%bucket = window
+        return
+      end if
+    end if
+    call insert_far(self, disk, tag, i, window)
   end subroutine schedule
+
+  !> The window that holds the time t.
+  pure function window_number(self, t) result(window)
+    class(event_queue_t), intent(in) :: self
+    real(real64), intent(in) :: t
+    integer(int32) :: window
+    real(real64) :: number
+    number = t*self%per_time
+    window = int(merge(number, last_window, number < last_window), int32)
+  end function window_number
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
   subroutine insert_near(self, disk, event)
@@ -157,35 +181,32 @@ contains
     end if
   end subroutine insert_near
 
-  !> Into a bucket, or the far list. A full bucket spills into an earlier one: opened too soon does no harm.
-  recursive subroutine insert_far(self, disk, tag, i)
+  !> Where there is no room in the right bucket: into an earlier one, as opened too soon does no harm; or into
+  !> the far list, if the window lies beyond the ring.
+  recursive subroutine insert_far(self, disk, tag, i, window)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i
-    integer(int32) :: window, k, n
-    window = int(min(disk(i)%event_time*self%per_time, 2.0e9_real64), int32)
-    if (window == tag(i)%bucket) return
-    do while (window - self%window < self%length .and. window > self%window)
-      k = iand(window, self%length - 1)
-      n = self%bucket(k)%n
-      if (n < bucket_capacity) then
-        self%bucket(k)%disk(n + 1) = i
-        self%bucket(k)%n = n + 1
-        tag(i)%bucket = window
-        return
-      end if
-      window = window - 1
-    end do
-    if (window <= self%window) then
-      tag(i)%bucket = in_window
-      call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
-    else if (tag(i)%bucket /= in_far_list) then
+    integer(int32), intent(in) :: i, window
+    integer(int32) :: earlier, k
+    if (window - self%window >= self%length) then
+      if (tag(i)%bucket == in_far_list) return
       if (self%n_far == size(self%far)) call sweep_far_list(self, disk, tag)
       self%n_far = self%n_far + 1
       self%far(self%n_far) = i
       tag(i)%bucket = in_far_list
+      return
     end if
+    do earlier = window - 1, self%window + 1, -1
+      k = iand(earlier, self%length - 1)
+      if (self%bucket(k)%n == bucket_capacity) cycle
+      self%bucket(k)%n = self%bucket(k)%n + 1
+      self%bucket(k)%disk(self%bucket(k)%n) = i
+      tag(i)%bucket = earlier
+      return
+    end do
+    tag(i)%bucket = in_window
+    call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
   end subroutine insert_far
 
   !> Drops void entries of the far list and files those that have come near.
