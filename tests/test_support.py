@@ -91,6 +91,9 @@ def test_a_line_outside_the_common_language_is_refused_with_its_number(tmp_path,
         ("  @test\n", "  @before\n\n"),
         ("contains", "  @before\n  subroutine a()\n  @before\n  subroutine b()\n"),
         ("@test\n", "@test\n  integer :: n\n"),
+        ("use funit", "use funit\n  use systems, only: a, &\n    run"),
+        ("use funit", "use funit\n  use systems, only: near => close_to, b"),
+        ("end module", "pure logical function is(x)\n  end function is\nend module"),
     ],
 )
 def test_a_file_outside_the_common_language_is_refused(tmp_path, before, after):
@@ -101,10 +104,10 @@ def test_a_file_outside_the_common_language_is_refused(tmp_path, before, after):
 
 def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_path):
     text = FILE.format("@assertEqual('a, @b(', name, message='x=1, ''y''') ").replace(
-        "contains", "contains ! user@host"
+        "contains", "use systems, only: carry_on => run ! user@host"
     )
     lines = translated(tmp_path, text).splitlines()
-    assert lines[3] == "contains ! user@host"
+    assert lines[3] == "use systems, only: carry_on => run ! user@host"
     assert "(e_ => ('a, @b('), a_ => (name))" in lines[6]
     assert "message='x=1, ''y'''" in lines[6]
 

@@ -8,8 +8,11 @@ shift 2
 expected=$(cat "$@" | grep -ciE '^[[:space:]]*@test[[:space:]]*$')
 echo "$expected unit tests under $runner"
 status=0
-output=$("$program" 2>&1) || status=$?
+output=$(timeout 300 "$program" 2>&1) || status=$?
 printf '%s\n' "$output"
+if [ "$status" -eq 124 ]; then
+  echo 'unit tests: stopped after 300 s' >&2
+fi
 if [ "$status" -ne 0 ]; then
   exit "$status"
 fi
