@@ -38,6 +38,7 @@ contains
       case ('output')
         call take_output(groups(k), settings%output)
         call check_cadences(groups(k), settings, problems)
+      case default   ! below: they need those above
       end select
     end do
     call take_obstacles(groups(o(1):o(2)), settings%obstacles, problems)
@@ -126,7 +127,7 @@ contains
     contact%wall_restitution = group%real_of('wall_restitution', restitution)
     contact%smooth_walls = group%text_of('wall_rule') == 'normal'
     contact%contact_time = group%real_of('contact_time', 0.0_real64)
-    call group%set_reals('wall_restitution', [contact%wall_restitution])
+    call group%put_reals('wall_restitution', [contact%wall_restitution])
     allocate (contact%restitution(n, n), source=restitution)
     pairs = group%reals_of('pair_restitution', none)
     if (size(pairs) == 0 .or. n == 0) return

@@ -40,12 +40,12 @@ contains
       written(sum(int(species%count, int64)))//' disks; allowed: up to '//written(most_disks))
     do k = 1, size(groups)
       associate (group => groups(k), s => species(k))
-        call group%set_integer('count', int(s%count, int64))
-        call group%set_reals('mass', [s%mass])
-        call group%set_reals('radius', [s%radius])
-        if (s%radius < sqrt(area(s%region))) call group%set_reals('packing_fraction', &
+        call group%put_integer('count', int(s%count, int64))
+        call group%put_reals('mass', [s%mass])
+        call group%put_reals('radius', [s%radius])
+        if (s%radius < sqrt(area(s%region))) call group%put_reals('packing_fraction', &
           [s%count*pi*s%radius**2/area(s%region)])
-        call group%set_reals('region', s%region)
+        call group%put_reals('region', s%region)
       end associate
     end do
   end subroutine take_species
@@ -131,7 +131,7 @@ contains
     integer :: k
     if (group%given(choice)) return
     do k = size(variables), 1, -1
-      if (group%given(trim(variables(k)))) call group%set_text(choice, consequences(k))
+      if (group%given(trim(variables(k)))) call group%put_text(choice, consequences(k))
     end do
   end subroutine infer
 

@@ -6,7 +6,7 @@ module namelist_input
   use input_problems, only: problem_list_t
   use input_settings, only: resolve_settings
   use input_values, only: store_values
-  use namelist_scanner, only: assignment, end_of_text, group_start, scanner_t, statement_t, token_t
+  use namelist_scanner, only: group_start, scanner_t, setting, statement_t, token_t
   use parameter_values, only: parameter_group_t, parameter_value_t, text_length
   use parameters, only: group_names, is_repeated, row_of, table, variables_of
   use settings, only: settings_t
@@ -105,6 +105,8 @@ contains
       select case (iachar(text(position:position)))
       case (0:8, 11:12, 14:31, 127)
         return
+      case default
+        cycle
       end select
     end do
     position = 0
@@ -221,10 +223,10 @@ contains
       select case (statement%kind)
       case (group_start)
         call enter_group(reading, statement, group)
-      case (assignment)
+      case (setting)
         if (group > 0) call take_assignment(reading%groups(group), scanner, &
           statement, reading%problems)
-      case (end_of_text)
+      case default   ! the end of the text
         exit
       end select
     end do
@@ -322,7 +324,7 @@ contains
           if (group%name /= group_names(j)) cycle
           n = n + 1
           if (group%text_of('name') == '') &
-            call group%set_text('name', trim(group%name)//written(n))
+            call group%put_text('name', trim(group%name)//written(n))
           group%instance = group%text_of('name')
         end associate
       end do

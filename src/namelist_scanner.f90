@@ -10,9 +10,9 @@ module namelist_scanner
   implicit none
   private
   public :: scanner_t, statement_t, token_t
-  public :: group_start, assignment, end_of_text
+  public :: group_start, setting
 
-  integer, parameter :: nothing = 0, group_start = 1, assignment = 2, end_of_text = 3
+  integer, parameter :: nothing = 0, group_start = 1, setting = 2, end_of_text = 3
   integer, parameter :: most_repeats = 10000000
 
   character(len=*), parameter :: eol = new_line('a'), blanks = ' '//achar(9)
@@ -29,11 +29,11 @@ module namelist_scanner
   end type token_t
 
   type :: statement_t
-    integer :: kind = nothing                    !! group_start, assignment or end_of_text
+    integer :: kind = nothing                    !! group_start, setting or end_of_text
     integer :: line = 0
     character(len=:), allocatable :: name        !! of the group or variable, in lower case
     integer :: element = 0                       !! the 2 of name(2) = value; 0: none
-    type(token_t), allocatable :: tokens(:)      !! values of an assignment
+    type(token_t), allocatable :: tokens(:)      !! values of a setting
     logical :: sound = .true.                    !! .false.: problems in it have been reported
   end type statement_t
 
@@ -161,7 +161,7 @@ contains
       allocate (statement%tokens(0))
       call self%read_values(statement%tokens, statement%sound, &
         self%group//'.'//plain(statement%name), problems)
-      statement%kind = assignment
+      statement%kind = setting
     end if
   end subroutine read_assignment
 

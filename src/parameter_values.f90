@@ -37,7 +37,7 @@ module parameter_values
   contains
     procedure :: integer_of, real_of, reals_of, text_of, logical_of
     procedure :: given, faulty, line_of
-    procedure :: set_integer, set_reals, set_text, unset
+    procedure :: put_integer, put_reals, put_text, unset
   end type parameter_group_t
 
 contains
@@ -129,28 +129,28 @@ contains
     if (line == 0) line = self%line
   end function line_of
 
-  pure subroutine set_integer(self, name, value)
+  pure subroutine put_integer(self, name, value)
     class(parameter_group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(int64), intent(in) :: value
     self%values(row_of(self%name, name))%integers = [value]
-  end subroutine set_integer
+  end subroutine put_integer
 
-  pure subroutine set_reals(self, name, values)
+  pure subroutine put_reals(self, name, values)
     class(parameter_group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: values(:)
     self%values(row_of(self%name, name))%reals = values
-  end subroutine set_reals
+  end subroutine put_reals
 
-  pure subroutine set_text(self, name, value)
+  pure subroutine put_text(self, name, value)
     class(parameter_group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: value
     character(len=text_length) :: padded
     padded = value
     self%values(row_of(self%name, name))%texts = [padded]
-  end subroutine set_text
+  end subroutine put_text
 
   pure subroutine unset(self, name)
     class(parameter_group_t), intent(inout) :: self
