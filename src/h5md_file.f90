@@ -7,6 +7,7 @@ module h5md_file
   use kinds, only: int32, int64, real64
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
+  use system, only: seconds
   use texts, only: written
   implicit none
   private
@@ -15,20 +16,25 @@ module h5md_file
   integer(int64), parameter :: most_in_chunk = 512      !! samples
   integer(int64), parameter :: chunk_bytes = 65536      !! aim for small frames; large ones are one chunk
   integer(int64), parameter :: block_bytes = 4194304    !! room made at once for an unknown number of frames
+  integer(int64), parameter :: batch_bytes = 262144     !! samples that wait to be written together
+  real(real64), parameter :: longest_wait = 0.05_real64 !! of a sample before it is written [s]
 
   !> Series that grow together: step, time, values; of events: values alone.
   type :: track_t
     type(series_t), allocatable :: series(:)
     character(len=:), allocatable :: counter            !! name of the dataset
-    integer(int64) :: committed = 0                     !! samples that are complete
+    integer(int64) :: committed = 0                     !! samples that are complete in the file
+    integer(int64) :: put = 0                           !! samples handed over, be they written or not
+    real(real64), private :: waiting_since = 0.0_real64 !! of the oldest sample that is not written [s]
   contains
     procedure :: make => make_track
     procedure :: resume => resume_track
     procedure :: put_moment
     procedure :: commit
+    procedure :: write_waiting
     procedure :: cut => cut_track
     procedure :: room => track_room
-    procedure, private :: block_of
+    procedure, private :: block_of, batch_of
   end type track_t
 
   type :: h5md_file_t
@@ -42,6 +48,8 @@ module h5md_file
     procedure, private :: link_moments
     procedure :: put_observables
     procedure :: put_events
+    procedure :: write_old
+    procedure :: write_all
   end type h5md_file_t
 
   character(len=*), parameter :: disks = "particles/disks/"
@@ -139,8 +147,14 @@ contains
       call track%put_moment(self%file, time)
       first = 1
       do k = 3, size(track%series)
-        call track%series(k)%put(self%file, track%committed + 1, 1_int64, values(first:))
-        first = first + product(track%series(k)%item)
+        associate (series => track%series(k), part => values(first:first + product(track%series(k)%item) - 1))
+          if (series%storage == long_integer) then
+            call series%put(self%file, track%put + 1, 1_int64, nint(part, int64))
+          else
+            call series%put(self%file, track%put + 1, 1_int64, part)
+          end if
+          first = first + size(part)
+        end associate
       end do
       call track%commit(self%file, 1_int64)
     end associate
@@ -156,7 +170,7 @@ contains
     integer(int64) :: first, count
     if (n == 0) return
     associate (track => self%events)
-      first = track%committed + 1
+      first = track%put + 1
       count = n
       call track%series(1)%put(self%file, first, count, time)
       column = pair(1, :n)
@@ -180,6 +194,7 @@ contains
     do k = 1, size(self%series)
       associate (series => self%series(k))
         series%block = self%block_of()
+        series%batch = self%batch_of()
         chunk = max(1_int64, min(most_in_chunk, extent, chunk_bytes/series%room()))
         call series%make(file, extent, chunk)
       end associate
@@ -193,6 +208,13 @@ contains
     integer(int64) :: n
     n = max(1_int64, min(most_in_chunk, block_bytes/self%room()))
   end function block_of
+
+  !> Samples that wait for each other.
+  pure function batch_of(self) result(n)
+    class(track_t), intent(in) :: self
+    integer(int64) :: n
+    n = max(1_int64, min(most_in_chunk, batch_bytes/self%room()))
+  end function batch_of
 
   !> Bytes of one sample.
   pure function track_room(self) result(bytes)
@@ -218,9 +240,11 @@ contains
       //written(committed(1))//", the checkpoint says "//written(count))
     do k = 1, size(self%series)
       self%series(k)%block = self%block_of()
+      self%series(k)%batch = self%batch_of()
       call self%series(k)%open(file)
     end do
     self%committed = count
+    self%put = count
     if (committed(1) /= count) call file%replace(self%counter, count)
   end subroutine resume_track
 
@@ -229,20 +253,53 @@ contains
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(in) :: time
-    call self%series(1)%put(file, self%committed + 1, 1_int64, [self%committed])
-    call self%series(2)%put(file, self%committed + 1, 1_int64, [time])
+    call self%series(1)%put(file, self%put + 1, 1_int64, [self%put])
+    call self%series(2)%put(file, self%put + 1, 1_int64, [time])
   end subroutine put_moment
 
-  !> Declares the samples complete: first the data, then the counter.
+  !> Declares the next samples complete. They are written when a batch is full or, at the latest, when they
+  !> have waited long enough.
   subroutine commit(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: count                 !! of samples
-    call file%flush()
-    call file%replace(self%counter, self%committed + count)
-    call file%flush()
-    if (.not. allocated(file%trouble)) self%committed = self%committed + count
+    if (self%put == self%committed) self%waiting_since = seconds()
+    self%put = self%put + count
+    if (self%put - self%committed >= self%batch_of()) call self%write_waiting(file)
   end subroutine commit
+
+  !> Writes what waits: first the data, then the counter.
+  subroutine write_waiting(self, file)
+    class(track_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer :: k
+    if (self%put == self%committed) return
+    do k = 1, size(self%series)
+      call self%series(k)%write_waiting(file)
+    end do
+    call file%flush()
+    call file%replace(self%counter, self%put)
+    call file%flush()
+    if (.not. allocated(file%trouble)) self%committed = self%put
+  end subroutine write_waiting
+
+  !> Writes the samples that have waited long enough.
+  subroutine write_old(self)
+    class(h5md_file_t), intent(inout) :: self
+    real(real64) :: now
+    now = seconds()
+    if (now - self%frames%waiting_since > longest_wait) call self%frames%write_waiting(self%file)
+    if (now - self%observables%waiting_since > longest_wait) call self%observables%write_waiting(self%file)
+    if (now - self%events%waiting_since > longest_wait) call self%events%write_waiting(self%file)
+  end subroutine write_old
+
+  !> Writes all samples that wait.
+  subroutine write_all(self)
+    class(h5md_file_t), intent(inout) :: self
+    call self%frames%write_waiting(self%file)
+    call self%observables%write_waiting(self%file)
+    call self%events%write_waiting(self%file)
+  end subroutine write_all
 
   !> Gives up the room that was not used.
   subroutine cut_track(self, file)

@@ -1,5 +1,7 @@
 !> Datasets that grow along their last dimension. Storage is allocated ahead, whole or in blocks, so that
 !> between two allocations no metadata change: a kill at any moment, or a reader, meets a file in order.
+!> Small items wait in memory until they are written together: a call of the library costs as much as a
+!> hundred kilobytes.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5kind_to_type, h5dcreate_f, h5dopen_f, &
@@ -23,15 +25,22 @@ module hdf5_series
     integer :: storage = double_precision
     integer, allocatable :: item(:)               !! shape of one item; empty: a number
     integer(int64) :: block = 1                   !! items by which it grows when it is full
+    integer(int64) :: batch = 1                   !! items that are written together
     integer(int64), private :: extent = 0         !! items there is room for
+    integer(int64), private :: waiting = 0        !! items put but not written
+    integer(int64), private :: first_waiting = 0  !! number of the first of them
+    real(real64), allocatable, private :: reals(:)          !! the waiting items, by the kind of their values
+    integer(int32), allocatable, private :: integers(:)
+    integer(int64), allocatable, private :: longs(:)
     integer(hid_t), private :: id = -1
   contains
     procedure :: make
     procedure :: open => open_series
+    procedure :: write_waiting
     procedure :: cut
     procedure :: room
     generic :: put => put_reals, put_integers, put_longs
-    procedure, private :: put_reals, put_integers, put_longs, write_items
+    procedure, private :: put_reals, put_integers, put_longs, write_items, place_in_batch
   end type series_t
 
 contains
@@ -101,7 +110,15 @@ contains
     integer(int64), intent(in) :: first           !! number of the first of these items, from 1
     integer(int64), intent(in) :: count           !! of items
     real(real64), intent(in), target :: values(*)
-    call self%write_items(file, first, count, h5t_native_double, c_loc(values))
+    integer(int64) :: n, at
+    if (count >= self%batch) then
+      call self%write_items(file, first, count, h5t_native_double, c_loc(values))
+    else
+      n = product(int(self%item, int64))
+      if (.not. allocated(self%reals)) allocate (self%reals(n*self%batch))
+      call self%place_in_batch(file, first, count, at)
+      self%reals(n*at + 1:n*(at + count)) = values(:n*count)
+    end if
   end subroutine put_reals
 
   subroutine put_integers(self, file, first, count, values)
@@ -109,7 +126,15 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
     integer(int32), intent(in), target :: values(*)
-    call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
+    integer(int64) :: n, at
+    if (count >= self%batch) then
+      call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
+    else
+      n = product(int(self%item, int64))
+      if (.not. allocated(self%integers)) allocate (self%integers(n*self%batch))
+      call self%place_in_batch(file, first, count, at)
+      self%integers(n*at + 1:n*(at + count)) = values(:n*count)
+    end if
   end subroutine put_integers
 
   subroutine put_longs(self, file, first, count, values)
@@ -117,8 +142,47 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
     integer(int64), intent(in), target :: values(*)
-    call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
+    integer(int64) :: n, at
+    if (count >= self%batch) then
+      call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
+    else
+      n = product(int(self%item, int64))
+      if (.not. allocated(self%longs)) allocate (self%longs(n*self%batch))
+      call self%place_in_batch(file, first, count, at)
+      self%longs(n*at + 1:n*(at + count)) = values(:n*count)
+    end if
   end subroutine put_longs
+
+  !> Where in the batch the next items go, which is written first if they do not fit.
+  subroutine place_in_batch(self, file, first, count, at)
+    class(series_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: first, count
+    integer(int64), intent(out) :: at             !! items that wait before them
+    if (self%waiting + count > self%batch) call self%write_waiting(file)
+    if (self%waiting == 0) self%first_waiting = first
+    at = self%waiting
+    self%waiting = self%waiting + count
+  end subroutine place_in_batch
+
+  !> Writes the items that wait.
+  subroutine write_waiting(self, file)
+    class(series_t), intent(inout), target :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64) :: n
+    n = self%waiting
+    self%waiting = 0
+    if (n == 0) return
+    if (allocated(self%reals)) then
+      call self%write_items(file, self%first_waiting, n, h5t_native_double, c_loc(self%reals))
+    else if (allocated(self%integers)) then
+      call self%write_items(file, self%first_waiting, n, h5kind_to_type(int32, h5_integer_kind), &
+        c_loc(self%integers))
+    else
+      call self%write_items(file, self%first_waiting, n, h5kind_to_type(int64, h5_integer_kind), &
+        c_loc(self%longs))
+    end if
+  end subroutine write_waiting
 
   !> Writes items; when they do not fit the series grows by whole blocks.
   subroutine write_items(self, file, first, count, in_memory, address)

@@ -10,6 +10,7 @@ module output
   use observables, only: observable_list, observed_values
   use parameter_values, only: parameter_group_t
   use run_description, only: describe_cost, describe_run
+  use run_files, only: checkpoint_of, is_file, lock_of, part_of, remove_checkpoints
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
@@ -65,22 +66,26 @@ contains
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: frames, samples
-    logical :: exists
     call self%claim(path, error)
     if (allocated(error)) return
-    inquire (file=path, exist=exists)
-    if (exists .and. .not. force) call fail(error, exit_files, path//": is there already, from a " &
-      //"finished run; --force replaces it")
+    if (is_file(path) .and. .not. force) then
+      call fail(error, exit_files, path//": is there already, from a finished run; --force replaces it")
+    else if (is_file(checkpoint_of(path)) .and. .not. force) then
+      call fail(error, exit_files, checkpoint_of(path)//": is there already, from a run that was " &
+        //"stopped; --resume goes on, --force starts over")
+    end if
     if (.not. allocated(error)) call self%plan(settings, sim, frames, samples)
     if (.not. allocated(error)) call check_room(self%h5md, frames, samples, path, error)
     if (.not. allocated(error)) then
-      call remove_file(path//".part")
+      call remove_checkpoints(path)
+      call remove_file(part_of(path))
       associate (h5md => self%h5md)
-        call h5md%file%create(path//".part", 0)
+        call h5md%file%create(part_of(path), 0)
         call describe_run(h5md%file, settings, groups, input_text, overrides, sim)
         call h5md%make_tracks(frames, samples)
       end associate
       call self%write_what_is_due(sim, error)
+      if (allocated(error)) call remove_file(part_of(path))     ! nothing is in it
     end if
     if (allocated(error)) call self%release()
   end subroutine open_output
@@ -102,7 +107,7 @@ contains
     self%progress%events = progress%events
     self%progress%spent = progress%spent
     associate (h5md => self%h5md)
-      call h5md%file%open(path//".part", writable=.true.)
+      call h5md%file%open(part_of(path), writable=.true.)
       call h5md%frames%resume(h5md%file, progress%frames%count)
       call h5md%observables%resume(h5md%file, progress%observables%count)
       if (settings%output%event_log) call h5md%events%resume(h5md%file, progress%events)
@@ -126,9 +131,9 @@ contains
     else if (is_folder(path)) then
       call fail(error, exit_files, path//": is a folder; the output must be a file")
     else
-      call self%lock%acquire(path//".lock", taken)
+      call self%lock%acquire(lock_of(path), taken)
       if (taken) call fail(error, exit_files, path//": another run is writing it; its lock is " &
-        //path//".lock")
+        //lock_of(path))
     end if
   end subroutine claim
 
@@ -203,6 +208,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (self%progress%frames%is_due(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_due(sim)) call self%write_observables(sim)
+    call self%h5md%write_old()
     call self%h5md%file%failure(error)
   end subroutine write_what_is_due
 
@@ -217,7 +223,7 @@ contains
     integer(int64) :: k
     call self%progress%frames%take(sim)
     associate (file => self%h5md%file, track => self%h5md%frames, n => sim%n_disks())
-      k = track%committed + 1
+      k = track%put + 1
       call track%put_moment(file, sim%time())
       allocate (vectors(2*n))
       do i = 1, n
@@ -283,7 +289,7 @@ contains
     if (log%n == 0) return
     call self%h5md%put_events(log%n, log%time, log%pair, log%impulse)
     call log%clear()
-    self%progress%events = self%h5md%events%committed
+    self%progress%events = self%h5md%events%put
     call self%h5md%file%failure(error)
   end subroutine write_events
 
@@ -295,10 +301,10 @@ contains
     logical :: done
     progress = self%progress
     progress%spent = self%progress%spent + seconds() - self%opened
-    call self%h5md%file%flush()
+    call self%h5md%write_all()
     call self%h5md%file%failure(error)
     if (allocated(error)) return
-    call synchronize(self%path//".part", done)
+    call synchronize(part_of(self%path), done)
     if (.not. done) call fail(error, exit_files, self%path//".part: cannot be written: " &
       //last_problem())
   end subroutine save
@@ -314,6 +320,7 @@ contains
     if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
     associate (h5md => self%h5md)
+      call h5md%write_all()
       call h5md%frames%cut(h5md%file)
       call h5md%observables%cut(h5md%file)
       call h5md%events%cut(h5md%file)
@@ -321,13 +328,14 @@ contains
       call h5md%file%close()
       call h5md%file%failure(error)
     end associate
-    if (.not. allocated(error)) call check_file(self%path//".part", self%progress, sim, error)
+    if (.not. allocated(error)) call check_file(part_of(self%path), self%progress, sim, error)
     if (.not. allocated(error)) then
-      call synchronize(self%path//".part", moved)
-      if (moved) call move_file(self%path//".part", self%path, moved)
+      call synchronize(part_of(self%path), moved)
+      if (moved) call move_file(part_of(self%path), self%path, moved)
       if (.not. moved) call fail(error, exit_files, self%path//".part: cannot be renamed to " &
         //self%path//": "//last_problem())
     end if
+    if (.not. allocated(error)) call remove_checkpoints(self%path)
     call self%release()
   end subroutine finish
 
@@ -356,6 +364,7 @@ contains
   !> Lets go of the files, finished or not.
   subroutine release(self)
     class(output_t), intent(inout) :: self
+    call self%h5md%write_all()
     call self%h5md%file%close()
     call self%lock%release()
   end subroutine release
