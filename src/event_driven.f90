@@ -82,7 +82,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: t, t_limit
     integer(int64) :: turn
-    integer(int32) :: i
+    integer(int32) :: i, code
     logical :: met
     if (reached(self, sim, limits)) return
     if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
@@ -91,16 +91,17 @@ contains
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
       if (.not. t <= t_limit) then
-        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i))
+        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i, sim%disk(i)%partner))
         self%idle = t > last_time
         if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
         return
       end if
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
+      code = sim%disk(i)%partner
       call react(self, sim, i, met)
       if (.not. met) cycle
-      if (sim%events - self%last_events > patience) call watch(self, sim, i, error)
+      if (sim%events - self%last_events > patience) call watch(self, sim, i, code, error)
       if (allocated(error) .or. reached(self, sim, limits)) return
       if (sim%events >= sim%next_epoch) then
         call move_epoch(self, sim)
@@ -160,27 +161,25 @@ contains
   end subroutine predict
 
   !> Ends the run if a long series of events has brought the clock no further. The last of them names whom.
-  subroutine watch(self, sim, i, error)
+  subroutine watch(self, sim, i, code, error)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: i, code          !! the disk that just collided, and with whom
     type(error_t), allocatable, intent(inout) :: error
     if (sim%events - self%last_events < 20*int(sim%n_disks(), int64)) return
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
-      "inelastic collapse, the clock stands still: "//moment(sim, i)//"; set contact.contact_time " &
+      "inelastic collapse, the clock stands still: "//moment(sim, i, code)//"; set contact.contact_time " &
       //"(TC model), well below the mean time between collisions, or raise contact.restitution")
     self%last_events = sim%events
     self%last_look = sim%now
   end subroutine watch
 
   !> Time, disk and partner of an event, for messages.
-  pure function moment(sim, i) result(text)
+  pure function moment(sim, i, code) result(text)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: i, code
     character(len=:), allocatable :: text
     character(len=200) :: line
-    integer(int32) :: code
-    code = sim%disk(i)%partner
     write (line, '("disk ",i0," (",a,")")') sim%tag(i)%id, sim%species(sim%tag(i)%species)%name
     text = trim(line)
     if (code > 0) then
