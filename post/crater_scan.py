@@ -126,7 +126,7 @@ def draw_sizes(
         fit = fits[name]
         label = title
         if fit:
-            power = f"{fit.exponent:.2f} \\pm {fit.exponent_error:.2f}"
+            power = f"{fit.exponent:z.2f} \\pm {fit.exponent_error:.2f}"
             label += f", $\\propto {base}^{{{power}}}$"
             inside = np.linspace(x[free].min(), x[free].max(), 200)
             inside = inside[abscissa(axis, inside) > 0]
@@ -211,7 +211,7 @@ def main() -> None:
     for axis, points in scans.items():
         for name, fit in fits_of(axis, points).items():
             if fit:
-                print(f"{axis}.{name}.exponent = {fit.exponent:.4f} +- {fit.exponent_error:.4f}")
+                print(f"{axis}.{name}.exponent = {fit.exponent:z.4f} +- {fit.exponent_error:.4f}")
     save(draw(scans, base_of(keys), fraction, runs), args.output, runs, "Crater size")
     if args.csv:
         write_csv(args.csv, table(scans))

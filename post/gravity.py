@@ -65,7 +65,7 @@ def table(run: Run, species: list[Samples], temperature: float) -> dict[str, lis
     g = float(np.abs(run.gravity[1]))
     rows = []
     for name, s in zip(run.names, species, strict=True):
-        speed = slope_estimate(s.square, 8 * temperature / s.mass)
+        speed = slope_estimate(s.square, 10 * temperature / s.mass)
         height = slope_estimate(s.height, 4 * temperature / (s.mass * g))
         rows.append(
             {

@@ -53,7 +53,8 @@ def default_colour(run: Run) -> str:
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
     """Rows and columns for `count` panels of this height over width, wider than high."""
     columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
-    return int(np.ceil(count / columns)), columns
+    rows = int(np.ceil(count / columns))
+    return rows, int(np.ceil(count / rows))
 
 
 def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -> None:

@@ -61,10 +61,11 @@ def equilibrium_frames(run: Run, skip: float, apart: float, first: int = 0) -> l
     return chosen
 
 
-def relaxation(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of each frame."""
-    a2 = [excess_kurtosis(reduced_speeds(run, [k])) for k in range(run.frames)]
-    return run.collisions_per_disk_at(run.time), np.array(a2)
+def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
+    """Collisions per disk and a2 of each frame up to `until` collisions per disk."""
+    tau = run.collisions_per_disk_at(run.time)
+    tau = tau[tau <= until]
+    return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
 
 
 def table(groups: list, samples: list[np.ndarray]) -> dict[str, list]:
@@ -116,19 +117,12 @@ def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str])
 def draw_relaxation(axes: plt.Axes, groups: list) -> None:
     """a2 against collisions per disk, mean and standard error over the runs."""
     for (count, runs), colour in zip(groups, COLOURS, strict=False):
-        tau = np.mean([relaxation(run)[0] for run in runs], axis=0)
-        a2 = estimate([relaxation(run)[1] for run in runs])
-        early = tau <= 16
-        axes.errorbar(
-            tau[early],
-            a2.mean[early],
-            a2.error[early] if len(runs) > 1 else None,
-            color=colour,
-            marker=".",
-            ls="-",
-            lw=1,
-            label=f"N = {count}",
-        )
+        tracks = [relaxation(run) for run in runs]
+        common = min(len(tau) for tau, _ in tracks)
+        tau = np.mean([track[:common] for track, _ in tracks], axis=0)
+        a2 = estimate([track[:common] for _, track in tracks])
+        error = a2.error if len(runs) > 1 else None
+        axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
     axes.plot(
         *RELAXATION.T,
         ls="",

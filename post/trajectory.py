@@ -9,7 +9,17 @@ are the exact path of flight without gravity.  Several runs are drawn side by si
 
 import numpy as np
 
-from drawing import COLOURS, caption, command_line, draw_box, launch, plt, read_all, save
+from drawing import (
+    COLOURS,
+    caption,
+    command_line,
+    disk_collection,
+    draw_box,
+    launch,
+    plt,
+    read_all,
+    save,
+)
 from matplotlib.patches import Circle
 from read_run import Run, RunError
 
@@ -39,16 +49,19 @@ def chosen_disks(run: Run, text: str | None) -> list[int]:
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
-    """Paths, with the disk where it is at the end."""
+    """Paths, with the disk where it is at the end; the others grey."""
     draw_box(axes, run)
+    others = np.full(run.count, "0.85")
+    others[disks] = "none"
+    disk_collection(axes, run, run.position[count - 1], facecolors=others, zorder=0.8)
     for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, count), strict=True)):
         colour = COLOURS[order % len(COLOURS)]
         alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
-        axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=4))
+        axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=0.9))
     axes.set_title(
-        f"{run.path.stem}: {caption([run])}\n"
+        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])},  "
         f"t = {run.time[0]:.4g} (crosses) to {run.time[count - 1]:.4g} (disks)"
     )
 

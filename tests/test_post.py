@@ -147,7 +147,7 @@ def test_reduced_speeds_do_not_know_units(tmp_path, rng):
 def test_relaxation_starts_at_minus_one_half(tmp_path, rng):
     tau, a2 = speeds.relaxation(read_run(gas(tmp_path / "gas.h5", rng)))
     assert a2[0] == pytest.approx(-0.5) and np.abs(a2[1:]).max() < 0.5
-    np.testing.assert_allclose(tau, np.arange(41))
+    np.testing.assert_allclose(tau, np.arange(17))
 
 
 def test_mixture_table(tmp_path, rng):
