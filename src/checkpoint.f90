@@ -15,13 +15,14 @@ module checkpoint
   use initial_state, only: describe_system
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
+  use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use system, only: last_problem, link_file, move_file, remove_file, synchronize
   use version, only: program_version
   implicit none
   private
-  public :: write_checkpoint, read_checkpoint, remove_checkpoint, has_checkpoint
+  public :: write_checkpoint, read_checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
   integer, parameter :: header_length = 64
@@ -32,33 +33,6 @@ module checkpoint
     "run.search = ", "run.queue = ", "stop.wall_clock = ", "output.checkpoint_every = "]
 
 contains
-
-  !> OUT.h5 -> OUT.chk.h5, or with another middle.
-  pure function checkpoint_path(path, middle) result(name)
-    character(len=*), intent(in) :: path, middle
-    character(len=:), allocatable :: name
-    integer :: stem
-    stem = len(path)
-    if (stem > 3) then
-      if (path(stem - 2:) == ".h5") stem = stem - 3
-    end if
-    name = path(:stem)//middle//".h5"
-  end function checkpoint_path
-
-  !> Whether a run with this output can go on.
-  function has_checkpoint(path) result(yes)
-    character(len=*), intent(in) :: path        !! of the output
-    logical :: yes
-    inquire (file=checkpoint_path(path, ".chk"), exist=yes)
-  end function has_checkpoint
-
-  !> Removes what a finished run needs no more.
-  subroutine remove_checkpoint(path)
-    character(len=*), intent(in) :: path        !! of the output
-    call remove_file(checkpoint_path(path, ".chk"))
-    call remove_file(checkpoint_path(path, ".chk_prev"))
-    call remove_file(checkpoint_path(path, ".chk_new"))
-  end subroutine remove_checkpoint
 
   !> Writes the checkpoint of a run; the one before is kept as OUT.chk_prev.h5.
   subroutine write_checkpoint(path, settings, groups, sim, output, error)
@@ -72,8 +46,8 @@ contains
     type(hdf5_file_t) :: file
     type(progress_t) :: progress
     logical :: done
-    new = checkpoint_path(path, ".chk_new")
-    current = checkpoint_path(path, ".chk")
+    new = new_checkpoint_of(path)
+    current = checkpoint_of(path)
     call output%save(progress, error)
     if (allocated(error)) return
     call remove_file(new)
@@ -87,7 +61,7 @@ contains
     if (.not. allocated(error)) then
       call seal(new, done)
       if (done) call synchronize(new, done)
-      if (done) call link_file(current, checkpoint_path(path, ".chk_prev"))
+      if (done) call link_file(current, earlier_checkpoint_of(path))
       if (done) call move_file(new, current, done)
       if (.not. done) call fail(error, exit_files, new//": cannot be written: "//last_problem())
     end if
@@ -105,13 +79,13 @@ contains
     character(len=:), allocatable :: current
     type(hdf5_file_t) :: file
     type(progress_t) :: progress
-    current = checkpoint_path(path, ".chk")
-    if (.not. has_checkpoint(path)) then
-      call fail(error, exit_files, current//": there is no checkpoint to go on from; start without " &
-        //"--resume")
+    current = checkpoint_of(path)
+    if (.not. is_file(current)) then
+      call fail(error, exit_files, current//": there is no checkpoint to go on from" &
+        //trim(merge("; the run is finished   ", "; start without --resume", is_file(path))))
     else if (.not. is_sealed(current)) then
       call fail(error, exit_usage, current//": is damaged, its checksum is wrong; the one before is " &
-        //checkpoint_path(path, ".chk_prev"))
+        //earlier_checkpoint_of(path))
     end if
     if (allocated(error)) return
     call file%open(current, writable=.false.)
@@ -325,11 +299,13 @@ contains
   subroutine seal(path, done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: done
+    character(len=header_length) :: header
     integer :: unit, status
+    header = header_of(path)
     open (newunit=unit, file=path, access="stream", form="unformatted", action="readwrite", &
       status="old", iostat=status)
     if (status == 0) then
-      write (unit, pos=1, iostat=status) header_of(path)
+      write (unit, pos=1, iostat=status) header
       close (unit, iostat=status)
     end if
     done = is_sealed(path)

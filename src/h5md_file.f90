@@ -15,7 +15,7 @@ module h5md_file
 
   integer(int64), parameter :: most_in_chunk = 512      !! samples
   integer(int64), parameter :: chunk_bytes = 65536      !! aim for small frames; large ones are one chunk
-  integer(int64), parameter :: block_bytes = 4194304    !! room made at once for an unknown number of frames
+  integer(int64), parameter :: block_bytes = 1048576    !! room made at once for an unknown number of frames
   integer(int64), parameter :: batch_bytes = 262144     !! samples that wait to be written together
   real(real64), parameter :: longest_wait = 0.05_real64 !! of a sample before it is written [s]
 

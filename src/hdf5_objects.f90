@@ -19,7 +19,7 @@ module hdf5_objects
     h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
   use errors, only: error_t, exit_files, fail
   use kinds, only: int32, int64, real64
-  use system, only: free_bytes
+  use system, only: free_bytes, last_problem
   use texts, only: written
   implicit none
   private
@@ -102,7 +102,7 @@ contains
     if (status >= 0) call h5pcreate_f(h5p_file_create_f, creation, status)
     if (status >= 0 .and. reserved > 0) call h5pset_userblock_f(creation, int(reserved, hsize_t), status)
     if (status >= 0) call h5fcreate_f(path, h5f_acc_excl_f, self%id, status, creation, access)
-    call self%check(status, "be created")
+    call self%check(status, "be created: "//last_problem())
     call h5pclose_f(creation, closed)
     call h5pclose_f(access, closed)
   end subroutine create
@@ -116,7 +116,7 @@ contains
     self%path = path
     call prepare_access(access, status)
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
-    call self%check(status, "be read: it is no HDF5 file, damaged, or closed to you")
+    call self%check(status, "be read: it is damaged, or no HDF5 file, or not for you")
     call h5pclose_f(access, closed)
   end subroutine open_file
 

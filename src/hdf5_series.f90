@@ -40,7 +40,8 @@ module hdf5_series
     procedure :: cut
     procedure :: room
     generic :: put => put_reals, put_integers, put_longs
-    procedure, private :: put_reals, put_integers, put_longs, write_items, place_in_batch
+    procedure, private :: put_reals, put_integers, put_longs
+    procedure, private :: grow, place_in_batch, write_items
   end type series_t
 
 contains
@@ -111,6 +112,7 @@ contains
     integer(int64), intent(in) :: count           !! of items
     real(real64), intent(in), target :: values(*)
     integer(int64) :: n, at
+    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5t_native_double, c_loc(values))
     else
@@ -127,6 +129,7 @@ contains
     integer(int64), intent(in) :: first, count
     integer(int32), intent(in), target :: values(*)
     integer(int64) :: n, at
+    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
     else
@@ -143,6 +146,7 @@ contains
     integer(int64), intent(in) :: first, count
     integer(int64), intent(in), target :: values(*)
     integer(int64) :: n, at
+    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
     else
@@ -184,7 +188,23 @@ contains
     end if
   end subroutine write_waiting
 
-  !> Writes items; when they do not fit the series grows by whole blocks.
+  !> Makes room for items up to number `last`, by whole blocks. When an item is put, not when it is written:
+  !> then the same run gives a file of the same layout, however its batches fell.
+  subroutine grow(self, file, last)
+    class(series_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: last
+    integer :: status
+    if (last <= self%extent .or. allocated(file%trouble)) return
+    do while (self%extent < last)
+      self%extent = self%extent + self%block
+    end do
+    call h5dset_extent_f(self%id, int([int(self%item, int64), self%extent], hsize_t), status)
+    call file%check(status, "write "//self%name)
+    call file%flush()
+  end subroutine grow
+
+  !> Writes items.
   subroutine write_items(self, file, first, count, in_memory, address)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -198,14 +218,8 @@ contains
     counts = [int(self%item, hsize_t), int(count, hsize_t)]
     start = 0
     start(size(start)) = first - 1
-    status = 0
-    if (first + count - 1 > self%extent) then
-      self%extent = first - 1 + max(count, self%block)
-      call h5dset_extent_f(self%id, [counts(:size(self%item)), int(self%extent, hsize_t)], status)
-      if (status >= 0) call file%flush()
-    end if
     file%unsaved = file%unsaved + count*self%room()
-    if (status >= 0) call h5screate_simple_f(size(counts), counts, here, status)
+    call h5screate_simple_f(size(counts), counts, here, status)
     if (status >= 0) call h5dget_space_f(self%id, space, status)
     if (status >= 0) call h5sselect_hyperslab_f(space, h5s_select_set_f, start, counts, status)
     if (status >= 0) call h5dwrite_f(self%id, in_memory, address, status, here, space)

@@ -84,7 +84,10 @@ contains
         call describe_run(h5md%file, settings, groups, input_text, overrides, sim)
         call h5md%make_tracks(frames, samples)
       end associate
-      call self%write_what_is_due(sim, error)
+      call self%write_frame(sim)
+      call self%write_observables(sim)
+      call self%h5md%write_all()
+      call self%h5md%file%failure(error)
       if (allocated(error)) call remove_file(part_of(path))     ! nothing is in it
     end if
     if (allocated(error)) call self%release()
@@ -305,7 +308,7 @@ contains
     call self%h5md%file%failure(error)
     if (allocated(error)) return
     call synchronize(part_of(self%path), done)
-    if (.not. done) call fail(error, exit_files, self%path//".part: cannot be written: " &
+    if (.not. done) call fail(error, exit_files, part_of(self%path)//": cannot be written: " &
       //last_problem())
   end subroutine save
 
@@ -332,7 +335,7 @@ contains
     if (.not. allocated(error)) then
       call synchronize(part_of(self%path), moved)
       if (moved) call move_file(part_of(self%path), self%path, moved)
-      if (.not. moved) call fail(error, exit_files, self%path//".part: cannot be renamed to " &
+      if (.not. moved) call fail(error, exit_files, part_of(self%path)//": cannot be renamed to " &
         //self%path//": "//last_problem())
     end if
     if (.not. allocated(error)) call remove_checkpoints(self%path)

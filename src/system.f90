@@ -292,9 +292,10 @@ contains
     character(len=*), intent(in) :: path
     integer(int64) :: bytes
     integer(c_int64_t) :: fields(16)
-    integer, parameter :: unit_size = 2, available = 5       !! f_frsize, f_bavail
+    integer, parameter :: unit_size = 2, total = 3, available = 5    !! f_frsize, f_blocks, f_bavail
     bytes = huge(bytes)
-    if (c_statvfs(folder_of(path)//c_null_char, fields) == 0) bytes = fields(unit_size)*fields(available)
+    if (c_statvfs(folder_of(path)//c_null_char, fields) /= 0) return
+    if (fields(total) > 0) bytes = fields(unit_size)*fields(available)
   end function free_bytes
 
   !> Why the last call into the system failed, in its own words.
