@@ -3,7 +3,7 @@
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
 Reads the collisions per second that each run notes of itself; the best of equal runs counts.
-Lines: powers of N through the last point of each.
+Lines: powers of N through the middle of each.
 """
 
 import numpy as np
@@ -48,7 +48,11 @@ def draw(measured: dict) -> plt.Figure:
         )
         power = POWERS[search]
         axes.loglog(
-            n, cost[-1] * (n / n[-1]) ** power, color=colour, lw=1, label=f"$\\propto N^{power}$"
+            n,
+            np.median(cost / n**power) * n**power,
+            color=colour,
+            lw=1,
+            label=f"$\\propto N^{power}$",
         )
     axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
     axes.legend()

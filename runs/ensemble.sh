@@ -91,6 +91,7 @@ read_manifest() {
     fi
     rest=${rest//$'\t'/ }
     rest=${rest#"${rest%%[![:blank:]]*}"}
+    rest=${rest%"${rest##*[![:blank:]]}"}
     [[ -z $rest || $rest == '--set '* ]] ||
       die "$1: member '${names[-1]}': '$rest' does not begin with --set"
     overrides+=("$rest")
@@ -108,23 +109,31 @@ check_names() {
   done
 }
 
+# Does member NAME have data, finished or not?
+has_data() {
+  [[ -e $folder/$1.h5 || -e $folder/$1.chk.h5 ]]
+}
+
 # Members of an earlier command on the folder must mean the same: results are told apart by name.
 remember() {
   local line name k
   local -A before=()
-  if [[ -e $folder/input.nml ]]; then
-    cmp -s "$input" "$folder/input.nml" ||
-      die "$folder holds members of another version of $input (see $folder/input.nml):" \
-        "choose another folder, or remove this one"
-  fi
   if [[ -e $folder/manifest.txt ]]; then
     while IFS= read -r line; do before[${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
   fi
+  if [[ -e $folder/input.nml ]] && ! cmp -s "$input" "$folder/input.nml"; then
+    for name in "${!before[@]}"; do
+      ! has_data "$name" ||
+        die "$folder holds members of another version of $input (see $folder/input.nml):" \
+          "choose another folder, or remove this one"
+    done
+  fi
   for k in "${!names[@]}"; do
     name=${names[k]}
-    [[ ${before[$name]-${overrides[k]}} == "${overrides[k]}" ]] ||
+    if [[ ${before[$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
       die "$folder holds a member '$name' with other settings (${before[$name]}):" \
         "choose another folder or name"
+    fi
     before[$name]=${overrides[k]}
   done
   cp -f -- "$input" "$folder/.input.$$" && mv -f -- "$folder/.input.$$" "$folder/input.nml"

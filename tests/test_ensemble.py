@@ -211,6 +211,16 @@ def test_results_of_other_settings_are_not_mixed(lab):
     assert result.returncode == 2 and "another version" in result.stderr
 
 
+def test_settings_of_a_failed_member_may_be_mended(lab):
+    manifest = lab / "members.txt"
+    manifest.write_text("a\t--set outcome.exit=2 \n")
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 1
+    (lab / "gas.nml").write_text("&run\n  title = 'mended'\n/\n")
+    manifest.write_text("a\t--set run.seed=1 \n")
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
+    assert starts(lab)["a"] == ["anew outcome.exit=2|", "anew run.seed=1|"]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
