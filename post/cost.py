@@ -47,13 +47,8 @@ def draw(measured: dict) -> plt.Figure:
             n, cost, ls="", marker=marker, color=colour, label=f"{search}: {LABELS[search]}"
         )
         power = POWERS[search]
-        axes.loglog(
-            n,
-            np.median(cost / n**power) * n**power,
-            color=colour,
-            lw=1,
-            label=f"$\\propto N^{power}$",
-        )
+        line = np.median(cost / n**power) * n**power
+        axes.loglog(n, line, color=colour, lw=1, label=f"$\\propto N^{power}$")
     axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
     axes.legend()
     return figure
