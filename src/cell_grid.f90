@@ -3,43 +3,37 @@
 !> The cost of a prediction does not depend on the number of disks.
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t, next_obstacle, obstacle_t, side_time
+  use big_disks, only: big_disks_t, largest_small_radius
+  use box_geometry, only: box_t, next_obstacle, next_side, obstacle_t, side_time
+  use cells, only: cells_t, gather, list_capacity
   use disks, only: disk_t
-  use free_flight, only: time_to_line
+  use free_flight, only: time_to_circle, time_to_line
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: cell_grid_t
 
-  integer(int32), parameter :: cell_capacity = 3
-  integer(int32), parameter :: count_slot = cell_capacity + 1
-  integer(int32), parameter :: listed = cell_capacity        !! mask of the disks in slots
-  integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
-  integer(int32), parameter :: list_capacity = 64
   real(real64), parameter :: no_shift(2) = 0.0_real64
   real(real64), parameter :: disks_per_cell = 0.5_real64    !! wanted when dilute
   real(real64), parameter :: slowest = 1/never              !! a disk slower than this is at rest
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
-  !> The disks in a cell: copied as a whole, 16 bytes. The last slot counts them: those in the slots in its
-  !> two lowest bits and, if the cell is crowded, those chained behind the last one in the bits above.
-  type :: cell_t
-    integer(int32) :: slot(count_slot) = 0
-  end type cell_t
+  integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
 
   type, extends(neighbour_search_t) :: cell_grid_t
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
-    integer(int32) :: stride = 0                   !! from row to row; the grid has a ring of empty cells
+    integer(int32) :: stride = 0                   !! from row to row
+    real(real64) :: small = 0.0_real64             !! largest radius the cells are made for [length]
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
     real(real64) :: side(0:1, 2) = 0.0_real64      !! of the box, lower and upper by axis [length]
     real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
     logical :: periodic = .false.                  !! along one axis at least
     logical :: falling = .false.                   !! disks fly on parabolas
     logical :: obstructed = .false.                !! there are obstacles
-    type(cell_t), allocatable :: cell(:)           !! (0:)
-    integer(int32), allocatable :: next(:)         !! (disks) chain of a crowded cell
+    type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
+    type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
     integer(int32), allocatable :: obstacle_list(:)    !! obstacles that reach into the cell, ascending
   contains
@@ -54,9 +48,13 @@ contains
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: reach, width, x(2)
+    real(real64) :: small, reach, width, x(2)
     integer(int32) :: i, n_cells
-    reach = 2*maxval(sim%disk%radius)*(1 + spare_width)
+    logical :: as_before
+    small = largest_small_radius(sim%disk)
+    as_before = allocated(self%obstacle_list) .and. small == self%small
+    self%small = small
+    reach = 2*small*(1 + spare_width)
     width = max(reach, sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()))
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%stride = self%n(1) + 2
@@ -67,22 +65,17 @@ contains
     self%periodic = any(sim%box%periodic)
     self%falling = sim%box%falling()
     n_cells = self%stride*(self%n(2) + 2)
-    if (allocated(self%cell)) then
-      if (size(self%cell) /= n_cells) deallocate (self%cell)
-    end if
-    if (.not. allocated(self%cell)) allocate (self%cell(0:n_cells - 1))
-    if (.not. allocated(self%next)) allocate (self%next(sim%n_disks()))
-    do i = 0, n_cells - 1
-      self%cell(i)%slot = 0
-    end do
+    call self%cells%empty(n_cells, sim%n_disks())
     do i = 1, sim%n_disks()
+      if (sim%disk(i)%radius > small) cycle
       x = (sim%position(i) - sim%box%lower)/self%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      call insert(self, cell_number(self, sim%tag(i)%cell), i)
+      call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
     end do
     self%obstructed = .false.
     if (allocated(sim%box%obstacle)) self%obstructed = size(sim%box%obstacle) > 0
-    if (self%obstructed) call list_obstacles(self, sim%box, maxval(sim%disk%radius))
+    if (self%obstructed .and. .not. as_before) call list_obstacles(self, sim%box, small)
+    call self%big%start(sim, small, self%n, self%width)
   end subroutine build
 
   !> Which obstacles a disk of at most `radius` can touch with its centre in each cell.
@@ -100,10 +93,10 @@ contains
         allocate (self%obstacle_list(n))
       else
         if (allocated(self%obstacle_start)) deallocate (self%obstacle_start)
-        allocate (self%obstacle_start(0:size(self%cell)))
+        allocate (self%obstacle_start(0:size(self%cells%cell)))
       end if
       n = 0
-      do c = 0, size(self%cell, kind=int32) - 1
+      do c = 0, size(self%cells%cell, kind=int32) - 1
         self%obstacle_start(c) = n + 1
         ix = modulo(c, self%stride)
         iy = c/self%stride
@@ -113,7 +106,7 @@ contains
           if (pass == 2) self%obstacle_list(n) = m
         end do
       end do
-      self%obstacle_start(size(self%cell)) = n + 1
+      self%obstacle_start(size(self%cells%cell)) = n + 1
     end do
   end subroutine list_obstacles
 
@@ -146,55 +139,6 @@ contains
     c = cell(1) + self%stride*cell(2)
   end function cell_number
 
-  !> Puts disk i into cell c.
-  pure subroutine insert(self, c, i)
-    class(cell_grid_t), intent(inout) :: self
-    integer(int32), intent(in) :: c, i
-    integer(int32) :: n
-    associate (slot => self%cell(c)%slot)
-      n = slot(count_slot)
-      if (n < cell_capacity) then
-        self%next(i) = 0
-        slot(n + 1) = i
-        slot(count_slot) = n + 1
-      else                                         ! becomes the head of the chain
-        self%next(i) = slot(cell_capacity)
-        slot(cell_capacity) = i
-        slot(count_slot) = n + chained
-      end if
-    end associate
-  end subroutine insert
-
-  !> Takes disk i out of cell c.
-  pure subroutine remove(self, c, i)
-    class(cell_grid_t), intent(inout) :: self
-    integer(int32), intent(in) :: c, i
-    integer(int32) :: n, k, link
-    associate (slot => self%cell(c)%slot)
-      n = slot(count_slot)
-      do k = 1, iand(n, listed)
-        if (slot(k) == i) exit
-      end do
-      if (n <= listed) then
-        slot(k) = slot(n)
-        slot(count_slot) = n - 1
-        return
-      end if
-      link = slot(cell_capacity)
-      if (k <= cell_capacity) then                 ! the head of the chain takes the free place
-        slot(k) = link
-        slot(cell_capacity) = self%next(link)
-        self%next(link) = 0
-      else
-        do while (self%next(link) /= i)
-          link = self%next(link)
-        end do
-        self%next(link) = self%next(i)
-      end if
-      slot(count_slot) = n - chained
-    end associate
-  end subroutine remove
-
   !> Moves disk i into the cell beyond the face; over a periodic side into the first one behind it.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
@@ -202,14 +146,20 @@ contains
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
     integer(int32) :: face, axis, there
+    if (self%big%count > 0) then
+      if (sim%disk(i)%radius > self%big%small) then
+        call self%big%register(sim, self%big%number_of(i))
+        return
+      end if
+    end if
     face = -merge(code - first_crossing, code, code <= first_crossing)
     axis = 1 + face/2
-    call remove(self, cell_number(self, sim%tag(i)%cell), i)
+    call self%cells%remove(cell_number(self, sim%tag(i)%cell), i)
     there = sim%tag(i)%cell(axis) + 2*modulo(face, 2) - 1
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
-    call insert(self, cell_number(self, sim%tag(i)%cell), i)
+    call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
   end subroutine cross
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -220,6 +170,12 @@ contains
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
     logical :: crowded
+    if (self%big%count > 0) then
+      if (sim%disk(i)%radius > self%big%small) then
+        call predict_big(self, sim, i)
+        return
+      end if
+    end if
     call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
     c = cell_number(self, sim%tag(i)%cell)
     if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
@@ -227,15 +183,67 @@ contains
     if (at_periodic_edge(self, sim%box, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else
-      call gather(self%cell, c, self%stride, list, n, crowded)
+      call gather(self%cells%cell, c, self%stride, list, n, crowded)
       call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
         no_shift, sim%box%gravity, t, code)
       if (crowded) call scan_crowd(self, sim%disk, i, c, sim%box%gravity, t, code)
     end if
+    if (self%big%count > 0) call scan_big_ones(self, sim, i, t, code)
     sim%disk(i)%event_time = t
     sim%disk(i)%partner = code
     sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
   end subroutine predict
+
+  !> Contacts of a small disk with the big ones that can be near its cell.
+  subroutine scan_big_ones(self, sim, i, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    integer(int32) :: e
+    e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
+    do while (e > 0)
+      associate (entry => self%big%entry(e))
+        call earliest_contact(sim%disk, i, 1, self%big%disk(entry%number:entry%number), .false., .true., &
+          entry%image*sim%box%edges(), sim%box%gravity, t, code)
+        e = entry%next
+      end associate
+    end do
+  end subroutine scan_big_ones
+
+  !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
+  !> the cells along its rim.
+  subroutine predict_big(self, sim, i)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64) :: t, t_margin
+    integer(int32) :: code, number, ix, iy, m
+    number = self%big%number_of(i)
+    call next_side(sim%box, sim%disk(i), t, code)
+    if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
+      [(m, m=1, size(sim%box%obstacle, kind=int32))], t, code)
+    t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
+      sim%box%gravity, self%big%margin, inside=.true.)
+    code = merge(leaves_margin, code, t_margin < t)
+    t = min(t, t_margin)
+    do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
+      do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk, .false., .true., &
+          [ix, iy]*sim%box%edges(), sim%box%gravity, t, code)
+      end do
+    end do
+    do m = 1, size(self%big%ring(number)%at, kind=int32)
+      associate (place => self%big%ring(number)%at(m))
+        call scan_cell(self, sim, i, place%cell(1) + self%stride*place%cell(2), &
+          -place%image*sim%box%edges(), t, code)
+      end associate
+    end do
+    sim%disk(i)%event_time = t
+    sim%disk(i)%partner = code
+    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
+  end subroutine predict_big
 
   !> When and how the disk leaves its cell, or meets a side within it.
   pure subroutine next_face(self, box, disk, cell, now, t, code)
@@ -328,33 +336,6 @@ contains
     if (self%periodic) yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
-  !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they
-  !> hold; of a crowded one, only those in its slots.
-  pure subroutine gather(cell, c, stride, list, n, crowded)
-    type(cell_t), intent(in) :: cell(0:*)
-    integer(int32), intent(in) :: c, stride
-    integer(int32), intent(out) :: list(list_capacity)
-    integer(int32), intent(out) :: n               !! number of disks listed
-    logical, intent(out) :: crowded                !! one of the cells has a chain
-    integer(int32) :: k, row, m, counts
-    m = 0
-    counts = 0
-    k = c - stride
-    do row = 1, 3
-      list(m + 1:m + count_slot) = cell(k - 1)%slot
-      m = m + iand(cell(k - 1)%slot(count_slot), listed)
-      list(m + 1:m + count_slot) = cell(k)%slot
-      m = m + iand(cell(k)%slot(count_slot), listed)
-      list(m + 1:m + count_slot) = cell(k + 1)%slot
-      m = m + iand(cell(k + 1)%slot(count_slot), listed)
-      counts = ior(counts, ior(cell(k - 1)%slot(count_slot), &
-        ior(cell(k)%slot(count_slot), cell(k + 1)%slot(count_slot))))
-      k = k + stride
-    end do
-    n = m
-    crowded = counts > listed
-  end subroutine gather
-
   !> Contacts with the chained disks of the nine cells around c.
   pure subroutine scan_crowd(self, disk, i, c, gravity, t, code)
     class(cell_grid_t), intent(in) :: self
@@ -380,14 +361,13 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: list(list_capacity), n, j
-    if (self%cell(c)%slot(count_slot) <= listed) return
-    j = self%next(self%cell(c)%slot(cell_capacity))
+    j = self%cells%chain(c)
     do while (j > 0)
       n = 0
       do while (j > 0 .and. n < list_capacity)
         n = n + 1
         list(n) = j
-        j = self%next(j)
+        j = self%cells%next(j)
       end do
       call earliest_contact(disk, i, n, list, .false., .true., shift, gravity, t, code)
     end do
@@ -401,7 +381,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    integer(int32) :: dx, dy, c, there(2), image(2)
+    integer(int32) :: dx, dy, there(2), image(2)
     real(real64) :: shift(2)
     do dy = -1, 1
       do dx = -1, 1
@@ -409,12 +389,22 @@ contains
         image = merge(floor(real(there - 1)/self%n), 0, sim%box%periodic)
         there = there - image*self%n
         shift = image*sim%box%edges()
-        c = there(1) + self%stride*there(2)
-        call earliest_contact(sim%disk, i, iand(self%cell(c)%slot(count_slot), listed), &
-          self%cell(c)%slot, .false., .true., shift, sim%box%gravity, t, code)
-        call scan_chain(self, sim%disk, i, c, shift, sim%box%gravity, t, code)
+        call scan_cell(self, sim, i, there(1) + self%stride*there(2), shift, t, code)
       end do
     end do
   end subroutine scan_around_edge
+
+  !> Contacts with the disks of one cell, seen `shift` away.
+  subroutine scan_cell(self, sim, i, c, shift, t, code)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: shift(2)           !! [length]
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    call earliest_contact(sim%disk, i, self%cells%in_slots(c), self%cells%cell(c)%slot, .false., &
+      .true., shift, sim%box%gravity, t, code)
+    call scan_chain(self, sim%disk, i, c, shift, sim%box%gravity, t, code)
+  end subroutine scan_cell
 
 end module cell_grid
