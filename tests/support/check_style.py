@@ -97,7 +97,7 @@ def path_problems(root: Path) -> Iterator[Problem]:
     for name in subprocess.check_output(command, cwd=root, text=True).splitlines():
         try:
             lines = (root / name).read_text().splitlines()
-        except (UnicodeDecodeError, FileNotFoundError):
+        except (UnicodeDecodeError, OSError):
             continue
         for number, line in enumerate(lines, start=1):
             if MACHINE_PATH.search(line) and not line.startswith("MACHINE_PATH"):
