@@ -154,6 +154,7 @@ contains
     integer(int32) :: i
     call evolution%start(sim)
     limits%collisions = sim%collisions + (length*sim%n_disks() + 1)/2
+    limits%events = sim%events + 4*length*sim%n_disks() ! one may rattle in a hole between obstacles
     limits%time = sim%time() + maxval(sim%box%edges())  ! few disks may never collide
     call evolution%advance(sim, limits, error)
     do i = 1, sim%n_disks()
