@@ -222,6 +222,8 @@ def read_values(path: Path, name: str, chosen: int | slice) -> np.ndarray:
 def check_format(path: Path, file: h5py.File) -> None:
     """Refuse a file of another kind or of a later version."""
     version = file["h5md"].attrs.get("version") if "h5md" in file else None
+    if path.name.endswith(".chk.h5"):
+        raise RunError(f"{path}: a checkpoint, resume the run or read its .part file")
     if version is None or DISKS not in file:
         raise RunError(f"{path}: an HDF5 file, but not of a Ricochet run")
     if version[0] != 1:

@@ -272,6 +272,7 @@ summarise() {
 
 # --- command line ---
 
+trap 'exit 75' TERM INT # until members run there is nothing to end
 input='' folder='' seeds='' manifest='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
 common='' scans=()
 while (($#)); do

@@ -141,6 +141,8 @@ def bad_files(folder):
     with h5py.File(folder / "partial.h5", "r+") as file:
         del file["particles/disks/velocity"], file["particles/disks/mass"]
     (folder / "unfinished.h5.part").touch()
+    with h5py.File(folder / "gas.chk.h5", "w") as file:
+        file["clock"] = 1.0
     return {
         "empty.h5": "empty",
         "text.h5": "not an HDF5",
@@ -149,6 +151,7 @@ def bad_files(folder):
         "future.h5": "version 2.0",
         "partial.h5": "mass",
         "missing.h5": "no such file",
+        "gas.chk.h5": "a checkpoint",
         "unfinished.h5": "unfinished run",
         "": "folder",
     }
