@@ -49,6 +49,7 @@ contains
     real(real64), intent(in) :: distance      !! along the normal; negative: the line lies behind [length]
     real(real64), intent(in) :: speed         !! along the normal [length/time]
     real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
+    real(real64), parameter :: slowest = 1/never  !! slower is at rest; the time would overflow
     real(real64) :: s, root
     s = never
     if (acceleration > 0) then
@@ -58,7 +59,7 @@ contains
       else
         s = (root - speed)/acceleration
       end if
-    else if (speed > 0) then
+    else if (speed > slowest) then
       if (acceleration < 0) then
         root = speed**2 + 2*acceleration*distance
         if (root >= 0) s = 2*distance/(speed + sqrt(root))
