@@ -22,7 +22,8 @@ module test_systems
     "walls gravity mixture", "walls gravity pegs inelastic contact", "walls round mixture", &
     "walls round pegs gravity smooth", "walls pegs inelastic", "channel", "channel gravity pegs mixture", &
     "channel inelastic contact", "periodic", "periodic few", "periodic dense mixture", &
-    "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture"]
+    "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture", &
+    "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact"]
 
 contains
 
@@ -52,7 +53,7 @@ contains
 
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` to bounce off and a
-  !> `round` container; `mixture` of two species; a `giant` among the small; a `bed` at rest that the first
+  !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the first
   !> disk hits; `inelastic`; `smooth` walls; `contact` time; `few`, `dilute` or `dense`.
   function system(words, seed) result(sim)
     character(len=*), intent(in) :: words
@@ -85,7 +86,7 @@ contains
     end if
     sim%law%smooth_walls = has("smooth")
     if (has("contact")) sim%law%contact_time = 0.01_dp
-    call fill_lattice(sim, spacing, has("giant"), stream)
+    call fill_lattice(sim, spacing, count([has("giant"), has("giants")]), stream)
     if (has("bed")) call lay_to_rest(sim%disk(2:))
     sim%start_energy = sim%kinetic_energy()
 
@@ -112,25 +113,26 @@ contains
 
   !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
   !> site, with velocity components uniform in (-1,1).
-  subroutine fill_lattice(sim, spacing, giant, stream)
+  subroutine fill_lattice(sim, spacing, giants, stream)
     type(simulation_t), intent(inout) :: sim
     real(dp), intent(in) :: spacing
-    logical, intent(in) :: giant
+    integer, intent(in) :: giants                  !! 0, 1 or 2
     type(random_stream_t), intent(inout) :: stream
     type(disk_t) :: disk
     type(tag_t) :: tag
     real(dp) :: jitter(2), site(2), room
     integer(int32) :: ix, iy, n(2)
+    integer :: k
     allocate (sim%disk(0), sim%tag(0))
-    if (giant) then
-      disk%x = [0.1_dp, 1.7_dp]
+    do k = 1, giants
+      disk%x = merge([0.1_dp, 1.7_dp], [1.3_dp, 1.2_dp], k == 1)
       disk%v = [0.7_dp, -1.5_dp]
       disk%radius = sim%species(3)%radius
-      sim%disk = [disk]
-      tag%id = 1
+      tag%id = k
       tag%species = 3
-      sim%tag = [tag]
-    end if
+      sim%disk = [sim%disk, disk]
+      sim%tag = [sim%tag, tag]
+    end do
     n = nint(sim%box%edges()/spacing, int32)
     do iy = 1, n(2)
       do ix = 1, n(1)
