@@ -25,7 +25,6 @@ module cell_grid
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
     integer(int32) :: stride = 0                   !! from row to row
-    real(real64) :: small = 0.0_real64             !! largest radius the cells are made for [length]
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
     real(real64) :: side(0:1, 2) = 0.0_real64      !! of the box, lower and upper by axis [length]
     real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
@@ -36,6 +35,8 @@ module cell_grid
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
     integer(int32), allocatable :: obstacle_list(:)    !! obstacles that reach into the cell, ascending
+    type(obstacle_t), allocatable :: listed(:)     !! what these lists were made for,
+    real(real64) :: listed_radius = 0.0_real64     !! and for disks of which size [length]
   contains
     procedure :: build
     procedure :: predict
@@ -50,10 +51,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     real(real64) :: small, reach, width, x(2)
     integer(int32) :: i, n_cells
-    logical :: as_before
     small = largest_small_radius(sim%disk)
-    as_before = allocated(self%obstacle_list) .and. small == self%small
-    self%small = small
     reach = 2*small*(1 + spare_width)
     width = max(reach, sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()))
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
@@ -74,9 +72,29 @@ contains
     end do
     self%obstructed = .false.
     if (allocated(sim%box%obstacle)) self%obstructed = size(sim%box%obstacle) > 0
-    if (self%obstructed .and. .not. as_before) call list_obstacles(self, sim%box, small)
+    if (self%obstructed .and. .not. lists_hold(self, sim%box, small)) &
+      call list_obstacles(self, sim%box, small)
     call self%big%start(sim, small, self%n, self%width)
   end subroutine build
+
+  !> Whether the lists of obstacles are up to date.
+  pure function lists_hold(self, box, radius) result(yes)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius
+    logical :: yes
+    integer :: m
+    yes = .false.
+    if (.not. allocated(self%listed)) return
+    if (size(self%listed) /= size(box%obstacle) .or. self%listed_radius /= radius &
+      .or. size(self%obstacle_start) /= size(self%cells%cell) + 1) return
+    do m = 1, size(box%obstacle)
+      associate (a => self%listed(m), b => box%obstacle(m))
+        if (any(a%centre /= b%centre) .or. a%radius /= b%radius .or. (a%inside .neqv. b%inside)) return
+      end associate
+    end do
+    yes = .true.
+  end function lists_hold
 
   !> Which obstacles a disk of at most `radius` can touch with its centre in each cell.
   subroutine list_obstacles(self, box, radius)
@@ -85,6 +103,8 @@ contains
     real(real64), intent(in) :: radius
     integer(int32) :: ix, iy, m, c, n
     integer :: pass
+    self%listed = box%obstacle
+    self%listed_radius = radius
     if (allocated(self%obstacle_list)) deallocate (self%obstacle_list)
     allocate (self%obstacle_list(0))
     do pass = 1, 2                                 ! count, then fill
