@@ -80,7 +80,11 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
     top.legend()
     error = np.degrees(angle - scattering_angle(s, ratio, restitution))
     bottom.semilogy(s, np.maximum(np.abs(error), 1e-16), ls="", marker=".", color=COLOURS[0])
-    bottom.set(xlabel="impact parameter $b/R_{12}$", ylabel="|error| (degrees)", ylim=(1e-17, 1e-8))
+    bottom.set(
+        xlabel="impact parameter $b/R_{12}$",
+        ylabel="|error| (degrees)\n(0 drawn at $10^{-16}$)",
+        ylim=(1e-17, 1e-8),
+    )
     return figure
 
 
