@@ -314,8 +314,8 @@ def mdanalysis_universe(run: Run):
     """The run as an MDAnalysis Universe (needs the package MDAnalysis).
 
     MDAnalysis knows three dimensions only: z = 0 is added.  Lengths and times keep their
-    numbers; the time between frames is their mean.  Selections such as `u.select_atoms("type projectile")` go by species; the
-    analysis classes of MDAnalysis then work on `u.trajectory`.
+    numbers; the time between frames is their mean.  Selections go by species, such as
+    `u.select_atoms("type projectile")`; the analysis classes work on `u.trajectory`.
     """
     import MDAnalysis
 
