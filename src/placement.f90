@@ -9,6 +9,7 @@ module placement
   use dense_growth, only: grow_disks
   use disks, only: disk_t, species_t
   use errors, only: error_t, exit_usage, fail
+  use last_frame, only: read_last_frame
   use packing, only: packing_t
   use position_file, only: read_positions
   use random_insertion, only: insert_at_random
@@ -86,7 +87,11 @@ contains
       call lattice_positions(species(s), packing%box, x, error)
     case default                                            ! 'file'
       columns = merge(4, 2, species(s)%velocities == 'file')
-      call read_positions(species(s)%file, species(s)%count, columns, x, error)
+      if (is_run(species(s)%file)) then
+        call read_last_frame(species(s)%file, species(s)%name, species(s)%count, columns, x, error)
+      else
+        call read_positions(species(s)%file, species(s)%count, columns, x, error)
+      end if
       if (allocated(error)) return
       do k = 1, merge(species(s)%count, 0, columns == 4)
         disk(offset(species, s) + k)%v = x(3:4, k)
@@ -94,6 +99,13 @@ contains
     end select
     if (.not. allocated(error)) call add_checked(packing, species, s, x, error)
   end subroutine place_fixed
+
+  !> Whether the file is the output of a run, finished or not.
+  pure function is_run(path) result(yes)
+    character(len=*), intent(in) :: path
+    logical :: yes
+    yes = index(path//'|', '.h5|') > 0 .or. index(path//'|', '.h5.part|') > 0
+  end function is_run
 
   !> Adds a species at known places, if they are free and in its region.
   subroutine add_checked(packing, species, s, x, error)
