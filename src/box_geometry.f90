@@ -7,7 +7,7 @@ module box_geometry
   implicit none
   private
   public :: box_t, obstacle_t, first_obstacle, n_sides
-  public :: side_time, obstacle_time, next_side, next_obstacle, obstacle_reach
+  public :: side_time, obstacle_time, next_side, next_obstacle, obstacle_reach, from_obstacle, nearest_image
 
   integer(int32), parameter :: n_sides = 4
   !> What a disk meets, as one number: > 0 a disk; 0, -1, -2, -3 the left, right, bottom and top side;
@@ -95,17 +95,43 @@ contains
     rho = merge(obstacle%radius - radius, obstacle%radius + radius, obstacle%inside)
   end function obstacle_reach
 
-  !> When the disk meets the m-th obstacle.
+  !> When the disk meets the m-th obstacle. A disk stays in the box until it passes a periodic side, so the
+  !> images of the obstacle one period away are enough; a container has none, it holds its disks.
   pure function obstacle_time(box, disk, m) result(t)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer, intent(in) :: m
     real(real64) :: t
+    integer :: image_x, image_y, reach(2)
+    t = never
     associate (o => box%obstacle(m))
-      t = disk%clock + time_to_circle(disk%x - o%centre, disk%v, box%gravity, &
-        obstacle_reach(o, disk%radius), o%inside)
+      reach = merge(1, 0, box%periodic .and. .not. o%inside)
+      do image_y = -reach(2), reach(2)
+        do image_x = -reach(1), reach(1)
+          t = min(t, disk%clock + time_to_circle(disk%x - (o%centre + [image_x, image_y]*box%edges()), &
+            disk%v, box%gravity, obstacle_reach(o, disk%radius), o%inside))
+        end do
+      end do
     end associate
   end function obstacle_time
+
+  !> From the m-th obstacle's centre, or its nearest image's, to x.
+  pure function from_obstacle(box, m, x) result(d)
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: m
+    real(real64), intent(in) :: x(2)            !! [length]
+    real(real64) :: d(2)
+    d = x - box%obstacle(m)%centre
+    if (any(box%periodic) .and. .not. box%obstacle(m)%inside) d = d - nearest_image(box, d)
+  end function from_obstacle
+
+  !> The whole periods in a separation: dx less these leads to the nearest image.
+  pure function nearest_image(box, dx) result(shift)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: dx(2)           !! [length]
+    real(real64) :: shift(2)
+    shift = merge(box%edges()*anint(dx/box%edges()), 0.0_real64, box%periodic)
+  end function nearest_image
 
   !> The earlier of an event known already and the contacts with the obstacles listed.
   pure subroutine next_obstacle(box, disk, list, t, code)

@@ -4,7 +4,7 @@
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius
-  use box_geometry, only: box_t, next_obstacle, next_side, obstacle_t, side_time
+  use box_geometry, only: box_t, nearest_image, next_obstacle, next_side, obstacle_t, side_time
   use cells, only: cells_t, gather, list_capacity
   use disks, only: disk_t
   use free_flight, only: time_to_circle, time_to_line
@@ -140,6 +140,7 @@ contains
     logical :: yes
     real(real64) :: middle(2), half(2), gap(2), far(2), spare
     middle = box%lower + ([ix, iy] - 0.5_real64)*self%width - obstacle%centre
+    if (.not. obstacle%inside) middle = middle - nearest_image(box, middle)
     half = 0.5_real64*self%width
     spare = 1 + spare_width
     gap = max(abs(middle) - half*spare, 0.0_real64)

@@ -2,7 +2,7 @@
 !> meet. Both dynamics share it, with all counts and sums.
 module encounters
   use kinds, only: int32, real64
-  use box_geometry, only: box_t, first_obstacle
+  use box_geometry, only: box_t, first_obstacle, from_obstacle, nearest_image
   use collisions, only: pair_impulse, wall_rebound
   use disks, only: disk_t
   use event_log, only: event_log_t
@@ -10,7 +10,7 @@ module encounters
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: collide, collide_pair, collide_wall, nearest_image, pass_side, passes, wall_normal
+  public :: collide, collide_pair, collide_wall, pass_side, passes, wall_normal
 
 contains
 
@@ -83,7 +83,7 @@ contains
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
-    if (any(sim%box%periodic)) dx = dx - nearest_image(dx, sim%box%edges(), sim%box%periodic)
+    if (any(sim%box%periodic)) dx = dx - nearest_image(sim%box, dx)
     dv = sim%disk(j)%v - sim%disk(i)%v
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
@@ -99,14 +99,6 @@ contains
     sim%virial = sim%virial - q*distance2
     sim%dissipated = sim%dissipated + 0.5_real64*(1 - restitution)*q*b
   end subroutine collide_pair
-
-  !> The whole periods in a separation: dx less these is the nearest image.
-  pure function nearest_image(dx, edges, periodic) result(shift)
-    real(real64), intent(in) :: dx(2), edges(2)
-    logical, intent(in) :: periodic(2)
-    real(real64) :: shift(2)
-    shift = merge(edges*anint(dx/edges), 0.0_real64, periodic)
-  end function nearest_image
 
   !> Whether the code names a periodic side.
   pure function passes(sim, code) result(yes)
@@ -166,14 +158,14 @@ contains
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: x(2)
     real(real64) :: normal(2)
+    integer :: m
     normal = 0
     if (code > first_obstacle) then
       normal(1 - code/2) = 1 - 2*modulo(code, 2)
     else
-      associate (o => box%obstacle(first_obstacle + 1 - code))
-        normal = x - o%centre
-        normal = merge(-normal, normal, o%inside)/norm2(normal)
-      end associate
+      m = first_obstacle + 1 - code
+      normal = from_obstacle(box, m, x)
+      normal = merge(-normal, normal, box%obstacle(m)%inside)/norm2(normal)
     end if
   end function wall_normal
 

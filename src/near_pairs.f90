@@ -3,7 +3,7 @@
 !> that one list of them serves many steps (Verlet, Phys. Rev. 159, 98 (1967)).
 module near_pairs
   use kinds, only: int32, never, pi, real64
-  use box_geometry, only: box_t, first_obstacle, obstacle_reach, obstacle_t
+  use box_geometry, only: box_t, first_obstacle, from_obstacle, obstacle_reach
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -119,8 +119,7 @@ contains
         if (p%partner > 0) then
           overlap = distance2(x(:, p%i), x(:, p%partner), period) < p%sigma*p%sigma
         else
-          overlap = gap(sim%box%obstacle(first_obstacle + 1 - p%partner), x(:, p%i), &
-            sim%disk(p%i)%radius) < 0
+          overlap = gap(sim%box, first_obstacle + 1 - p%partner, x(:, p%i), sim%disk(p%i)%radius) < 0
         end if
         if (overlap) call append(contacts, p)
       end associate
@@ -137,20 +136,20 @@ contains
     if (.not. allocated(sim%box%obstacle)) return
     do m = 1, size(sim%box%obstacle, kind=int32)
       do i = 1, sim%n_disks()
-        if (gap(sim%box%obstacle(m), x(:, i), sim%disk(i)%radius) < length) &
+        if (gap(sim%box, m, x(:, i), sim%disk(i)%radius) < length) &
           call append(list, pair_t(i, first_obstacle + 1 - m))
       end do
     end do
   end subroutine add_obstacles
 
-  !> From the obstacle to the rim of a disk at x; negative if they overlap.
-  pure function gap(obstacle, x, radius) result(length)
-    type(obstacle_t), intent(in) :: obstacle
+  !> From the m-th obstacle to the rim of a disk at x; negative if they overlap.
+  pure function gap(box, m, x, radius) result(length)
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: m
     real(real64), intent(in) :: x(2), radius   !! [length]
     real(real64) :: length
-    length = sqrt((x(1) - obstacle%centre(1))**2 + (x(2) - obstacle%centre(2))**2) &
-      - obstacle_reach(obstacle, radius)
-    if (obstacle%inside) length = -length
+    length = norm2(from_obstacle(box, int(m), x)) - obstacle_reach(box%obstacle(m), radius)
+    if (box%obstacle(m)%inside) length = -length
   end function gap
 
   !> Squared distance of the nearest images of two points in the box.

@@ -71,8 +71,7 @@ contains
     integer(int32) :: k, j
     xi = disk(i)%x(1); yi = disk(i)%x(2)
     ui = disk(i)%v(1); vi = disk(i)%v(2)
-    clock = disk(i)%clock
-    ri = disk(i)%radius
+    clock = disk(i)%clock; ri = disk(i)%radius
     gate = above(t)
     si = 0
     do k = 1, n
@@ -105,14 +104,12 @@ contains
       in_time = 2*(late - gate)*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then
-        t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
-        if (t_j <= t .and. b < 0) then
-          if (t_j < t .or. before(i, j, partner)) then
-            t = t_j
-            partner = j
-            gate = above(t)
-          end if
-        end if
+        t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
+        if (t_j > t .or. b >= 0) cycle
+        if (t_j == t .and. .not. before(i, j, partner)) cycle
+        t = t_j
+        partner = j
+        gate = above(t)
       end if
     end do
   end subroutine earliest_contact

@@ -5,9 +5,9 @@
 !> As there, a disk's own state changes only at its own collisions: no error adds up from step to step.
 module time_stepped
   use kinds, only: int32, int64, never, real64
-  use box_geometry, only: box_t, n_sides
+  use box_geometry, only: box_t, n_sides, nearest_image
   use disks, only: disk_t
-  use encounters, only: collide, nearest_image, pass_side, passes, wall_normal
+  use encounters, only: collide, pass_side, passes, wall_normal
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
@@ -214,7 +214,7 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64) :: dx(2)
     dx = self%x(:, j) - self%x(:, i)
-    dx = dx - nearest_image(dx, sim%box%edges(), sim%box%periodic)
+    dx = dx - nearest_image(sim%box, dx)
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) &
       call collide(sim, i, j, sim%now, self%log)
   end subroutine meet_disk
