@@ -57,7 +57,7 @@ contains
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
       if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
-        .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()) return
+        .or. sim%dissipated >= limits%dissipated .or. is_half_full(self%log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
@@ -127,7 +127,15 @@ contains
     end do
   end subroutine take_step
 
-  !> A step is never cut in two: the log has to take all its collisions.
+  !> A step is never cut in two: there must be room for all its collisions. So the log is to be emptied when
+  !> it is half full, and grows only if one step needs more than the other half.
+  pure function is_half_full(log) result(yes)
+    type(event_log_t), intent(in) :: log
+    logical :: yes
+    yes = .false.
+    if (log%is_on()) yes = 2*log%n >= size(log%time)
+  end function is_half_full
+
   pure subroutine make_room(log, n)
     type(event_log_t), intent(inout) :: log
     integer, intent(in) :: n                        !! collisions that may come
