@@ -15,7 +15,7 @@ module checkpoint
   use initial_state, only: describe_system
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
-  use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of
+  use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of, part_of
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use system, only: last_problem, link_file, move_file, remove_file, synchronize
@@ -79,10 +79,15 @@ contains
     character(len=:), allocatable :: current
     type(hdf5_file_t) :: file
     type(progress_t) :: progress
+    logical :: finished
     current = checkpoint_of(path)
-    if (.not. is_file(current)) then
-      call fail(error, exit_files, current//": there is no checkpoint to go on from" &
-        //trim(merge("; the run is finished   ", "; start without --resume", is_file(path))))
+    finished = is_file(path)
+    if (finished) finished = .not. is_file(part_of(path))
+    if (finished) then
+      call fail(error, exit_files, path//": is finished; there is nothing to go on with")
+    else if (.not. is_file(current)) then
+      call fail(error, exit_files, current//": there is no checkpoint to go on from; start without " &
+        //"--resume")
     else if (.not. is_sealed(current)) then
       call fail(error, exit_usage, current//": is damaged, its checksum is wrong; the one before is " &
         //earlier_checkpoint_of(path))

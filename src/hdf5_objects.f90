@@ -8,7 +8,7 @@ module hdf5_objects
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, &
     h5open_f, h5eset_auto_f, h5get_libversion_f, h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, &
     h5gcreate_f, h5gclose_f, h5lexists_f, h5lcreate_hard_f, h5oopen_f, h5oclose_f, &
-    h5acreate_f, h5awrite_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, &
+    h5acreate_f, h5aexists_f, h5aopen_f, h5awrite_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, &
     h5dget_space_f, h5dget_type_f, h5screate_f, h5screate_simple_f, h5sclose_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tclose_f, &
     h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, h5pset_create_inter_group_f, &
@@ -19,7 +19,7 @@ module hdf5_objects
     h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
   use errors, only: error_t, exit_files, fail
   use kinds, only: int32, int64, real64
-  use system, only: free_bytes, last_problem
+  use system, only: free_bytes, last_problem, move_file
   use texts, only: written
   implicit none
   private
@@ -33,6 +33,7 @@ module hdf5_objects
   contains
     procedure :: create
     procedure :: open => open_file
+    procedure :: rename => rename_file
     procedure :: flush => flush_file
     procedure :: close => close_file
     procedure :: check
@@ -119,6 +120,17 @@ contains
     call self%check(status, "be read: it is damaged, or no HDF5 file, or not for you")
     call h5pclose_f(access, closed)
   end subroutine open_file
+
+  !> Gives the open file another name.
+  subroutine rename_file(self, path)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    logical :: moved
+    if (allocated(self%trouble)) return
+    call move_file(self%path, path, moved)
+    if (.not. moved) call self%check(-1, "be renamed to "//path//": "//last_problem())
+    if (moved) self%path = path
+  end subroutine rename_file
 
   !> All that was written goes to the operating system: it outlives a kill of the program.
   subroutine flush_file(self)
@@ -246,7 +258,7 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a new dataset, or attribute of an object that is there.
+  !> Writes a new dataset, or an attribute, new or not, of an object that is there.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -255,6 +267,7 @@ contains
     type(c_ptr), intent(in) :: address
     integer(hid_t) :: space, object, values, properties, links
     integer :: status, closed, at
+    logical :: exists
     if (allocated(self%trouble)) return
     if (size(extents) == 0) then
       call h5screate_f(h5s_scalar_f, space, status)
@@ -264,7 +277,12 @@ contains
     at = index(name, "@")
     if (at > 0) then
       call h5oopen_f(self%id, name(:at - 1), object, status)
-      if (status >= 0) call h5acreate_f(object, name(at + 1:), stored_as, space, values, status)
+      if (status >= 0) call h5aexists_f(object, name(at + 1:), exists, status)
+      if (status >= 0 .and. exists) then
+        call h5aopen_f(object, name(at + 1:), values, status)
+      else if (status >= 0) then
+        call h5acreate_f(object, name(at + 1:), stored_as, space, values, status)
+      end if
       if (status >= 0) call h5awrite_f(values, in_memory, address, status)
       if (status >= 0) call h5aclose_f(values, status)
       call h5oclose_f(object, closed)

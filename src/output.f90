@@ -10,7 +10,8 @@ module output
   use observables, only: observable_list, observed_values
   use parameter_values, only: parameter_group_t
   use run_description, only: describe_cost, describe_run
-  use run_files, only: checkpoint_of, is_file, lock_of, part_of, remove_checkpoints
+  use run_files, only: checkpoint_of, is_file, lock_of, new_part_of, part_of, &
+    remove_checkpoints
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
@@ -79,16 +80,18 @@ contains
     if (.not. allocated(error)) then
       call remove_checkpoints(path)
       call remove_file(part_of(path))
+      call remove_file(new_part_of(path))
       associate (h5md => self%h5md)
-        call h5md%file%create(part_of(path), 0)
+        call h5md%file%create(new_part_of(path), 0)
         call describe_run(h5md%file, settings, groups, input_text, overrides, sim)
         call h5md%make_tracks(frames, samples)
+        call self%write_frame(sim)
+        call self%write_observables(sim)
+        call h5md%write_all()
+        call h5md%file%rename(part_of(path))
+        call h5md%file%failure(error)
       end associate
-      call self%write_frame(sim)
-      call self%write_observables(sim)
-      call self%h5md%write_all()
-      call self%h5md%file%failure(error)
-      if (allocated(error)) call remove_file(part_of(path))     ! nothing is in it
+      call remove_file(new_part_of(path))           ! if it failed: nothing of use is in it
     end if
     if (allocated(error)) call self%release()
   end subroutine open_output

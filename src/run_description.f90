@@ -37,6 +37,7 @@ contains
     if (allocated(sim%box%obstacle)) call describe_obstacles(file, sim%box%obstacle)
     call file%put("parameters/seed", [integer ::], [settings%run%seed])
     call describe_origin(file)
+    call describe_cost(file, sim, 0.0_real64)            ! so that nothing is added at the end
   end subroutine describe_run
 
   subroutine describe_format(file)
@@ -200,7 +201,7 @@ contains
     call file%put("provenance@host", host_name())
   end subroutine describe_origin
 
-  !> Writes what is known at the end only.
+  !> Writes, or writes anew, what is known at the end only.
   subroutine describe_cost(file, sim, wall_seconds)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim

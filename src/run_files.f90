@@ -3,7 +3,7 @@ module run_files
   use system, only: remove_file
   implicit none
   private
-  public :: part_of, lock_of, checkpoint_of, earlier_checkpoint_of, new_checkpoint_of
+  public :: part_of, new_part_of, lock_of, checkpoint_of, earlier_checkpoint_of, new_checkpoint_of
   public :: is_file, remove_checkpoints
 
 contains
@@ -14,6 +14,13 @@ contains
     character(len=:), allocatable :: name
     name = path//".part"
   end function part_of
+
+  !> The same before all that is written once is in it.
+  pure function new_part_of(path) result(name)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: name
+    name = path//".part_new"
+  end function new_part_of
 
   !> The file whose lock keeps two runs from one output.
   pure function lock_of(path) result(name)

@@ -1,0 +1,227 @@
+"""One run is the same run stopped and resumed, bit for bit; and what no run can resume is refused."""
+
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+
+from whole_runs import (
+    FILES,
+    FINISHED,
+    MIXTURE,
+    STOPPED,
+    USAGE,
+    differences,
+    one_line,
+    write_input,
+)
+
+GAS = "&species name = 'gas' count = 150 radius = 0.02 speed = 1 /\n"
+OUTPUT = "&output frames_every_time = 0.05 observables_every_collisions = 30 event_log = .true. /\n"
+STOP = "&stop time = 30 /\n"
+INELASTIC = "&contact restitution = 0.99 wall_rule = 'normal' contact_time = 1e-3 /\n"
+FALLING = "&box upper = 1, 2 gravity = 0.1, -1 /\n"
+SYSTEMS = {
+    "walls": GAS + OUTPUT + STOP,
+    "inelastic": GAS + INELASTIC + OUTPUT + STOP,
+    "periodic": GAS + "&box boundary = 'periodic', 'periodic' /\n" + OUTPUT + STOP,
+    "channel": GAS + "&box boundary = 'periodic', 'wall' gravity = 0, -1 /\n" + OUTPUT + STOP,
+    "gravity": GAS + FALLING + INELASTIC + OUTPUT + STOP,
+    "obstacles": GAS
+    + "&obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 /\n"
+    + "&obstacle name = 'pot' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n"
+    + OUTPUT
+    + STOP,
+    "giant": GAS + "&species name = 'giant' count = 1 mass = 50 radius = 0.2 /\n" + OUTPUT + STOP,
+    "heap": GAS + "&run queue = 'heap' /\n" + OUTPUT + STOP,
+    "pairs": GAS + "&run search = 'pairs' /\n" + OUTPUT + STOP,
+    "steps": GAS + "&run dynamics = 'steps' dt = 1e-3 /\n" + OUTPUT + STOP,
+    "events": GAS
+    + "&output frames_every_events = 77 observables_every_time = 0.1 precision = 'single' /\n"
+    + "&stop collisions_per_disk = 300 /\n",
+    "first and last": GAS + STOP,
+}
+
+
+def stop_now_and_then(program, command, folder, duration, rng, most=20):
+    """Runs to the end with stops at random moments; how often it was stopped."""
+    for stops in range(most + 1):
+        resume = ["--resume"] if list(folder.glob("*.chk.h5")) else []
+        process = subprocess.Popen(
+            [program, *command, *resume], cwd=folder, stderr=subprocess.PIPE, text=True
+        )
+        if stops < most:
+            time.sleep(rng.uniform(0.01, duration))
+            process.send_signal(rng.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
+        message = process.communicate(timeout=60)[1]
+        if process.returncode == FINISHED:
+            return stops
+        # a signal before the program has set its handler ends it as it would any other
+        assert process.returncode in (STOPPED, -15, -2, -1), message
+    return None
+
+
+@pytest.mark.parametrize("longer", [1, pytest.param(30, marks=pytest.mark.check)])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_one_run_is_the_same_run_stopped_and_resumed(program, ricochet, tmp_path, system, longer):
+    text = SYSTEMS[system].replace("time = 30", f"time = {30 * longer}")
+    write_input(tmp_path, text.replace("disk = 300", f"disk = {300 * longer}"))
+    begin = time.monotonic()
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    duration = time.monotonic() - begin
+    command = ["gas.nml", "-o", "parts.h5", "--quiet"]
+    longest = duration / min(10, 2 * longer)
+    stops = stop_now_and_then(program, command, tmp_path, longest, random.Random(system))
+    assert stops is not None
+    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+
+
+@pytest.fixture
+def stopped(ricochet, tmp_path):
+    """`stopped(*options)`: a run that its wall clock has stopped; its command less --resume."""
+    write_input(tmp_path, MIXTURE)
+    command = ["gas.nml", "-o", "gas.h5", "--set", "stop.time=1000"]
+    run = ricochet(*command, "--set", "stop.wall_clock=0.02")
+    assert run.returncode == STOPPED and "--resume" in one_line(run)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "gas.chk.h5",
+        "gas.h5.part",
+        "gas.nml",
+    ]
+    return command
+
+
+def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
+    """The wall clock stops a run at once, so that every resume makes one little step."""
+    write_input(tmp_path, SYSTEMS["walls"])
+    short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
+    short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
+    assert ricochet(*short, "whole.h5").returncode == FINISHED
+    resume, status, stops = [], STOPPED, 0
+    while status == STOPPED:
+        run = ricochet(*short, "parts.h5", "--set", "stop.wall_clock=1e-9", *resume)
+        status, resume, stops = run.returncode, ["--resume"], stops + 1
+        assert stops < 500
+    assert status == FINISHED and stops > 20
+    changed = ["/parameters/overrides", "/parameters/stop@wall_clock"]
+    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == changed
+
+
+def test_how_a_run_is_done_may_change_when_it_goes_on(ricochet, tmp_path, stopped):
+    fewer = [*stopped[:-1], "stop.time=40"]
+    ricochet(*fewer, "--set", "stop.wall_clock=0.02", "--force")
+    run = ricochet(*fewer, "--resume", "--set", "run.search='pairs'", "--set", "run.queue='heap'")
+    assert run.returncode == FINISHED
+    fewer[2] = "whole.h5"
+    assert ricochet(*fewer).returncode == FINISHED
+    other = differences(tmp_path / "whole.h5", tmp_path / "gas.h5")
+    assert all(name.startswith("/parameters") for name in other)
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ("run.seed=8", "run.seed = 8"),
+        ("species.heavy.mass=3", "species.heavy.mass = 3"),
+        ("contact.contact_time=0.002", "contact.contact_time = 0.002"),
+        ("stop.time=1001", "stop.time = 1001"),
+        ("output.event_log=.false.", "output.event_log = .false."),
+    ],
+)
+def test_a_checkpoint_of_another_input_is_refused(ricochet, tmp_path, stopped, change, names):
+    before = (tmp_path / "gas.h5.part").read_bytes()
+    run = ricochet(*stopped, "--set", change, "--resume")
+    assert run.returncode == USAGE
+    assert "another input" in one_line(run) and names in one_line(run)
+    assert (tmp_path / "gas.h5.part").read_bytes() == before
+
+
+def test_a_checkpoint_of_another_version_is_refused(ricochet, tmp_path, stopped):
+    path = tmp_path / "gas.chk.h5"
+    with h5py.File(path, "r+") as file:
+        file["program"][()] = b"ricochet 0.0.9"
+    seal(path)
+    run = ricochet(*stopped, "--resume")
+    assert run.returncode == USAGE and "ricochet 0.0.9" in one_line(run)
+
+
+@pytest.mark.parametrize("trials", [60, pytest.param(600, marks=pytest.mark.check)])
+def test_a_damaged_checkpoint_is_refused(ricochet, tmp_path, stopped, trials):
+    path = tmp_path / "gas.chk.h5"
+    whole, rng = path.read_bytes(), random.Random(1)
+    for k in range(trials):
+        damaged = bytearray(whole)
+        if k % 2:
+            damaged[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
+        else:
+            damaged = damaged[: k * len(whole) // trials]
+        path.write_bytes(damaged)
+        run = ricochet(*stopped, "--resume")
+        assert run.returncode == USAGE and "damaged" in one_line(run)
+    path.write_bytes(whole)
+    run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=0.01")
+    assert run.returncode == STOPPED
+
+
+def test_the_checkpoint_before_is_kept_and_is_as_good(ricochet, tmp_path):
+    command = write_short_run(tmp_path)
+    assert ricochet(*command, "whole.h5").returncode == FINISHED
+    parts = [*command, "parts.h5"]
+    for resume in ([], ["--resume"], ["--resume"]):
+        run = ricochet(*parts, "--set", "stop.wall_clock=1e-9", *resume)
+        assert run.returncode == STOPPED
+    shutil.copy(tmp_path / "parts.chk_prev.h5", tmp_path / "parts.chk.h5")
+    assert ricochet(*parts, "--resume").returncode == FINISHED
+    other = differences(tmp_path / "whole.h5", tmp_path / "parts.h5")
+    assert all(name.startswith("/parameters") for name in other)
+
+
+def test_resuming_needs_a_checkpoint(ricochet, tmp_path):
+    command = [*write_short_run(tmp_path), "gas.h5"]
+    run = ricochet(*command, "--resume")
+    assert run.returncode == FILES and "no checkpoint" in one_line(run)
+    assert ricochet(*command).returncode == FINISHED
+    run = ricochet(*command, "--resume")
+    assert run.returncode == FILES and "finished" in one_line(run)
+
+
+def test_resuming_needs_the_unfinished_output(ricochet, tmp_path, stopped):
+    part = tmp_path / "gas.h5.part"
+    part.write_bytes(part.read_bytes()[:5000])
+    assert "gas.h5.part" in one_line(ricochet(*stopped, "--resume"))
+    part.unlink()
+    run = ricochet(*stopped, "--resume")
+    assert run.returncode == FILES and "gas.h5.part" in one_line(run)
+
+
+def test_a_stopped_run_is_started_over_by_force_only(ricochet, tmp_path, stopped):
+    run = ricochet(*stopped)
+    assert run.returncode == FILES and "--resume" in one_line(run) and "--force" in one_line(run)
+    assert ricochet(*stopped[:-1], "stop.time=1", "--force").returncode == FINISHED
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gas.h5", "gas.nml"]
+
+
+def write_short_run(folder) -> list[str]:
+    """The beginning of a command that runs a moment, up to -o."""
+    write_input(folder, MIXTURE)
+    return ["gas.nml", "--set", "stop.time=0.5", "-o"]
+
+
+def seal(path):
+    """Renews the checksum of a checkpoint: CRC-64 (ECMA-182, reflected) over all but the header."""
+    table = []
+    for byte in range(256):
+        remainder = byte
+        for _ in range(8):
+            remainder = remainder >> 1 ^ (0xC96C5795D7870F42 if remainder & 1 else 0)
+        table.append(remainder)
+    data, crc = path.read_bytes(), 0xFFFFFFFFFFFFFFFF
+    for byte in data[64:]:
+        crc = table[(crc ^ byte) & 255] ^ crc >> 8
+    crc ^= 0xFFFFFFFFFFFFFFFF
+    header = f"ricochet checkpoint, CRC-64 of the rest: {crc:016X}".ljust(63) + "\n"
+    path.write_bytes(header.encode() + data[64:])

@@ -1,0 +1,84 @@
+"""What the tests of whole runs share: inputs, and ways to look at and compare output files."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+FINISHED, USAGE, FILES, STOPPED = 0, 2, 3, 75
+
+#: A little of everything: two species, walls that take energy, frames and observables apart.
+MIXTURE = """&run title = 'mixture' seed = 5 /
+&species name = 'light' count = 60 radius = 0.02 temperature = 1 /
+&species name = 'heavy' count = 20 radius = 0.03 mass = 4 temperature = 1 /
+&contact restitution = 0.95 wall_restitution = 0.9 contact_time = 1e-3 /
+&stop time = 4 /
+&output frames_every_time = 0.25 observables_every_collisions = 50 event_log = .true. /
+"""
+
+
+def contents(path) -> dict[str, np.ndarray]:
+    """All that an output file says: datasets by path, attributes by path@name."""
+    found = {}
+
+    def visit(name, item):
+        found.update({f"{name}@{key}": value for key, value in item.attrs.items()})
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+        else:  # not visititems: it leaves out second names
+            for key in item:
+                visit(f"{name}/{key}", item[key])
+
+    with h5py.File(path, "r", locking=False) as file:
+        visit("", file)
+    return found
+
+
+def differences(one, other) -> list[str]:
+    """Names of what is not the same, bit for bit, in two output files; their origin aside."""
+    a, b = contents(one), contents(other)
+    return [
+        name
+        for name in sorted(a.keys() | b.keys())
+        if not name.startswith("/provenance")
+        and not (name in a and name in b and same(a[name], b[name]))
+    ]
+
+
+def same(a, b) -> bool:
+    """Equal in type, shape and every bit."""
+    a, b = np.asarray(a), np.asarray(b)
+    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def committed(path) -> dict[str, np.ndarray]:
+    """Frames and observables of a file that may still be written, as far as they are committed."""
+    found = {}
+    with h5py.File(path, "r", locking=False) as file:
+        for root in ("particles/disks", "observables"):
+            count = int(file[root]["committed"][()])
+            for name in ("position", "velocity", "total_energy", "collisions", "momentum"):
+                if f"{root}/{name}/value" in file:
+                    for part in ("step", "time", "value"):
+                        found[f"{root}/{name}/{part}"] = file[f"{root}/{name}/{part}"][:count]
+    return found
+
+
+def is_beginning(part: dict, whole: dict) -> list[str]:
+    """Names in `part` that are not the first samples of the same in `whole`."""
+    return [name for name in part if not same(part[name], whole[name][: len(part[name])])]
+
+
+def one_line(run) -> str:
+    """The message of a run that failed: a single line, and no trace of a library."""
+    lines = run.stderr.splitlines()
+    assert len(lines) == 1, run.stderr
+    assert "HDF5-DIAG" not in run.stderr and "Fortran runtime" not in run.stderr
+    return lines[0]
+
+
+def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
+    """An input file in a folder."""
+    path = Path(folder) / name
+    path.write_text(text)
+    return path
