@@ -2,7 +2,7 @@
 module test_systems
   use kinds, only: dp => real64, int32, int64, never
   use all_pairs, only: all_pairs_t
-  use box_geometry, only: obstacle_reach, obstacle_t
+  use box_geometry, only: box_t, obstacle_reach, obstacle_t
   use cell_grid, only: cell_grid_t
   use disks, only: disk_t, tag_t
   use errors, only: error_t
@@ -98,13 +98,13 @@ contains
     end function has
   end function system
 
-  !> Circles inside the box: three of different size, or one container.
+  !> Circles: three of different size, one of them astride the left side, or one container.
   subroutine add_obstacles(sim, words)
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: words
     allocate (sim%box%obstacle(0))
     if (index(words, "pegs") > 0) sim%box%obstacle = [ &
-      obstacle_t("small", [-0.3_dp, 1.1_dp], 0.05_dp, .false.), &
+      obstacle_t("small", [-1.0_dp, 1.1_dp], 0.15_dp, .false.), &
       obstacle_t("middle", [0.9_dp, 1.9_dp], 0.2_dp, .false.), &
       obstacle_t("large", [1.2_dp, 1.2_dp], 0.3_dp, .false.)]
     if (index(words, "round") > 0) sim%box%obstacle = [sim%box%obstacle, &
@@ -166,7 +166,7 @@ contains
     yes = .true.
     do k = 1, size(sim%box%obstacle)
       associate (o => sim%box%obstacle(k))
-        yes = yes .and. (norm2(site - o%centre) > obstacle_reach(o, radius) .neqv. o%inside)
+        yes = yes .and. (norm2(separation(sim%box, site, o%centre)) > obstacle_reach(o, radius) .neqv. o%inside)
       end associate
     end do
     do k = 1, size(sim%disk)
@@ -296,19 +296,27 @@ contains
       x = sim%position(i)
       associate (r => sim%disk(i)%radius)
         do j = 1, i - 1
-          dx = sim%position(j) - x
-          dx = dx - merge(sim%box%edges()*anint(dx/sim%box%edges()), 0.0_dp, sim%box%periodic)
+          dx = separation(sim%box, x, sim%position(j))
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
         gap = min(gap, minval(merge(never, min(x - sim%box%lower, sim%box%upper - x) - r, sim%box%periodic))/(2*r))
         do m = 1, n_obstacles(sim)
           reach = obstacle_reach(sim%box%obstacle(m), r)
-          dx(1) = norm2(x - sim%box%obstacle(m)%centre) - reach
+          dx(1) = norm2(separation(sim%box, x, sim%box%obstacle(m)%centre)) - reach
           gap = min(gap, merge(-dx(1), dx(1), sim%box%obstacle(m)%inside)/(2*r))
         end do
       end associate
     end do
   end function tightest_gap
+
+  !> From a point to the nearest image of another.
+  pure function separation(box, a, b) result(dx)
+    type(box_t), intent(in) :: box
+    real(dp), intent(in) :: a(2), b(2)
+    real(dp) :: dx(2)
+    dx = b - a
+    dx = dx - merge(box%edges()*anint(dx/box%edges()), 0.0_dp, box%periodic)
+  end function separation
 
   pure function n_obstacles(sim) result(n)
     type(simulation_t), intent(in) :: sim
