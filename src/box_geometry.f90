@@ -129,8 +129,9 @@ contains
   pure function nearest_image(box, dx) result(shift)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64) :: shift(2)
-    shift = merge(box%edges()*anint(dx/box%edges()), 0.0_real64, box%periodic)
+    real(real64) :: shift(2), edges(2)
+    edges = box%edges()
+    shift = merge(edges*anint(dx/edges), 0.0_real64, box%periodic)
   end function nearest_image
 
   !> The earlier of an event known already and the contacts with the obstacles listed.

@@ -13,6 +13,7 @@ module event_driven
   use neighbour_search, only: first_crossing, neighbour_search_t
   use renumbering, only: renumber
   use simulation_state, only: simulation_t
+  use texts, only: written
   implicit none
   private
   public :: event_driven_t
@@ -193,8 +194,7 @@ contains
       line = ""
     end if
     text = text//trim(line)
-    write (line, '(" at time ",g0)') sim%time()
-    text = text//trim(line)
+    text = text//" at time "//written(sim%time())
   end function moment
 
   !> Moves the origin of time to about now, so that times stay small and keep their digits; and, as

@@ -87,6 +87,9 @@ contains
     box%upper = group%reals_of('upper', none)
     box%gravity = group%reals_of('gravity', none)
     box%periodic = group%values(row_of('box', 'boundary'))%texts == 'periodic'
+    if (any(box%periodic .and. abs(box%gravity) > 0)) call problems%add(group%line_of('gravity'), &
+      'box.gravity', 'has no floor to pull to along a periodic axis: disks would fall for ever; ' &
+      //'make that axis a wall, or the component 0')
     do axis = 1, 2
       if (box%lower(axis) < box%upper(axis)) cycle
       call problems%add(group%line_of(merge('upper', 'lower', group%given('upper'))), 'box.upper', &
