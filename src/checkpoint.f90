@@ -309,11 +309,13 @@ contains
     header = header_of(path)
     open (newunit=unit, file=path, access="stream", form="unformatted", action="readwrite", &
       status="old", iostat=status)
-    if (status == 0) then
-      write (unit, pos=1, iostat=status) header
-      close (unit, iostat=status)
-    end if
-    done = is_sealed(path)
+    done = status == 0
+    if (.not. done) return
+    write (unit, pos=1, iostat=status) header
+    done = status == 0
+    close (unit, iostat=status)
+    done = done .and. status == 0
+    if (done) done = is_sealed(path)
   end subroutine seal
 
   function is_sealed(path) result(yes)

@@ -96,7 +96,7 @@ contains
     class(event_queue_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
     real(real64), intent(in) :: now
-    real(real64) :: width, wait(sample_size), swap
+    real(real64) :: width, waits(sample_size), swap
     integer :: i, k, n_waits
     width = never
     if (self%n_taken > sample_size .and. self%calendar) then
@@ -107,13 +107,13 @@ contains
     do i = 1, size(disk), (size(disk) - 1)/sample_size + 1
       if (.not. disk(i)%event_time < never) cycle
       n_waits = n_waits + 1
-      wait(n_waits) = disk(i)%event_time - now
+      waits(n_waits) = disk(i)%event_time - now
       do k = n_waits, 2, -1
-        if (wait(k) >= wait(k - 1)) exit
-        swap = wait(k); wait(k) = wait(k - 1); wait(k - 1) = swap
+        if (waits(k) >= waits(k - 1)) exit
+        swap = waits(k); waits(k) = waits(k - 1); waits(k - 1) = swap
       end do
     end do
-    if (n_waits > 0) width = events_per_window*wait((n_waits + 1)/2) &
+    if (n_waits > 0) width = events_per_window*waits((n_waits + 1)/2) &
       /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
   end function window_width
 

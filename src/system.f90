@@ -24,9 +24,9 @@ module system
   real(real64), parameter :: twice_at_once = 0.5_real64
 
   ! The only module variables of the program: a signal handler has nowhere else to write.
-  integer(c_int), volatile, save :: stop_signal = 0
-  integer(c_int), volatile, save :: checkpoint_signal = 0
-  real(real64), volatile, save :: first_signal_at = 0.0_real64
+  integer(c_int), volatile :: stop_signal = 0
+  integer(c_int), volatile :: checkpoint_signal = 0
+  real(real64), volatile :: first_signal_at = 0.0_real64
 
   !> A lock on a run's output. The kernel drops it when the process ends, however it ends.
   type :: lock_t
@@ -350,7 +350,7 @@ contains
         read (unit, '(a)', iostat=io) found
         close (unit)
       end if
-      if (found == token) return
+      if (io == 0 .and. found == token) return
       status = c_close(self%descriptor)
     end do
   end subroutine acquire
