@@ -1,4 +1,4 @@
-"""One run is the same run stopped and resumed, bit for bit; and what no run can resume is refused."""
+"""One run is the same run stopped and resumed, bit for bit; what no run can resume is refused."""
 
 import random
 import shutil
