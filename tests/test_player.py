@@ -1,0 +1,358 @@
+"""The player in a real browser: it loads without errors, its buttons act, its picture changes."""
+
+import base64
+import contextlib
+import json
+import shutil
+import socket
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_run import maxwell_velocities, run_script, write_run
+
+import player
+from read_run import read_run
+
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+]
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(9)
+
+
+# --- the file, without a browser ---
+
+
+def bouncing_gas(path, rng, frames=40, count=60, **more):
+    """A run of disks that drift; the second half is a heavier species."""
+    velocity = maxwell_velocities(rng, frames, count)
+    phase = rng.uniform(0, 6, (1, count, 2))
+    position = 0.5 + 0.3 * np.cos(np.arange(frames)[:, None, None] / 9 + phase)
+    species = 1 + (np.arange(count) >= count // 2)
+    options = {
+        "mass": np.where(species == 2, 4.0, 1.0),
+        "radius": np.where(species == 2, 0.02, 0.01),
+        "species": species,
+        "names": ("light", "heavy"),
+        "collisions": np.arange(frames)[:, None] * np.arange(count),
+        "observables": {"collisions": 30 * np.arange(frames)},
+        "parameters": {"run": {"title": "A <gas> & more", "seed": 3}},
+        **more,
+    }
+    return write_run(path, position, velocity, **options)
+
+
+def test_positions_keep_sixteen_bits(tmp_path, rng):
+    run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, lower=(-1.0, 0.0), edges=(3.0, 2.0)))
+    facts, blocks = player.film(run, [0, 7], "speed", None)
+    codes = np.frombuffer(blocks["positions"], "<u2").reshape(2, run.count, 2)
+    back = np.array(facts["lower"]) + codes[1] / 65535 * np.array(facts["edges"])
+    np.testing.assert_allclose(back, run.position[7], atol=3.0 / 65535)
+
+
+def test_colours_span_their_scale():
+    values = np.array([0.0, 1.0, 2.0, 5.0])
+    assert player.coded(values, 2.0, log=False).tolist() == [0, 128, 255, 255]
+    assert player.coded(values, 3.0, log=True).tolist() == [0, 128, 202, 255]
+
+
+def test_speeds_and_energies_are_those_of_the_frame(tmp_path, rng):
+    run = read_run(bouncing_gas(tmp_path / "gas.h5", rng))
+    facts, _ = player.film(run, [0, 20], "speed", None)
+    assert facts["kinetic"][1][1] == pytest.approx(run.kinetic_energy(20)[30:].mean(), rel=1e-6)
+    assert facts["potential"] is None
+    inside = np.sum(run.speed(20)[30:] <= facts["speeds"]["top"])
+    assert sum(facts["speeds"]["counts"][1][1]) == inside
+
+
+def test_ten_thousand_disks_and_three_hundred_frames_stay_below_thirty_megabytes(tmp_path):
+    count, frames = 10000, 300
+    still = np.broadcast_to(np.float32(0.5), (frames, count, 2))
+    path = write_run(tmp_path / "big.h5", still[:1], still[:1], collisions=np.zeros((1, count)))
+    run = read_run(path)
+    assert player.frames_that_fit(run) >= frames
+    assert frames * count * 7 * 4 / 3 < player.ROOM < 30e6 - 5e5
+
+
+def test_wrong_requests_are_answered_in_one_line(tmp_path, rng, capsys):
+    path = bouncing_gas(tmp_path / "gas.h5", rng, collisions=None)
+    for arguments, words in (
+        (["-o", tmp_path / "a.mp4"], "a player ends in .html"),
+        (["--disk", 61], "no disk 61, there are 60"),
+        (["--colour", "collisions"], "has no collisions per disk"),
+    ):
+        assert run_script("player", path, *arguments) == 2
+        assert words in capsys.readouterr().err
+
+
+# --- in the browser ---
+
+
+class Browser:
+    """A session of chromedriver, by its own protocol (W3C WebDriver)."""
+
+    def __init__(self, port: int, profile: Path, size: tuple[int, int]) -> None:
+        """Start chromium with an empty profile."""
+        self.root = f"http://127.0.0.1:{port}"
+        arguments = [*FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
+        wanted = {
+            "goog:chromeOptions": {"args": arguments, "binary": shutil.which("chromium")},
+            "goog:loggingPrefs": {"browser": "ALL"},
+        }
+        answer = self.call("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
+        self.root += f"/session/{answer['sessionId']}"
+
+    def call(self, method: str, path: str, body: dict | None = None) -> object:
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.root + path, data, method=method)
+        request.add_header("Content-Type", "application/json")
+        with urllib.request.urlopen(request, timeout=60) as reply:
+            return json.load(reply)["value"]
+
+    def open(self, page: Path) -> None:
+        self.call("POST", "/url", {"url": page.resolve().as_uri()})
+
+    def run(self, script: str, *arguments) -> object:
+        return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def resize(self, width: int, height: int, phone: bool = False) -> None:
+        """Set the size of the page itself, as on a device."""
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1}
+        body = {"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics | {"mobile": phone}}
+        self.call("POST", "/goog/cdp/execute", body)
+
+    def complaints(self) -> list[dict]:
+        return self.call("POST", "/se/log", {"type": "browser"})
+
+    def click(self, name: str) -> None:
+        found = self.call("POST", "/element", {"using": "css selector", "value": f"#{name}"})
+        self.call("POST", f"/element/{next(iter(found.values()))}/click", {})
+
+    def press(self, key: str) -> None:
+        actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        body = {"actions": [{"type": "key", "id": "keys", "actions": actions}]}
+        self.call("POST", "/actions", body)
+
+    def picture(self) -> bytes:
+        """The page as PNG."""
+        return base64.b64decode(self.call("GET", "/screenshot"))
+
+    def close(self) -> None:
+        self.call("DELETE", "")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
+    """A browser with an empty profile, ended with its driver."""
+    missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+    if missing:
+        pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")
+    port = free_port()
+    with (folder / "chromedriver.log").open("w") as log:
+        driver = subprocess.Popen(
+            ["chromedriver", f"--port={port}", "--allowed-ips=127.0.0.1"], stdout=log, stderr=log
+        )
+    try:
+        for _ in range(100):
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
+                break
+            time.sleep(0.1)
+        browser = Browser(port, folder / "profile", size)
+        try:
+            yield browser
+        finally:
+            browser.close()
+    finally:
+        driver.terminate()
+        driver.wait(20)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with browsing(tmp_path_factory.mktemp("browser")) as one:
+        yield one
+
+
+@pytest.fixture
+def opened(browser, tmp_path, rng):
+    """The player of a small gas, paused at its first frame."""
+    path = bouncing_gas(tmp_path / "gas.h5", rng)
+    assert run_script("player", path, "-o", tmp_path / "gas.html") == 0
+    browser.resize(1280, 800)
+    browser.open(tmp_path / "gas.html")
+    browser.run("step(0)")
+    return browser
+
+
+def stage(browser) -> str:
+    return browser.run("return stage.toDataURL()")
+
+
+def frame(browser) -> int:
+    return browser.run("return state.frame")
+
+
+def test_it_loads_without_complaints_and_tells_what_it_shows(opened):
+    assert opened.complaints() == []
+    assert opened.run("return document.querySelector('h1').textContent") == "A <gas> & more"
+    assert "frame 1/40" in opened.run("return $('clock').textContent")
+    opened.run("show(3)")
+    assert "t = 3 · frame 4/40" in opened.run("return $('clock').textContent")
+
+
+def test_it_asks_nothing_of_the_network(opened):
+    asked = opened.run("return performance.getEntriesByType('resource').map(r => r.name)")
+    assert asked == []
+
+
+def test_buttons_and_keys_step_through_the_frames_and_the_picture_follows(opened):
+    first = stage(opened)
+    opened.click("next")
+    second = stage(opened)
+    assert frame(opened) == 1 and second != first
+    opened.press("\ue014")  # arrow right
+    assert frame(opened) == 2 and stage(opened) not in (first, second)
+    opened.press("\ue012")  # arrow left
+    assert frame(opened) == 1 and stage(opened) == second
+    opened.click("back")
+    opened.click("back")
+    assert frame(opened) == 0 and stage(opened) == first
+    opened.press("\ue010")  # end
+    assert frame(opened) == 39
+    opened.click("first")
+    assert frame(opened) == 0
+
+
+def test_play_plays_to_the_end_and_pause_pauses(opened):
+    opened.run("state.rate = 120")
+    opened.click("play")
+    for _ in range(100):
+        if frame(opened) == 39:
+            break
+        time.sleep(0.05)
+    assert frame(opened) == 39
+    assert opened.run("return [state.playing, $('play').ariaPressed]") == [False, "false"]
+    opened.run("state.rate = 10")
+    opened.click("play")
+    time.sleep(0.5)
+    opened.press(" ")
+    stopped = frame(opened)
+    assert 0 < stopped < 39
+    time.sleep(0.4)
+    assert frame(opened) == stopped
+
+
+def test_the_scrub_bar_and_the_choices_act(opened):
+    opened.run("$('scrub').value = 25; $('scrub').dispatchEvent(new Event('input'))")
+    assert frame(opened) == 25
+    pictures = {}
+    for colour in ("species", "speed", "displacement", "collisions"):
+        opened.run(
+            "$('colour').value = arguments[0]; $('colour').dispatchEvent(new Event('change'))",
+            colour,
+        )
+        pictures[colour] = stage(opened)
+    assert len(set(pictures.values())) == 4
+    histogram = opened.run("return $('histogram').toDataURL()")
+    opened.click("now")
+    now = opened.run("return $('histogram').toDataURL()")
+    assert now != histogram
+    opened.run("step(26)")
+    assert opened.run("return $('histogram').toDataURL()") != now
+    energy = opened.run("return $('energy').toDataURL()")
+    opened.click("total")
+    assert opened.run("return $('energy').toDataURL()") != energy
+    assert opened.complaints() == []
+
+
+def test_a_click_on_a_disk_shows_its_trace(opened):
+    opened.run("step(12)")
+    plain = stage(opened)
+    opened.run(
+        """const box = stage.getBoundingClientRect();
+        const clientX = box.left + xOf(12, 41) / view.dots;
+        const clientY = box.top + yOf(12, 41) / view.dots;
+        stage.dispatchEvent(new MouseEvent('click', {clientX, clientY}));"""
+    )
+    chosen = opened.run("return state.disk")
+    traced = stage(opened)
+    assert chosen == 41 and traced != plain
+    assert "disk 42 (heavy)" in opened.run("return $('disk').textContent")
+    opened.click("clear")
+    assert stage(opened) == plain
+
+
+def test_disks_have_their_true_size(opened):
+    """Area of the pixels of one colour against the circle of its radius."""
+    area, radius = opened.run(
+        """$('theme').click(); document.documentElement.dataset.theme = 'light';
+        state.colour = 'species'; for (let k = 0; k < positions.length; k++) positions[k] = 0;
+        positions[2 * 59] = positions[2 * 59 + 1] = 32768; layout(); step(0);
+        const r = view.radii[1], side = Math.ceil(2 * r) + 8;
+        const left = xOf(0, 59) - side / 2, top = yOf(0, 59) - side / 2;
+        const data = brush.getImageData(left, top, side, side).data;
+        let sum = 0;
+        for (let k = 0; k < data.length; k += 4) sum += (255 - data[k + 2]) / 255;
+        return [sum, r]"""
+    )
+    assert area == pytest.approx(np.pi * radius**2, rel=0.05)
+
+
+def test_light_and_dark_differ(opened):
+    before = stage(opened)
+    opened.click("theme")
+    assert stage(opened) != before
+
+
+def test_it_fits_a_phone(opened):
+    opened.resize(390, 844, phone=True)
+    opened.run("layout()")
+    assert opened.run("return document.documentElement.scrollWidth") <= 390
+    width = opened.run("return stage.getBoundingClientRect().width")
+    assert 300 <= width <= 390
+    assert opened.run("return $('play').getBoundingClientRect().height") >= 44
+    assert opened.complaints() == []
+
+
+@pytest.mark.check
+def test_ten_thousand_disks_are_drawn_thirty_times_a_second(browser, tmp_path, rng):
+    """The best of some windows of a second: other programs may use the processor, too."""
+    position = rng.uniform(0, 1, (10, 10000, 2))
+    path = write_run(tmp_path / "big.h5", position, 0 * position, radius=0.003)
+    assert run_script("player", path, "-o", tmp_path / "big.html") == 0
+    browser.resize(1280, 800)
+    browser.open(tmp_path / "big.html")
+    browser.run(
+        """window.drawn = 0; play(false);
+        requestAnimationFrame(function again() {
+          show((state.frame + 1) % frames); window.drawn++; requestAnimationFrame(again);
+        });"""
+    )
+    rates = []
+    for _ in range(5):
+        before = browser.run("return [drawn, performance.now()]")
+        time.sleep(1)
+        after = browser.run("return [drawn, performance.now()]")
+        rates.append(1000 * (after[0] - before[0]) / (after[1] - before[1]))
+    assert max(rates) >= 30, rates
