@@ -6,7 +6,7 @@
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, &
-    h5open_f, h5eset_auto_f, h5get_libversion_f, h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, &
+    h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, &
     h5gcreate_f, h5gclose_f, h5lexists_f, h5lcreate_hard_f, h5oopen_f, h5oclose_f, &
     h5acreate_f, h5aexists_f, h5aopen_f, h5awrite_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, &
     h5dget_space_f, h5dget_type_f, h5screate_f, h5screate_simple_f, h5sclose_f, &
@@ -81,10 +81,12 @@ contains
   end function hdf5_version
 
   !> Starts the library, silent on errors, and prepares access without HDF5's own locks: they would keep
-  !> readers out, and one reader could stop a run.
+  !> readers out, and one reader could stop a run. It is not to tidy up when the program ends: everything is
+  !> closed by then, or could not be closed because the disk is full, and then it crashes.
   subroutine prepare_access(access, status)
     integer(hid_t), intent(out) :: access
     integer, intent(out) :: status
+    call h5dont_atexit_f(status)
     call h5open_f(status)
     if (status >= 0) call h5eset_auto_f(0, status)
     if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
@@ -266,9 +268,12 @@ contains
     integer(hid_t), intent(in) :: stored_as, in_memory
     type(c_ptr), intent(in) :: address
     integer(hid_t) :: space, object, values, properties, links
+    integer(size_t) :: bytes
     integer :: status, closed, at
     logical :: exists
     if (allocated(self%trouble)) return
+    call h5tget_size_f(stored_as, bytes, status)
+    self%unsaved = self%unsaved + bytes*product(int(extents, int64))
     if (size(extents) == 0) then
       call h5screate_f(h5s_scalar_f, space, status)
     else
