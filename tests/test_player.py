@@ -57,6 +57,13 @@ def bouncing_gas(path, rng, frames=40, count=60, **more):
     return write_run(path, position, velocity, **options)
 
 
+def still_run(path, position, **more):
+    """A run whose disks stand at the positions given, frame by frame."""
+    frames = len(position)
+    observables = {"collisions": np.zeros(frames)}
+    return write_run(path, position, np.zeros_like(position), observables=observables, **more)
+
+
 def test_positions_keep_sixteen_bits(tmp_path, rng):
     run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, lower=(-1.0, 0.0), edges=(3.0, 2.0)))
     facts, blocks = player.film(run, [0, 7], "speed", None)
@@ -87,6 +94,19 @@ def test_ten_thousand_disks_and_three_hundred_frames_stay_below_thirty_megabytes
     run = read_run(path)
     assert player.frames_that_fit(run) >= frames
     assert frames * count * 7 * 4 / 3 < player.ROOM < 30e6 - 5e5
+
+
+def test_crossings_of_periodic_sides_are_counted(tmp_path):
+    image = np.array([[[0, 0]], [[1, -2]], [[1, -2]]])
+    run = read_run(
+        still_run(tmp_path / "a.h5", np.full((3, 1, 2), 0.5), image=image, periodic=(True, True))
+    )
+    _, blocks = player.film(run, [0, 1, 2], "speed", None)
+    assert [(code // 16 - 8, code % 16 - 8) for code in blocks["shifts"]] == [
+        (0, 0),
+        (1, -2),
+        (0, 0),
+    ]
 
 
 def test_wrong_requests_are_answered_in_one_line(tmp_path, rng, capsys):
@@ -319,6 +339,38 @@ def test_disks_have_their_true_size(opened):
     assert area == pytest.approx(np.pi * radius**2, rel=0.05)
 
 
+def colours_at(browser, *points):
+    """Colours of the stage at points of the box, given in units of its edges."""
+    return browser.run(
+        """return arguments[0].map(([x, y]) => Array.from(brush.getImageData(
+          view.left + x * view.width, view.bottom - y * view.height, 1, 1).data).slice(0, 3))""",
+        points,
+    )
+
+
+def test_a_disk_on_a_periodic_side_shows_on_both(browser, tmp_path):
+    here = np.array([[[0.02, 0.5]]])
+    for periodic in (True, False):
+        path = still_run(tmp_path / "a.h5", here, radius=0.1, periodic=(periodic, False))
+        assert run_script("player", path, "-o", tmp_path / "a.html") == 0
+        browser.open(tmp_path / "a.html")
+        near, far, middle = colours_at(browser, (0.06, 0.52), (0.96, 0.52), (0.5, 0.52))
+        assert near != middle
+        assert (far == near) == periodic
+
+
+def test_obstacles_are_drawn(browser, tmp_path):
+    path = still_run(
+        tmp_path / "a.h5",
+        np.array([[[0.5, 0.8]]]),
+        obstacles=[((0.5, 0.5), 0.5, True), ((0.5, 0.3), 0.1, False)],
+    )
+    assert run_script("player", path, "-o", tmp_path / "a.html") == 0
+    browser.open(tmp_path / "a.html")
+    corner, inner, free = colours_at(browser, (0.03, 0.03), (0.5, 0.3), (0.25, 0.5))
+    assert corner == inner != free
+
+
 def test_light_and_dark_differ(opened):
     before = stage(opened)
     opened.click("theme")
@@ -339,7 +391,7 @@ def test_it_fits_a_phone(opened):
 def test_ten_thousand_disks_are_drawn_thirty_times_a_second(browser, tmp_path, rng):
     """The best of some windows of a second: other programs may use the processor, too."""
     position = rng.uniform(0, 1, (10, 10000, 2))
-    path = write_run(tmp_path / "big.h5", position, 0 * position, radius=0.003)
+    path = still_run(tmp_path / "big.h5", position, radius=0.003)
     assert run_script("player", path, "-o", tmp_path / "big.html") == 0
     browser.resize(1280, 800)
     browser.open(tmp_path / "big.html")
