@@ -22,7 +22,7 @@ input() {
 &run search = '$4' /
 &species name = 'gas', count = $1, packing_fraction = $2, placement = '$placement', velocities = 'maxwell' /
 &stop collisions = $3 /
-&output observables_every_collisions = $1 /
+&output observables_every_collisions = $((5 * $1)) /
 EOF
 }
 
