@@ -1,0 +1,112 @@
+"""Runs opened by the programs that they are exported for: OVITO, MDAnalysis, readers of CSV."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_run import ROOT, run_script
+
+from read_run import Run, mdanalysis_universe, read_run
+
+
+def reader(module: str):
+    """The module, or a skip that says how to get it."""
+    return pytest.importorskip(
+        module, reason=f"{module} is not installed (requirements.txt, tests/readers.txt)"
+    )
+
+
+@pytest.fixture
+def run(ricochet, tmp_path) -> Run:
+    """Two species in a container whose lower corner is not the origin."""
+    result = ricochet(
+        *(ROOT / "input" / "container.nml", "-o", "run.h5", "--quiet"),
+        *("--set", "stop.collisions_per_disk=2", "--set", "species.light.count=20"),
+    )
+    assert result.returncode == 0, result.stderr
+    return read_run(tmp_path / "run.h5")
+
+
+@pytest.fixture
+def periodic_run(ricochet, tmp_path) -> Run:
+    """A gas between two walls, periodic along x."""
+    result = ricochet(
+        *(ROOT / "input" / "brownian.nml", "-o", "periodic.h5", "--quiet"),
+        *("--set", "box.boundary=periodic,wall", "--set", "species.gas.count=50"),
+        *("--set", "stop.time=0.1"),
+    )
+    assert result.returncode == 0, result.stderr
+    return read_run(tmp_path / "periodic.h5")
+
+
+def exported(run: Run, name: str, *options) -> Path:
+    path = run.path.with_name(name)
+    assert run_script("export", run.path, "-o", path, *options) == 0
+    return path
+
+
+def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
+    pipeline = reader("ovito.io").import_file(str(exported(run, "run.xyz")))
+    assert pipeline.source.num_frames == run.frames
+    for frame in (0, run.frames - 1):
+        data = pipeline.compute(frame)
+        disks = data.particles
+        assert data.cell.is2D
+        assert data.attributes["Time"] == pytest.approx(run.time[frame], rel=1e-15)
+        one_bit = {"rtol": 4e-16}  # OVITO's reader of numbers may be off by that
+        np.testing.assert_allclose(disks.positions[...][:, :2], run.position[frame], **one_bit)
+        np.testing.assert_allclose(disks["Velocity"][...][:, :2], run.velocity[frame], **one_bit)
+        np.testing.assert_allclose(disks["Radius"][...], run.radius, rtol=1e-7)
+        np.testing.assert_array_equal(disks["Mass"][...], run.mass)
+        np.testing.assert_array_equal(disks.identifiers[...], np.arange(1, run.count + 1))
+        names = {kind.id: kind.name for kind in disks.particle_types.types}
+        assert [names[t] for t in disks.particle_types[...]] == [
+            run.names[s - 1] for s in run.species
+        ]
+
+
+def test_ovito_knows_the_box_and_its_periodic_sides(run, periodic_run):
+    import_file = reader("ovito.io").import_file
+    for one in (run, periodic_run):
+        cell = import_file(str(exported(one, "run.xyz"))).compute(0).cell
+        assert tuple(cell.pbc[:2]) == tuple(one.periodic)
+        np.testing.assert_array_equal(np.diag(cell[:2, :2]), one.edges)
+        np.testing.assert_array_equal(cell[:2, 3], one.lower)
+
+
+def test_mdanalysis_reads_positions_velocities_times_and_species(run):
+    reader("MDAnalysis")
+    universe = mdanalysis_universe(run)
+    assert len(universe.trajectory) == run.frames
+    for frame in (0, run.frames - 1):
+        step = universe.trajectory[frame]
+        assert step.time == pytest.approx(run.time[frame] - run.time[0], rel=1e-6, abs=1e-9)
+        np.testing.assert_allclose(universe.atoms.positions[:, :2], run.position[frame], atol=1e-6)
+        np.testing.assert_allclose(universe.atoms.velocities[:, :2], run.velocity[frame], atol=1e-6)
+        assert not universe.atoms.positions[:, 2].any()
+    heavy = universe.select_atoms("type heavy")
+    np.testing.assert_array_equal(heavy.indices, np.flatnonzero(run.of_species("heavy")))
+    np.testing.assert_allclose(heavy.masses, run.mass[heavy.indices])
+    np.testing.assert_allclose(universe.atoms.radii, run.radius)
+
+
+def test_analyses_of_mdanalysis_work_on_a_run(run):
+    reader("MDAnalysis")
+    from MDAnalysis.analysis.rms import RMSF
+
+    atoms = mdanalysis_universe(run).atoms
+    spread = np.sqrt(np.sum(np.var(run.position[:], axis=0), axis=1))
+    np.testing.assert_allclose(RMSF(atoms).run().results.rmsf, spread, rtol=1e-4)
+
+
+def test_csv_is_read_by_numpy(run):
+    table = np.genfromtxt(
+        exported(run, "run.csv", "--every", 2), delimiter=",", names=True, dtype=None
+    )
+    frames = range(0, run.frames, 2)
+    assert len(table) == len(frames) * run.count
+    np.testing.assert_array_equal(
+        table["vx"], np.concatenate([run.velocity[k][:, 0] for k in frames])
+    )
+    np.testing.assert_array_equal(table["time"], np.repeat(run.time[frames], run.count))
+    assert set(table["species"]) == {"light", "heavy"}
