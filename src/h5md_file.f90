@@ -1,41 +1,19 @@
-!> The output file of a run in H5MD layout: where frames, observables and events stand, and that what is
-!> committed is there. https://www.nongnu.org/h5md/h5md.html, version 1.1.
+!> The output file of a run in H5MD layout: where frames, observables and events stand.
+!> https://www.nongnu.org/h5md/h5md.html, version 1.1.
 !>
-!> Each of the three is a track: series that grow together, and a counter of the samples that are complete,
-!> written after their data have been flushed. A reader, or a restart, goes by the counter.
+!> A file never changes its layout. When the number of samples is known at the start it has room for just
+!> these; else, when the room is used up, and at the end, a file that fits takes its place in one instant.
 module h5md_file
   use kinds, only: int32, int64, real64
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
-  use system, only: seconds
-  use texts, only: written
+  use sample_track, only: track_t
+  use system, only: remove_file, seconds
   implicit none
   private
-  public :: h5md_file_t, track_t
+  public :: h5md_file_t
 
-  integer(int64), parameter :: most_in_chunk = 512      !! samples
-  integer(int64), parameter :: chunk_bytes = 65536      !! aim for small frames; large ones are one chunk
-  integer(int64), parameter :: block_bytes = 1048576    !! room made at once for an unknown number of frames
-  integer(int64), parameter :: batch_bytes = 262144     !! samples that wait to be written together
   real(real64), parameter :: longest_wait = 0.05_real64 !! of a sample before it is written [s]
-
-  !> Series that grow together: step, time, values; of events: values alone.
-  type :: track_t
-    type(series_t), allocatable :: series(:)
-    character(len=:), allocatable :: counter            !! name of the dataset
-    integer(int64) :: committed = 0                     !! samples that are complete in the file
-    integer(int64) :: put = 0                           !! samples handed over, be they written or not
-    real(real64), private :: waiting_since = 0.0_real64 !! of the oldest sample that is not written [s]
-  contains
-    procedure :: make => make_track
-    procedure :: resume => resume_track
-    procedure :: put_moment
-    procedure :: commit
-    procedure :: write_waiting
-    procedure :: cut => cut_track
-    procedure :: room => track_room
-    procedure, private :: block_of, batch_of
-  end type track_t
 
   type :: h5md_file_t
     type(hdf5_file_t) :: file
@@ -45,11 +23,16 @@ module h5md_file
     procedure :: plan_observables
     procedure :: plan_events
     procedure :: make_tracks
-    procedure, private :: link_moments
     procedure :: put_observables
     procedure :: put_events
+    procedure :: reserve_frame
     procedure :: write_old
     procedure :: write_all
+    procedure :: trim => trim_file
+    procedure :: close => close_file
+    procedure, private :: capacities
+    procedure, private :: reserve
+    procedure, private :: rebuild
   end type h5md_file_t
 
   character(len=*), parameter :: disks = "particles/disks/"
@@ -111,31 +94,14 @@ contains
       series_t(element//"/time", double_precision, [integer ::])]
   end function moments
 
-  !> Makes room in the file for what is planned.
+  !> Makes room in a new file for what is planned.
   subroutine make_tracks(self, frames, samples)
     class(h5md_file_t), intent(inout) :: self
     integer(int64), intent(in) :: frames, samples       !! of observables; 0: unknown
     call self%frames%make(self%file, frames)
-    call self%link_moments(self%frames)
     call self%observables%make(self%file, samples)
-    call self%link_moments(self%observables)
-    if (allocated(self%events%series)) call self%events%make(self%file, 0_int64)
-    call self%file%flush()
+    call self%events%make(self%file, 0_int64)
   end subroutine make_tracks
-
-  !> Gives all elements the step and time of the first, as H5MD wants it for what is sampled together.
-  subroutine link_moments(self, track)
-    class(h5md_file_t), intent(inout) :: self
-    type(track_t), intent(in) :: track
-    character(len=:), allocatable :: element
-    integer :: k
-    do k = 4, size(track%series)
-      element = track%series(k)%name
-      element = element(:len(element) - len("value"))
-      call self%file%link(track%series(1)%name, element//"step")
-      call self%file%link(track%series(2)%name, element//"time")
-    end do
-  end subroutine link_moments
 
   !> Appends one sample of all observables.
   subroutine put_observables(self, time, values)
@@ -143,6 +109,7 @@ contains
     real(real64), intent(in) :: time
     real(real64), intent(in) :: values(:)               !! components one after the other
     integer :: k, first
+    call self%reserve([0_int64, 1_int64, 0_int64])
     associate (track => self%observables)
       call track%put_moment(self%file, time)
       first = 1
@@ -169,9 +136,10 @@ contains
     integer(int32), allocatable :: column(:)
     integer(int64) :: first, count
     if (n == 0) return
+    count = n
+    call self%reserve([0_int64, 0_int64, count])
     associate (track => self%events)
       first = track%put + 1
-      count = n
       call track%series(1)%put(self%file, first, count, time)
       column = pair(1, :n)
       call track%series(2)%put(self%file, first, count, column)
@@ -182,106 +150,94 @@ contains
     end associate
   end subroutine put_events
 
-  !> Makes room for `planned` samples, or for a block of them if their number is unknown (0).
-  subroutine make_track(self, file, planned)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: planned
-    integer(int64) :: extent, chunk
-    integer :: k
-    extent = planned
-    if (planned == 0) extent = self%block_of()
-    do k = 1, size(self%series)
-      associate (series => self%series(k))
-        series%block = self%block_of()
-        series%batch = self%batch_of()
-        chunk = max(1_int64, min(most_in_chunk, extent, chunk_bytes/series%room()))
-        call series%make(file, extent, chunk)
-      end associate
+  !> Makes sure that there is room for one more frame.
+  subroutine reserve_frame(self)
+    class(h5md_file_t), intent(inout) :: self
+    call self%reserve([1_int64, 0_int64, 0_int64])
+  end subroutine reserve_frame
+
+  !> Makes sure that there is room for more samples of each track.
+  subroutine reserve(self, more)
+    class(h5md_file_t), intent(inout) :: self
+    integer(int64), intent(in) :: more(3)               !! frames, observables, events
+    integer(int64) :: wanted(3)
+    wanted = [self%frames%larger(more(1)), self%observables%larger(more(2)), self%events%larger(more(3))]
+    if (any(wanted > self%capacities())) call self%rebuild(wanted)
+  end subroutine reserve
+
+  pure function capacities(self) result(n)
+    class(h5md_file_t), intent(in) :: self
+    integer(int64) :: n(3)
+    n = [self%frames%capacity, self%observables%capacity, self%events%capacity]
+  end function capacities
+
+  !> Gives up the room that is not used. If there is no room for the copy it stays: the counters hold.
+  subroutine trim_file(self)
+    class(h5md_file_t), intent(inout) :: self
+    integer(int64) :: used(3)
+    call self%write_all()
+    if (allocated(self%file%trouble)) return
+    used = [self%frames%committed, self%observables%committed, self%events%committed]
+    if (all(used == self%capacities())) return
+    call self%rebuild(used)
+    if (allocated(self%file%trouble)) deallocate (self%file%trouble)
+  end subroutine trim_file
+
+  !> Puts a file with other capacities in the place of this one.
+  subroutine rebuild(self, capacity)
+    class(h5md_file_t), intent(inout) :: self
+    integer(int64), intent(in) :: capacity(3)
+    character(len=*), parameter :: fixed(8) = [character(len=23) :: "h5md", "parameters", &
+      "provenance", disks//"box", disks//"id", disks//"species", disks//"mass", disks//"radius"]
+    type(h5md_file_t) :: new
+    integer :: k, length
+    call self%write_all()
+    if (allocated(self%file%trouble)) return
+    call remove_file(self%file%path//"_new")
+    call new%file%create(self%file%path//"_new", 0)
+    do k = 1, size(fixed)
+      call new%file%copy(self%file, trim(fixed(k)))
     end do
-    call file%put(self%counter, [integer ::], [0_int64])
-  end subroutine make_track
-
-  !> Samples by which the track grows.
-  pure function block_of(self) result(n)
-    class(track_t), intent(in) :: self
-    integer(int64) :: n
-    n = max(1_int64, min(most_in_chunk, block_bytes/self%room()))
-  end function block_of
-
-  !> Samples that wait for each other.
-  pure function batch_of(self) result(n)
-    class(track_t), intent(in) :: self
-    integer(int64) :: n
-    n = max(1_int64, min(most_in_chunk, batch_bytes/self%room()))
-  end function batch_of
-
-  !> Bytes of one sample.
-  pure function track_room(self) result(bytes)
-    class(track_t), intent(in) :: self
-    integer(int64) :: bytes
-    integer :: k
-    bytes = 0
-    do k = 1, size(self%series)
-      bytes = bytes + self%series(k)%room()
+    do k = 3, size(self%observables%series)
+      length = index(self%observables%series(k)%name, "/kinetic_energy/")
+      if (length > 0) call copy_population(self%observables%series(k)%name(:length - 1))
     end do
-  end function track_room
+    call new%frames%copy(new%file, self%frames, self%file, capacity(1))
+    call new%observables%copy(new%file, self%observables, self%file, capacity(2))
+    call new%events%copy(new%file, self%events, self%file, capacity(3))
+    call new%file%flush()
+    call new%file%rename(self%file%path)
+    if (allocated(new%file%trouble)) then
+      self%file%trouble = new%file%trouble
+      self%file%unsaved = new%file%unsaved
+      call new%close()
+      call remove_file(self%file%path//"_new")
+    else
+      call self%close()
+      self%file = new%file
+      self%frames = new%frames
+      self%observables = new%observables
+      self%events = new%events
+    end if
 
-  !> Opens the track of a file and goes back to its first `count` samples.
-  subroutine resume_track(self, file, count)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: count
-    integer(int64) :: committed(1)
-    integer :: k
-    committed = 0
-    call file%fetch(self%counter, 1, committed)
-    if (committed(1) < count) call file%check(-1, "go on: "//self%counter//" is " &
-      //written(committed(1))//", the checkpoint says "//written(count))
-    do k = 1, size(self%series)
-      self%series(k)%block = self%block_of()
-      self%series(k)%batch = self%batch_of()
-      call self%series(k)%open(file)
-    end do
-    self%committed = count
-    self%put = count
-    if (committed(1) /= count) call file%replace(self%counter, count)
-  end subroutine resume_track
+  contains
 
-  !> Writes step and time of the sample that is being written.
-  subroutine put_moment(self, file, time)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    real(real64), intent(in) :: time
-    call self%series(1)%put(file, self%put + 1, 1_int64, [self%put])
-    call self%series(2)%put(file, self%put + 1, 1_int64, [time])
-  end subroutine put_moment
+    !> What a group of observables holds besides its series.
+    subroutine copy_population(group)
+      character(len=*), intent(in) :: group
+      call new%file%copy(self%file, group//"/particle_number")
+      call new%file%put(group//"@dimension", [integer ::], [2_int32])
+    end subroutine copy_population
 
-  !> Declares the next samples complete. They are written when a batch is full or, at the latest, when they
-  !> have waited long enough.
-  subroutine commit(self, file, count)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: count                 !! of samples
-    if (self%put == self%committed) self%waiting_since = seconds()
-    self%put = self%put + count
-    if (self%put - self%committed >= self%batch_of()) call self%write_waiting(file)
-  end subroutine commit
+  end subroutine rebuild
 
-  !> Writes what waits: first the data, then the counter.
-  subroutine write_waiting(self, file)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer :: k
-    if (self%put == self%committed) return
-    do k = 1, size(self%series)
-      call self%series(k)%write_waiting(file)
-    end do
-    call file%flush()
-    call file%replace(self%counter, self%put)
-    call file%flush()
-    if (.not. allocated(file%trouble)) self%committed = self%put
-  end subroutine write_waiting
+  subroutine close_file(self)
+    class(h5md_file_t), intent(inout) :: self
+    call self%frames%close()
+    call self%observables%close()
+    call self%events%close()
+    call self%file%close()
+  end subroutine close_file
 
   !> Writes the samples that have waited long enough.
   subroutine write_old(self)
@@ -300,16 +256,5 @@ contains
     call self%observables%write_waiting(self%file)
     call self%events%write_waiting(self%file)
   end subroutine write_all
-
-  !> Gives up the room that was not used.
-  subroutine cut_track(self, file)
-    class(track_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer :: k
-    if (.not. allocated(self%series)) return
-    do k = 1, size(self%series)
-      call self%series(k)%cut(file, self%committed)
-    end do
-  end subroutine cut_track
 
 end module h5md_file

@@ -7,7 +7,7 @@ module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, &
     h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, &
-    h5gcreate_f, h5gclose_f, h5lexists_f, h5lcreate_hard_f, h5oopen_f, h5oclose_f, &
+    h5gcreate_f, h5gclose_f, h5lexists_f, h5lcreate_hard_f, h5ocopy_f, h5oopen_f, h5oclose_f, &
     h5acreate_f, h5aexists_f, h5aopen_f, h5awrite_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, &
     h5dget_space_f, h5dget_type_f, h5screate_f, h5screate_simple_f, h5sclose_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tclose_f, &
@@ -40,6 +40,7 @@ module hdf5_objects
     procedure :: failure
     procedure :: make_group
     procedure :: link
+    procedure :: copy
     procedure :: has
     generic :: put => put_reals, put_integers, put_longs, put_text, put_texts
     generic :: fetch => fetch_reals, fetch_integers, fetch_longs
@@ -189,6 +190,20 @@ contains
     call self%check(status, "link "//second_name)
     call h5pclose_f(links, closed)
   end subroutine link
+
+  !> Takes over an object of another file, with all that is in it.
+  subroutine copy(self, source, name)
+    class(hdf5_file_t), intent(inout) :: self
+    type(hdf5_file_t), intent(in) :: source
+    character(len=*), intent(in) :: name
+    integer(hid_t) :: links
+    integer :: status, closed
+    if (allocated(self%trouble)) return
+    call prepare_links(links, status)
+    if (status >= 0) call h5ocopy_f(source%id, name, self%id, name, status, lcpl_id=links)
+    call self%check(status, "copy "//name)
+    call h5pclose_f(links, closed)
+  end subroutine copy
 
   !> Whether there is an object of this name; the groups on its way must exist.
   function has(self, name) result(yes)

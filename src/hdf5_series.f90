@@ -1,13 +1,14 @@
-!> Datasets that grow along their last dimension. Storage is allocated ahead, whole or in blocks, so that
-!> between two allocations no metadata change: a kill at any moment, or a reader, meets a file in order.
-!> Small items wait in memory until they are written together: a call of the library costs as much as a
-!> hundred kilobytes.
+!> Datasets that are filled along their last dimension. Their storage is allocated as a whole when they are
+!> made and takes no room on the disk before it is filled; nothing but data is ever written after that, so
+!> that a kill at any moment, or a reader, meets a file in order. Small items wait in memory until they are
+!> written together: a call of the library costs as much as a hundred kilobytes.
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int8
   use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5kind_to_type, h5dcreate_f, h5dopen_f, &
-    h5dwrite_f, h5dclose_f, h5dget_space_f, h5dset_extent_f, h5pclose_f, h5pset_chunk_f, &
-    h5screate_simple_f, h5sclose_f, h5sselect_hyperslab_f, h5s_select_set_f, h5s_unlimited_f, &
-    h5t_native_double, h5t_ieee_f32le, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
+    h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5pclose_f, h5screate_simple_f, h5sclose_f, &
+    h5sselect_hyperslab_f, h5s_select_set_f, h5t_native_double, h5t_ieee_f32le, h5t_ieee_f64le, &
+    h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t, prepare_dataset, prepare_links
   use kinds, only: int32, int64, real64
   implicit none
@@ -18,15 +19,15 @@ module hdf5_series
   integer, parameter :: double_precision = 1, single_precision = 2, short_integer = 3, &
     long_integer = 4
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
+  integer(int64), parameter :: copied_at_once = 1048576     !! [bytes]
 
   !> One series. Its name, storage and shape are given, then it is made or opened.
   type :: series_t
     character(len=:), allocatable :: name
     integer :: storage = double_precision
     integer, allocatable :: item(:)               !! shape of one item; empty: a number
-    integer(int64) :: block = 1                   !! items by which it grows when it is full
     integer(int64) :: batch = 1                   !! items that are written together
-    integer(int64), private :: extent = 0         !! items there is room for
+    integer(int64) :: capacity = 0                !! items there is room for
     integer(int64), private :: waiting = 0        !! items put but not written
     integer(int64), private :: first_waiting = 0  !! number of the first of them
     real(real64), allocatable, private :: reals(:)          !! the waiting items, by the kind of their values
@@ -37,11 +38,12 @@ module hdf5_series
     procedure :: make
     procedure :: open => open_series
     procedure :: write_waiting
-    procedure :: cut
+    procedure :: copy
+    procedure :: close => close_series
     procedure :: room
     generic :: put => put_reals, put_integers, put_longs
     procedure, private :: put_reals, put_integers, put_longs
-    procedure, private :: grow, place_in_batch, write_items
+    procedure, private :: place_in_batch, write_items, read_items, storage_type
   end type series_t
 
 contains
@@ -53,27 +55,29 @@ contains
     bytes = bytes_of(self%storage)*product(int(self%item, int64))
   end function room
 
-  !> Makes the series with storage for `extent` items.
-  subroutine make(self, file, extent, chunk)
+  !> Its HDF5 type in the file.
+  function storage_type(self) result(type)
+    class(series_t), intent(in) :: self
+    integer(hid_t) :: type, types(4)
+    types = [h5t_ieee_f64le, h5t_ieee_f32le, h5t_std_i32le, h5t_std_i64le]
+    type = types(self%storage)
+  end function storage_type
+
+  !> Makes the series with room for `capacity` items.
+  subroutine make(self, file, capacity)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: extent
-    integer(int64), intent(in) :: chunk           !! items that lie together in the file
-    integer(hid_t) :: space, properties, links, types(4)
-    integer(hsize_t) :: item(size(self%item))
-    integer :: status, closed, rank
+    integer(int64), intent(in) :: capacity
+    integer(hid_t) :: space, properties, links
+    integer :: status, closed
     if (allocated(file%trouble)) return
-    types = [h5t_ieee_f64le, h5t_ieee_f32le, h5t_std_i32le, h5t_std_i64le]
-    self%extent = extent
-    item = self%item
-    rank = size(item) + 1
+    self%capacity = capacity
     call prepare_dataset(properties, status)
-    if (status >= 0) call h5pset_chunk_f(properties, rank, [item, int(chunk, hsize_t)], status)
-    if (status >= 0) call h5screate_simple_f(rank, [item, int(extent, hsize_t)], space, status, &
-      [item, int(h5s_unlimited_f, hsize_t)])
     if (status >= 0) call prepare_links(links, status)
-    if (status >= 0) call h5dcreate_f(file%id, self%name, types(self%storage), space, self%id, &
-      status, properties, links)
+    if (status >= 0) call h5screate_simple_f(size(self%item) + 1, &
+      int([int(self%item, int64), capacity], hsize_t), space, status)
+    if (status >= 0) call h5dcreate_f(file%id, self%name, self%storage_type(), space, self%id, status, &
+      properties, links)
     call file%check(status, "write "//self%name)
     call h5sclose_f(space, closed)
     call h5pclose_f(properties, closed)
@@ -86,24 +90,34 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer :: status
     if (allocated(file%trouble)) return
-    self%extent = file%length(self%name)/product(int(self%item, int64))
+    self%capacity = file%length(self%name)/product(int(self%item, int64))
     call h5dopen_f(file%id, self%name, self%id, status)
     call file%check(status, "be read: "//self%name)
   end subroutine open_series
 
-  !> Gives up what lies beyond the first `count` items, and closes the series.
-  subroutine cut(self, file, count)
+  subroutine close_series(self)
     class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: count
     integer :: status
-    if (allocated(file%trouble)) return
-    status = 0
-    if (count /= self%extent) call h5dset_extent_f(self%id, int([int(self%item, int64), count], &
-      hsize_t), status)
-    if (status >= 0) call h5dclose_f(self%id, status)
-    call file%check(status, "write "//self%name)
-  end subroutine cut
+    if (self%id >= 0) call h5dclose_f(self%id, status)
+    self%id = -1
+  end subroutine close_series
+
+  !> Takes over the first `count` items of the same series in another file.
+  subroutine copy(self, file, source, source_file, count)
+    class(series_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file, source_file
+    class(series_t), intent(in) :: source
+    integer(int64), intent(in) :: count
+    integer(int8), allocatable, target :: buffer(:)
+    integer(int64) :: first, n, step
+    step = max(1_int64, copied_at_once/self%room())
+    allocate (buffer(min(step, count)*self%room()))
+    do first = 1, count, step
+      n = min(step, count - first + 1)
+      call source%read_items(source_file, first, n, self%storage_type(), c_loc(buffer))
+      call self%write_items(file, first, n, self%storage_type(), c_loc(buffer))
+    end do
+  end subroutine copy
 
   subroutine put_reals(self, file, first, count, values)
     class(series_t), intent(inout) :: self
@@ -112,7 +126,6 @@ contains
     integer(int64), intent(in) :: count           !! of items
     real(real64), intent(in), target :: values(*)
     integer(int64) :: n, at
-    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5t_native_double, c_loc(values))
     else
@@ -129,7 +142,6 @@ contains
     integer(int64), intent(in) :: first, count
     integer(int32), intent(in), target :: values(*)
     integer(int64) :: n, at
-    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
     else
@@ -146,7 +158,6 @@ contains
     integer(int64), intent(in) :: first, count
     integer(int64), intent(in), target :: values(*)
     integer(int64) :: n, at
-    call self%grow(file, first + count - 1)
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
     else
@@ -188,44 +199,54 @@ contains
     end if
   end subroutine write_waiting
 
-  !> Makes room for items up to number `last`, by whole blocks. When an item is put, not when it is written:
-  !> then the same run gives a file of the same layout, however its batches fell.
-  subroutine grow(self, file, last)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: last
-    integer :: status
-    if (last <= self%extent .or. allocated(file%trouble)) return
-    do while (self%extent < last)
-      self%extent = self%extent + self%block
-    end do
-    call h5dset_extent_f(self%id, int([int(self%item, int64), self%extent], hsize_t), status)
-    call file%check(status, "write "//self%name)
-    call file%flush()
-  end subroutine grow
-
-  !> Writes items.
   subroutine write_items(self, file, first, count, in_memory, address)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
     integer(hid_t), intent(in) :: in_memory
     type(c_ptr), intent(in) :: address
-    integer(hid_t) :: space, here
-    integer(hsize_t) :: start(size(self%item) + 1), counts(size(self%item) + 1)
+    integer(hid_t) :: there, here
     integer :: status, closed
     if (allocated(file%trouble)) return
+    file%unsaved = file%unsaved + count*self%room()
+    call select_items(self, first, count, there, here, status)
+    if (status >= 0) call h5dwrite_f(self%id, in_memory, address, status, here, there)
+    call file%check(status, "write "//self%name)
+    call h5sclose_f(there, closed)
+    call h5sclose_f(here, closed)
+  end subroutine write_items
+
+  subroutine read_items(self, file, first, count, in_memory, address)
+    class(series_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: first, count
+    integer(hid_t), intent(in) :: in_memory
+    type(c_ptr), intent(in) :: address
+    type(c_ptr) :: place
+    integer(hid_t) :: there, here
+    integer :: status, closed
+    if (allocated(file%trouble)) return
+    place = address
+    call select_items(self, first, count, there, here, status)
+    if (status >= 0) call h5dread_f(self%id, in_memory, place, status, here, there)
+    call file%check(status, "be read: "//self%name)
+    call h5sclose_f(there, closed)
+    call h5sclose_f(here, closed)
+  end subroutine read_items
+
+  !> Some items, as part of the file and of the memory.
+  subroutine select_items(self, first, count, there, here, status)
+    class(series_t), intent(in) :: self
+    integer(int64), intent(in) :: first, count
+    integer(hid_t), intent(out) :: there, here
+    integer, intent(out) :: status
+    integer(hsize_t) :: start(size(self%item) + 1), counts(size(self%item) + 1)
     counts = [int(self%item, hsize_t), int(count, hsize_t)]
     start = 0
     start(size(start)) = first - 1
-    file%unsaved = file%unsaved + count*self%room()
     call h5screate_simple_f(size(counts), counts, here, status)
-    if (status >= 0) call h5dget_space_f(self%id, space, status)
-    if (status >= 0) call h5sselect_hyperslab_f(space, h5s_select_set_f, start, counts, status)
-    if (status >= 0) call h5dwrite_f(self%id, in_memory, address, status, here, space)
-    call file%check(status, "write "//self%name)
-    call h5sclose_f(space, closed)
-    call h5sclose_f(here, closed)
-  end subroutine write_items
+    if (status >= 0) call h5dget_space_f(self%id, there, status)
+    if (status >= 0) call h5sselect_hyperslab_f(there, h5s_select_set_f, start, counts, status)
+  end subroutine select_items
 
 end module hdf5_series

@@ -116,7 +116,7 @@ contains
       call h5md%file%open(part_of(path), writable=.true.)
       call h5md%frames%resume(h5md%file, progress%frames%count)
       call h5md%observables%resume(h5md%file, progress%observables%count)
-      if (settings%output%event_log) call h5md%events%resume(h5md%file, progress%events)
+      call h5md%events%resume(h5md%file, progress%events)
       call h5md%file%flush()
       call h5md%file%failure(error)
     end associate
@@ -228,6 +228,7 @@ contains
     integer(int32) :: i
     integer(int64) :: k
     call self%progress%frames%take(sim)
+    call self%h5md%reserve_frame()
     associate (file => self%h5md%file, track => self%h5md%frames, n => sim%n_disks())
       k = track%put + 1
       call track%put_moment(file, sim%time())
@@ -315,7 +316,7 @@ contains
       //last_problem())
   end subroutine save
 
-  !> Ends the output of a finished run: the last samples, the extents cut to what was written, a look at
+  !> Ends the output of a finished run: the last samples, unused room given up, a look at
   !> the file, its final name.
   subroutine finish(self, sim, wall_seconds, error)
     class(output_t), intent(inout) :: self
@@ -326,12 +327,9 @@ contains
     if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
     associate (h5md => self%h5md)
-      call h5md%write_all()
-      call h5md%frames%cut(h5md%file)
-      call h5md%observables%cut(h5md%file)
-      call h5md%events%cut(h5md%file)
+      call h5md%trim()
       call describe_cost(h5md%file, sim, self%progress%spent + wall_seconds)
-      call h5md%file%close()
+      call h5md%close()
       call h5md%file%failure(error)
     end associate
     if (.not. allocated(error)) call check_file(part_of(self%path), self%progress, sim, error)
@@ -371,7 +369,7 @@ contains
   subroutine release(self)
     class(output_t), intent(inout) :: self
     call self%h5md%write_all()
-    call self%h5md%file%close()
+    call self%h5md%close()
     call self%lock%release()
   end subroutine release
 
