@@ -1,5 +1,6 @@
 !> Short texts: lists of them, numbers as text, and the known word nearest to a misspelt one.
 module texts
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
   implicit none
   private
@@ -40,7 +41,10 @@ contains
     character(len=:), allocatable :: text
     character(len=24) :: buffer
     integer :: exponent
-    if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
+    if (.not. ieee_is_normal(number)) then          ! NaN, infinite, or its power of ten underflows
+      write (buffer, '(es24.16e3)') number
+      text = trim(adjustl(buffer))
+    else if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
       write (buffer, '(f24.6)') number
       text = trim(adjustl(buffer(:verify(buffer, '0', back=.true.))))
       if (text(len(text):) == '.') text = text(:len(text) - 1)
