@@ -2,21 +2,23 @@
 
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
-Reads the collisions per second that each run notes of itself; the best of equal runs counts.
-Lines: powers of N through the middle of each.
+Reads the collisions per second of processor time that each run notes of itself; the best of equal
+runs counts.  Lines: powers of N fitted to the points from --fit-from disks on; below, what a
+collision costs anyway is not small beside the search.  Cells look at as many disks whatever N is;
+what rises is the cost of reaching them, when they no longer fit into the caches.
 """
 
 import numpy as np
 
 from drawing import COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv
 from read_run import Run, RunError
+from theory import PowerLaw, fit_power_law
 
 LABELS = {
     "rescan": "everything anew at each collision",
     "pairs": "all pairs of the disks just involved",
     "cells": "neighbouring cells",
 }
-POWERS = {"rescan": 2, "pairs": 1, "cells": 0}
 
 
 def microseconds(run: Run) -> float:
@@ -36,35 +38,56 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return {search: tuple(np.array(sorted(points.items())).T) for search, points in least.items()}
 
 
-def draw(measured: dict) -> plt.Figure:
-    """Doubly logarithmic."""
-    figure, axes = plt.subplots(figsize=(6.5, 5))
-    for search, colour, marker in zip(POWERS, COLOURS, "osD", strict=False):
+def fits(measured: dict, fit_from: int) -> dict[str, PowerLaw]:
+    """Search -> power of N through the points of at least so many disks, three or more."""
+    laws = {}
+    for search, (n, cost) in measured.items():
+        many = n >= fit_from
+        law = fit_power_law(n[many], cost[many], 1e-3 * cost[many])  # the scatter makes the error
+        if law:
+            laws[search] = law
+    return laws
+
+
+def draw(measured: dict, laws: dict[str, PowerLaw], fit_from: int) -> plt.Figure:
+    """Doubly logarithmic; the fits dotted where they are prolonged."""
+    figure, axes = plt.subplots(figsize=(7, 5.5))
+    for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search not in measured:
             continue
         n, cost = measured[search]
         axes.loglog(
             n, cost, ls="", marker=marker, color=colour, label=f"{search}: {LABELS[search]}"
         )
-        power = POWERS[search]
-        line = np.median(cost / n**power) * n**power
-        axes.loglog(n, line, color=colour, lw=1, label=f"$\\propto N^{power}$")
+        if search not in laws:
+            continue
+        law = laws[search]
+        style = {"color": colour, "lw": 1}
+        axes.plot(n, law(n), ls=":", **style)
+        fitted = n[n >= fit_from]
+        label = f"$\\propto N^{{{law.exponent:.3f} \\pm {law.exponent_error:.3f}}}$"
+        axes.plot(fitted, law(fitted), label=label, **style)
     axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
     axes.legend()
     return figure
 
 
 def main() -> None:
-    args = command_line(__doc__, "cost.png", table=True).parse_args()
+    parser = command_line(__doc__, "cost.png", table=True)
+    parser.add_argument("--fit-from", type=int, default=128, metavar="N", help="[128]")
+    args = parser.parse_args()
     runs = read_all(args.runs)
     measured = costs(runs)
+    laws = fits(measured, args.fit_from)
     table = {
         "search": [search for search, (n, _) in measured.items() for _ in n],
         "N": [int(k) for n, _ in measured.values() for k in n],
         "microseconds": [float(c) for _, cost in measured.values() for c in cost],
     }
     print_table(table)
-    save(draw(measured), args.output, runs, "Cost of a collision")
+    for search, law in laws.items():
+        print(f"exponent_{search} = {law.exponent:.3f} +- {law.exponent_error:.3f}")
+    save(draw(measured, laws, args.fit_from), args.output, runs, "Cost of a collision")
     if args.csv:
         write_csv(args.csv, table)
 

@@ -7,25 +7,30 @@ python=${PYTHON:-.venv/bin/python}
 data=runs/cost figures=runs/figures
 mkdir -p "$data" "$figures"
 
-# Packing fraction 0.3 whatever the number; no output on the way.
-measure() { # search, pairs to look at in a run, power of N that a collision costs, counts
-  local search=$1 pairs=$2 power=$3 count collisions radius
-  shift 3
+# Packing fraction 0.3 whatever the number; no output on the way. Collisions enough that the first
+# predictions, one per disk, do not count: 10 per disk, 5 of a million disks; with `rescan`, which
+# predicts all disks at each collision, some hundreds at all.
+measure() { # collisions, collisions per disk, power of N to divide the first by, search, counts
+  local collisions=$1 per_disk=$2 power=$3 search=$4 count number radius
+  shift 4
   for count; do
-    collisions=$((pairs / count ** power))
+    number=$(awk -v c="$collisions" -v d="$per_disk" -v p="$power" -v n="$count" \
+      'BEGIN { few = c / n^p; if (few < d * n / 2) few = d * n / 2; printf "%d", few }')
     radius=$(awk -v n="$count" 'BEGIN { printf "%.17g", sqrt(0.3 / (atan2(0, -1) * n)) }')
-    printf '%s_%s\t--set run.search=%s --set species.gas.count=%s --set species.gas.radius=%s ' \
-      "$search" "$count" "$search" "$count" "$radius"
-    printf -- '--set %s=%s ' stop.collisions "$collisions" \
-      output.frames_every_collisions "$collisions" output.observables_every_collisions "$collisions"
+    printf '%s_%s_%s\t--set run.search=%s --set species.gas.count=%s --set species.gas.radius=%s ' \
+      "$search" "$count" "$repeat" "$search" "$count" "$radius"
+    printf -- '--set %s=%s ' stop.collisions "$number" stop.collisions_per_disk 1e9 \
+      output.precision single \
+      output.frames_every_collisions "$number" output.observables_every_collisions "$number"
     printf '\n'
   done
 }
-{
-  measure rescan 200000000 2 64 128 256 512 1024
-  measure pairs 100000000 1 64 128 256 512 1024 2048 4096
-  measure cells 1000000 0 64 128 256 512 1024 2048 4096 8192 16384 32768 65536
-} >"$data/members.txt"
+for repeat in 1 2 3; do # the best of three counts: a disturbance can only add
+  measure 200000000 0 2 rescan 16 32 64 128 256 512 1024
+  measure 100000000 10 1 pairs 16 32 64 128 256 512 1024 2048 4096 8192
+  measure 1000000 10 0 cells 16 64 256 1024 4096 16384 65536 262144
+  measure 1000000 5 0 cells 1048576
+done >"$data/members.txt"
 
 runs/ensemble.sh input/gas.nml -d "$data" --manifest "$data/members.txt" "$@" -j 1
 "$python" post/cost.py "$data"/*.h5 -o "$figures/cost.png" --csv "$figures/cost.csv"
