@@ -27,16 +27,27 @@ from read_run import Run, RunError
 def paths_of(run: Run, disks: list[int], count: int | None = None) -> list[np.ndarray]:
     """(T', 2) positions of each disk in the first `count` frames.
 
-    A row of NaN breaks the line where a periodic side is crossed.
+    A path that crosses periodic sides goes on beyond them, and comes in from beyond: a row of NaN
+    breaks the line between the two pieces.
     """
     paths = list(np.moveaxis(run.position[:count][:, disks], 1, 0))
     if run.image is None:
         return paths
-    jumps = np.any(np.diff(run.image[:count][:, disks], axis=0), axis=2).T
-    return [
-        np.insert(path, np.flatnonzero(jump) + 1, np.nan, axis=0)
-        for path, jump in zip(paths, jumps, strict=True)
-    ]
+    images = np.moveaxis(run.image[:count][:, disks], 1, 0)
+    return [wrapped(*track, run.edges) for track in zip(paths, images, strict=True)]
+
+
+def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """The path (T, 2) with each step over a side drawn in every cell that it may touch."""
+    rows = [path[:1]]
+    gap = np.full((1, 2), np.nan)
+    for start, end, jump in zip(path[:-1], path[1:], np.diff(image, axis=0), strict=True):
+        step = np.array([start, end + jump * edges])
+        rows.append(step[1:])
+        corners = {(i, j) for i in (0, jump[0]) for j in (0, jump[1])} - {(0, 0)}
+        for corner in sorted(corners, key=lambda c: tuple(c) == tuple(jump)):
+            rows += [gap, step - corner * edges]
+    return np.concatenate(rows)
 
 
 def chosen_disks(run: Run, text: str | None) -> list[int]:

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# L3: circular walls and unequal disks: paths in three billiards, a round container, Brownian motion.
+# L3: circular walls and unequal disks: paths in the billiards of Sinai and Lorentz, the divergence of
+# neighbouring paths, a round container, Brownian motion.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python}
@@ -8,9 +9,31 @@ data=runs/billiards figures=runs/figures
 for name in sinai lorentz container; do
   runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 "$@"
 done
+
+# Sinai's disk from 64 places in 64 directions, each twice, 1e-12 apart; until they are far apart.
+mkdir -p "$data/sinai_pairs"
+for k in {1..64}; do
+  for shift in 0 1e-12; do
+    printf 'pair_%02d_%s\t' "$k" "$shift"
+    awk -v k="$k" -v shift="$shift" 'BEGIN {
+      set = " --set species.disk."
+      x = 0.02 + 0.2 * (0.618 * k % 1) + shift
+      y = 0.02 + 0.96 * (0.755 * k % 1)
+      printf "%sposition=%.17g,%.17g", set, x, y
+      printf "%svelocity=%.17g,%.17g", set, cos(2.4 * k), sin(2.4 * k)
+    }'
+    printf ' --set %s' stop.time=30 output.frames_every_time=0.1 stop.events=1000000 \
+      output.frames_every_events=1000000
+    printf '\n'
+  done
+done >"$data/sinai_pairs/members.txt"
+runs/ensemble.sh input/sinai.nml -d "$data/sinai_pairs" \
+  --manifest "$data/sinai_pairs/members.txt" "$@"
 runs/ensemble.sh input/brownian.nml -d "$data/brownian" --seeds 1 --set stop.time=10 "$@"
 "$python" post/trajectory.py "$data"/{sinai,lorentz}/seed_1.h5 --first 200 \
   -o "$figures/billiards.png"
+"$python" post/lyapunov.py "$data"/sinai_pairs/pair_*.h5 -o "$figures/lyapunov.png" \
+  --csv "$figures/lyapunov.csv"
 "$python" post/snapshot.py "$data/container/seed_1.h5" --frames 0,-1 --quiver \
   -o "$figures/container.png"
 "$python" post/trajectory.py "$data/brownian/seed_1.h5" --disks 2001 -o "$figures/brownian.png"

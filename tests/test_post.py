@@ -15,6 +15,7 @@ import energy
 import equipartition
 import export
 import gravity
+import lyapunov
 import mixture
 import scattering
 import snapshot
@@ -446,7 +447,21 @@ def test_paths_break_where_a_period_is_crossed(tmp_path):
         )
     )
     (path,) = trajectory.paths_of(run, [0])
-    np.testing.assert_array_equal(path, [[0.8, 0.5], [np.nan, np.nan], [0.1, 0.5], [0.4, 0.5]])
+    cut = [np.nan, np.nan]
+    np.testing.assert_allclose(
+        path, [[0.8, 0.5], [1.1, 0.5], cut, [-0.2, 0.5], [0.1, 0.5], [0.4, 0.5]]
+    )
+
+
+def test_paths_over_a_corner_are_drawn_in_the_cell_between():
+    path = trajectory.wrapped(
+        np.array([[0.9, 0.7], [0.5, 0.1]]), np.array([[0, 0], [1, 1]]), np.ones(2)
+    )
+    pieces = np.split(path, np.flatnonzero(np.isnan(path[:, 0])))
+    assert len(pieces) == 4, "as it leaves, through two cells that it may touch, as it arrives"
+    np.testing.assert_allclose(pieces[0], [[0.9, 0.7], [1.5, 1.1]])
+    np.testing.assert_allclose(pieces[-1][1:], [[-0.1, -0.3], [0.5, 0.1]])
+    assert any(np.allclose(piece[1:], [[-0.1, 0.7], [0.5, 1.1]]) for piece in pieces)
 
 
 def test_exports_keep_every_digit(tmp_path, rng):
@@ -482,6 +497,64 @@ def test_cost_takes_the_best_of_equal_runs(tmp_path):
     measured = cost.costs(runs)
     np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
     np.testing.assert_allclose(measured["cells"], [[10], [1]])
+
+
+def test_cost_fits_a_power_of_n_to_many_disks():
+    n = np.array([16, 128, 256, 512, 1024])
+    measured = {"rescan": (n, np.where(n < 100, 9, 3e-3 * n**1.9)), "cells": (n[:3], n[:3])}
+    laws = cost.fits(measured, 128)
+    assert laws["rescan"].exponent == pytest.approx(1.9) and "cells" not in laws
+    assert laws["rescan"].factor == pytest.approx(3e-3)
+    bent = cost.fits({"pairs": (n, n * np.array([1, 1, 1.1, 1, 1.1]))}, 16)["pairs"]
+    assert 0 < abs(bent.exponent - 1) < 2 * bent.exponent_error < 0.1
+
+
+# --- divergence ---
+
+
+def neighbours(folder, rng, pairs=3, growth=2.0, frames=81):
+    """Files of pairs of runs of two disks, 1e-12 exp(growth t) apart up to 0.5, time 0 to 16."""
+    time = np.linspace(0, 16, frames)
+    paths = []
+    for k in range(pairs):
+        x = rng.uniform(size=(frames, 2, 2))
+        slope = growth + 0.1 * (k - (pairs - 1) / 2)
+        apart = np.minimum(1e-12 * np.exp(slope * time), 0.5)
+        shifted = x + apart[:, None, None] * np.array([[0.6, 0], [0, 0.8]])
+        for name, where in (("a", x), ("b", shifted)):
+            paths.append(write_run(folder / f"{k}_{name}.h5", where, x, time=time))
+    return paths
+
+
+def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng):
+    runs = [read_run(path) for path in neighbours(tmp_path, rng)]
+    apart = np.array([lyapunov.distance(*runs[k : k + 2]) for k in (0, 2, 4)])
+    found = lyapunov.divergence(runs[0].time, apart, largest=0.01, skip=0.2)
+    np.testing.assert_allclose(found.slope, [1.9, 2.0, 2.1], atol=1e-3)
+    assert found.exponent.mean == pytest.approx(2, abs=1e-3)
+    assert found.exponent.error == pytest.approx(0.1 / 3**0.5, rel=0.02)
+    assert found.end == pytest.approx(10.8), "the last frame before the first pair is 0.01 apart"
+    with pytest.raises(RunError, match="nothing to fit"):
+        lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, skip=0.2)
+
+
+def test_lyapunov_follows_disks_through_periodic_sides(tmp_path):
+    x = np.array([[[0.9, 0.5]], [[0.1, 0.5]]])
+    image = np.array([[[0, 0]], [[1, 0]]])
+    sides = {"periodic": (True, False), "time": [0, 1]}
+    one = read_run(write_run(tmp_path / "1.h5", x, x, image=image, **sides))
+    shift = np.array([0.8, 0])
+    other = read_run(write_run(tmp_path / "2.h5", x + shift, x, image=0 * image, **sides))
+    np.testing.assert_allclose(lyapunov.distance(one, other), [0.8, 0.2])
+    later = read_run(write_run(tmp_path / "3.h5", x, x, time=[0, 2]))
+    with pytest.raises(RunError, match="not the same disks at the same times"):
+        lyapunov.distance(one, later)
+
+
+def test_lyapunov_wants_pairs(tmp_path, rng, capsys):
+    paths = neighbours(tmp_path, rng)
+    assert run_script("lyapunov", *paths[:3]) == 2
+    assert "3 runs: not pairs" in capsys.readouterr().err
 
 
 # --- every script draws ---
@@ -528,6 +601,8 @@ def runs_for(script, folder, rng):
         ]
     if script == "trajectory":
         return [gas(folder / "gas.h5", rng, count=3, obstacles=[((0.5, 0.5), 0.5, 1)])]
+    if script == "lyapunov":
+        return neighbours(folder, rng)
     if script == "cost":
         x = np.zeros((1, 3, 2))
         return [
@@ -557,6 +632,7 @@ def runs_for(script, folder, rng):
         "gravity",
         "trajectory",
         "cost",
+        "lyapunov",
     ],
 )
 def test_script_draws_and_tabulates(tmp_path, rng, script):

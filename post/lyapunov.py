@@ -1,0 +1,105 @@
+"""Divergence of neighbouring trajectories, and the Lyapunov exponent.
+
+    python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
+
+Takes the runs two by two in the order given: the same experiment started twice, a hair's breadth
+apart, with frames at the same times.  The distance of a pair is that of all positions, through
+periodic sides too.  It grows as exp(lambda t) until it is as large as the billiard; a straight line
+is fitted to its logarithm for each pair, over a time that is the same for all: from --skip of it
+on (the separation has to turn into the direction that grows) until the first pair is --largest
+apart.  lambda is the mean of the slopes, its error their standard error.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from drawing import COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv
+from read_run import Run, RunError
+from theory import Estimate, estimate
+
+
+class Divergence(NamedTuple):
+    """Logarithms of the distances of pairs, and lines through them from `begin` to `end`."""
+
+    time: np.ndarray  # (T,)
+    logarithm: np.ndarray  # (P, T)
+    slope: np.ndarray  # (P,) [1/time]
+    begin: float
+    end: float
+
+    @property
+    def exponent(self) -> Estimate:
+        """The Lyapunov exponent with its standard error."""
+        return estimate(self.slope)
+
+
+def distance(one: Run, other: Run) -> np.ndarray:
+    """(T,) between two runs, in the space of the positions of all disks."""
+    frames = min(one.frames, other.frames)
+    if one.count != other.count or not np.array_equal(one.time[:frames], other.time[:frames]):
+        raise RunError(f"{other.path}: not the same disks at the same times as in {one.path}")
+    apart = other.unwrapped(slice(frames)) - one.unwrapped(slice(frames))
+    return np.sqrt(np.sum(apart**2, axis=(1, 2)))
+
+
+def divergence(time: np.ndarray, apart: np.ndarray, largest: float, skip: float) -> Divergence:
+    """Fit the distances (P, T) of P pairs."""
+    with np.errstate(divide="ignore"):
+        logarithm = np.log(apart)
+    far = np.any(apart > largest, axis=0)
+    last = int(np.argmax(far)) if far.any() else len(time)
+    first = int(np.ceil(skip * last))
+    if last - first < 3 or not np.all(np.isfinite(logarithm[:, first:last])):
+        raise RunError("nothing to fit: starts are equal or too far apart, or frames too rare")
+    fitted = time[first:last]
+    slope = np.polyfit(fitted, logarithm[:, first:last].T, 1)[0]
+    return Divergence(time, logarithm, slope, float(fitted[0]), float(fitted[-1]))
+
+
+def draw(found: Divergence) -> plt.Figure:
+    """Each pair thin; their geometric mean thick, with the line of the exponent."""
+    figure, axes = plt.subplots(figsize=(7, 5))
+    for track in found.logarithm:
+        axes.semilogy(found.time, np.exp(track), color=COLOURS[0], lw=0.6, alpha=0.4)
+    mean = found.logarithm.mean(axis=0)
+    axes.plot(found.time, np.exp(mean), color="black", label=f"{len(found.slope)} pairs, mean")
+    inside = (found.time >= found.begin) & (found.time <= found.end)
+    t = found.time[inside]
+    line = mean[inside].mean() + found.exponent.mean * (t - t.mean())
+    mean_slope, error = found.exponent
+    label = f"$e^{{\\lambda t}}$, $\\lambda$ = {mean_slope:.3f} ± {error:.3f}"
+    axes.plot(t, np.exp(line), color=COLOURS[1], lw=2.5, ls="--", label=label)
+    axes.set(xlabel="time t (reduced units)", ylabel="distance of the positions (reduced units)")
+    axes.legend(loc="lower right")
+    return figure
+
+
+def main() -> None:
+    parser = command_line(__doc__, "lyapunov.png", table=True)
+    parser.add_argument("--largest", type=float, default=0.01, help="distance at the end [0.01]")
+    parser.add_argument("--skip", type=float, default=0.2, help="share of the time left out [0.2]")
+    args = parser.parse_args()
+    runs = read_all(args.runs)
+    if len(runs) % 2:
+        raise RunError(f"{len(runs)} runs: not pairs")
+    apart = [distance(*pair) for pair in zip(runs[::2], runs[1::2], strict=True)]
+    frames = min(map(len, apart))
+    apart = np.array([track[:frames] for track in apart])
+    found = divergence(runs[0].time[:frames], apart, args.largest, args.skip)
+    figures = {
+        "pairs": [len(found.slope)],
+        "from": [found.begin],
+        "to": [found.end],
+        "lyapunov_exponent": [float(found.exponent.mean)],
+        "error": [float(found.exponent.error)],
+    }
+    print_table(figures)
+    save(draw(found), args.output, runs, "Divergence of neighbouring trajectories")
+    if args.csv:
+        columns = {f"pair_{k + 1}": track for k, track in enumerate(apart)}
+        write_csv(args.csv, {"time": found.time, **columns})
+
+
+if __name__ == "__main__":
+    launch(main)
