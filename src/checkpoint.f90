@@ -18,7 +18,8 @@ module checkpoint
   use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of, part_of
   use settings, only: settings_t
   use simulation_state, only: simulation_t
-  use system, only: last_problem, link_file, move_file, remove_file, synchronize
+  use system, only: free_bytes, last_problem, link_file, move_file, remove_file, synchronize
+  use texts, only: written
   use version, only: program_version
   implicit none
   private
@@ -49,6 +50,7 @@ contains
     new = new_checkpoint_of(path)
     current = checkpoint_of(path)
     call output%save(progress, error)
+    if (.not. allocated(error)) call check_room(new, size(sim%disk, kind=int64), error)
     if (allocated(error)) return
     call remove_file(new)
     call file%create(new, reserved)
@@ -67,6 +69,17 @@ contains
     end if
     if (allocated(error)) call remove_file(new)
   end subroutine write_checkpoint
+
+  !> Fails if a checkpoint of n disks does not fit onto the disk.
+  subroutine check_room(path, n, error)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: n
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), parameter :: per_disk = 60, besides = 32768     !! [bytes]
+    if (free_bytes(path) < per_disk*n + besides) call fail(error, exit_files, path &
+      //": cannot be written: "//written(per_disk*n + besides)//" bytes needed, " &
+      //written(free_bytes(path))//" bytes free")
+  end subroutine check_room
 
   !> Restores a run from its checkpoint: the simulation, and the output open and ready to go on.
   subroutine read_checkpoint(path, settings, groups, sim, output, error)

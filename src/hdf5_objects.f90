@@ -12,7 +12,7 @@ module hdf5_objects
     h5dget_space_f, h5dget_type_f, h5screate_f, h5screate_simple_f, h5sclose_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tclose_f, &
     h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, h5pset_create_inter_group_f, &
-    h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5pset_userblock_f, &
+    h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5pset_sieve_buf_size_f, h5pset_userblock_f, &
     h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, h5p_link_create_f, &
     h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_scope_global_f, &
     h5d_alloc_time_early_f, h5d_fill_time_never_f, h5s_scalar_f, &
@@ -24,6 +24,8 @@ module hdf5_objects
   implicit none
   private
   public :: hdf5_file_t, prepare_dataset, prepare_links, hdf5_version
+
+  integer(size_t), parameter :: sieve = 4096      !! what a small write becomes [bytes]
 
   type :: hdf5_file_t
     character(len=:), allocatable :: path
@@ -92,6 +94,7 @@ contains
     if (status >= 0) call h5eset_auto_f(0, status)
     if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
     if (status >= 0) call h5pset_file_locking_f(access, .false., .true., status)
+    if (status >= 0) call h5pset_sieve_buf_size_f(access, sieve, status)
   end subroutine prepare_access
 
   !> A new file; there must be none of this name. The first `reserved` bytes are left to the caller.

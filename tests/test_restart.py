@@ -85,7 +85,7 @@ def stopped(ricochet, tmp_path):
     """`stopped(*options)`: a run that its wall clock has stopped; its command less --resume."""
     write_input(tmp_path, MIXTURE)
     command = ["gas.nml", "-o", "gas.h5", "--set", "stop.time=1000"]
-    run = ricochet(*command, "--set", "stop.wall_clock=0.02")
+    run = ricochet(*command, "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED and "--resume" in one_line(run)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "gas.chk.h5",
@@ -113,7 +113,7 @@ def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_p
 
 def test_how_a_run_is_done_may_change_when_it_goes_on(ricochet, tmp_path, stopped):
     fewer = [*stopped[:-1], "stop.time=40"]
-    ricochet(*fewer, "--set", "stop.wall_clock=0.02", "--force")
+    assert ricochet(*fewer, "--set", "stop.wall_clock=1e-9", "--force").returncode == STOPPED
     run = ricochet(*fewer, "--resume", "--set", "run.search='pairs'", "--set", "run.queue='heap'")
     assert run.returncode == FINISHED
     fewer[2] = "whole.h5"
@@ -163,7 +163,7 @@ def test_a_damaged_checkpoint_is_refused(ricochet, tmp_path, stopped, trials):
         run = ricochet(*stopped, "--resume")
         assert run.returncode == USAGE and "damaged" in one_line(run)
     path.write_bytes(whole)
-    run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=0.01")
+    run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED
 
 

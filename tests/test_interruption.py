@@ -1,0 +1,325 @@
+"""What a kill, a signal, a full disk, a twin or a curious reader can do to a run: nothing."""
+
+import random
+import re
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+
+from whole_runs import (
+    FILES,
+    FINISHED,
+    MIXTURE,
+    STOPPED,
+    committed,
+    differences,
+    is_beginning,
+    one_line,
+    write_input,
+)
+
+#: Frames as fast as they come, in a file that grows; a checkpoint now and then.
+BUSY = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
+&stop collisions = 20000 /
+&output frames_every_events = 9 observables_every_events = 5 checkpoint_every = 0.05 /
+"""
+#: The same with all room allocated at the start.
+PLANNED = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
+&stop time = 30 /
+&output frames_every_time = 0.01 observables_every_time = 0.004 checkpoint_every = 0.05 /
+"""
+LONG = ["--set", "stop.collisions=1000000000", "--set", "output.checkpoint_every="]
+FRAMES = "/particles/disks/position/value"
+
+
+@pytest.fixture
+def started(program, tmp_path):
+    """`started(*arguments)` starts the program in `tmp_path`; whatever still runs is ended."""
+    processes = []
+
+    def start(*arguments):
+        command = [program, *map(str, arguments)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def wait_for(condition, limit=20.0):
+    """Returns when the condition holds."""
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.005)
+
+
+def frames_in(path) -> int:
+    """Committed frames; 0 if there is no file, or it is just growing."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return int(file["particles/disks/committed"][()])
+    except OSError:
+        return 0
+
+
+@pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])
+@pytest.mark.parametrize("tries", [20, pytest.param(200, marks=pytest.mark.check)])
+def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
+    write_input(tmp_path, text)
+    begin = time.monotonic()
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    duration = time.monotonic() - begin
+    whole = committed(tmp_path / "whole.h5")
+    part, rng, killed = tmp_path / "gas.h5.part", random.Random(tries), 0
+    for _ in range(tries):
+        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+        process = started("gas.nml", "-o", "gas.h5", "--quiet", *resume)
+        time.sleep(rng.uniform(0, 0.7 * duration))
+        process.kill()
+        message = process.communicate()[1]
+        assert process.returncode in (FINISHED, -signal.SIGKILL), message
+        if (tmp_path / "gas.h5").exists():  # perhaps killed just after
+            (tmp_path / "gas.h5").rename(tmp_path / "finished.h5")
+            (tmp_path / "gas.chk.h5").unlink(missing_ok=True)
+        elif part.exists():
+            killed += 1
+            found = committed(part)
+            assert len(found["particles/disks/position/time"]) > 0
+            assert is_beginning(found, whole) == []
+    assert killed > tries / 4
+    resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+    assert ricochet("gas.nml", "-o", "gas.h5", *resume).returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
+
+
+@pytest.mark.parametrize("tries", [15, pytest.param(200, marks=pytest.mark.check)])
+def test_a_kill_while_checkpoints_are_written_leaves_a_whole_one(
+    ricochet, started, tmp_path, tries
+):
+    write_input(tmp_path, BUSY)
+    always = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "output.checkpoint_every=1e-6"]
+    checkpoint, rng = tmp_path / "gas.chk.h5", random.Random(tries)
+    for _ in range(tries):
+        resume = ["--resume"] if checkpoint.exists() else []
+        process = started(*always, "--quiet", *resume)
+        wait_for(checkpoint.exists)
+        time.sleep(rng.uniform(0, 0.15))
+        process.kill()
+        assert process.communicate()[1] == ""
+    run = ricochet(*always, "--resume", "--set", "stop.wall_clock=1e-3")
+    assert run.returncode == STOPPED
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):
+    """Also when it comes twice within a moment, as launchers send it."""
+    process = start_long(started, tmp_path)
+    for _ in range(times):
+        process.send_signal(getattr(signal, name))
+        time.sleep(0.001)
+    begin = time.monotonic()
+    message = process.communicate(timeout=5)[1]
+    assert process.returncode == STOPPED and "--resume" in message.splitlines()[-1]
+    assert time.monotonic() - begin < 1
+    assert (tmp_path / "gas.chk.h5").exists() and not (tmp_path / "gas.h5.lock").exists()
+
+
+def test_usr1_makes_a_checkpoint_and_the_run_goes_on(started, tmp_path):
+    process = start_long(started, tmp_path)
+    process.send_signal(signal.SIGUSR1)
+    wait_for((tmp_path / "gas.chk.h5").exists)
+    frames = frames_in(tmp_path / "gas.h5.part")
+    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > frames)
+    assert process.poll() is None
+
+
+def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
+    """Also a program that has no time to look: here it compares all pairs of many disks."""
+    write_input(tmp_path, BUSY.replace("100", "20000").replace("0.02", "0.002"))
+    process = started("gas.nml", "-o", "gas.h5", "--set", "run.search='rescan'")
+    wait_for((tmp_path / "gas.h5.part").exists)
+    process.send_signal(signal.SIGTERM)
+    time.sleep(0.6)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=1)
+    assert process.returncode == -signal.SIGTERM
+
+
+def test_ignored_signals_stay_ignored(program, tmp_path):
+    """The run of nohup outlives the terminal."""
+    write_input(tmp_path, BUSY)
+    process = subprocess.Popen(
+        ["nohup", program, "gas.nml", "-o", "gas.h5"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 2)
+    process.send_signal(signal.SIGHUP)
+    assert process.wait(timeout=30) == FINISHED
+
+
+@pytest.mark.parametrize("text", [PLANNED, BUSY], ids=["planned", "growing"])
+@pytest.mark.parametrize("polls", [100, pytest.param(1000, marks=pytest.mark.check)])
+def test_a_running_file_can_be_read(ricochet, started, tmp_path, text, polls):
+    """No error, and no wrong number, however often one looks."""
+    write_input(tmp_path, text)
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    whole, part = committed(tmp_path / "whole.h5"), tmp_path / "gas.h5.part"
+    looks = 0
+    while looks < polls:
+        process = started("gas.nml", "-o", "gas.h5", "--force")
+        while not part.exists() and process.poll() is None:
+            time.sleep(0.001)
+        while process.poll() is None and looks < polls:
+            try:
+                found = committed(part)
+            except OSError:
+                assert process.wait() == FINISHED and not part.exists()
+                break
+            looks += 1
+            assert is_beginning(found, whole) == []
+        assert process.wait() == FINISHED, process.stderr.read()
+
+
+def test_a_reader_that_locks_the_file_stops_nobody(ricochet, tmp_path):
+    write_input(tmp_path, MIXTURE)
+    run = ricochet("gas.nml", "-o", "gas.h5", "--set", "stop.wall_clock=1e-9")
+    assert run.returncode == STOPPED
+    with h5py.File(tmp_path / "gas.h5.part", "r", locking=True):
+        run = ricochet("gas.nml", "-o", "gas.h5", "--resume")
+    assert run.returncode == FINISHED
+
+
+@pytest.mark.parametrize("option", ["--force", "--resume"])
+def test_a_twin_is_refused_and_harms_nobody(ricochet, started, tmp_path, option):
+    process = start_long(started, tmp_path, "--set", "stop.collisions=100000")
+    process.send_signal(signal.SIGUSR1)
+    wait_for((tmp_path / "gas.chk.h5").exists)
+    command = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "stop.collisions=100000"]
+    run = ricochet(*command, option)
+    assert run.returncode == FILES and "another run" in one_line(run)
+    assert process.wait(timeout=60) == FINISHED
+    command[2] = "alone.h5"
+    assert ricochet(*command).returncode == FINISHED
+    assert differences(tmp_path / "alone.h5", tmp_path / "gas.h5") == []
+
+
+def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
+    write_input(tmp_path, BUSY)
+    twins = [started("gas.nml", "-o", "gas.h5", "--force") for _ in range(6)]
+    codes = [(twin.wait(timeout=60), twin.stderr.read()) for twin in twins]
+    assert {code for code, _ in codes} <= {FINISHED, FILES}
+    assert any(code == FINISHED for code, _ in codes)
+    assert all("another run" in message for code, message in codes if code == FILES)
+    assert ricochet("gas.nml", "-o", "alone.h5").returncode == FINISHED
+    assert differences(tmp_path / "alone.h5", tmp_path / "gas.h5") == []
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """`small_disk(kilobytes)` gives a folder on a disk of that size; needs the rights of root."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = []
+
+    def mount(kilobytes):
+        options = f"size={kilobytes}k" + (",remount" if mounted else "")
+        command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
+        if subprocess.run(command, capture_output=True).returncode != 0:
+            pytest.skip("cannot mount a small disk here: needs root")
+        mounted.append(folder)
+        return folder
+
+    yield mount
+    if mounted:
+        subprocess.run(["umount", folder], check=True)
+
+
+def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk):
+    """Forty sizes, from no room for the layout to nearly all."""
+    write_input(tmp_path, BUSY.replace("20000", "6000").replace("0.05 /", "0.001 /"))
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    whole = committed(tmp_path / "whole.h5")
+    needed = (tmp_path / "whole.h5").stat().st_size // 1024
+    stopped = 0
+    for k in range(40):
+        folder = small_disk(64 + (needed - 64) * k // 40)
+        run = ricochet("gas.nml", "-o", "disk/gas.h5")
+        assert run.returncode == FILES
+        line = one_line(run)
+        assert re.search(r"^disk/.*: (\d+ bytes needed, \d+ bytes free|.* are free.*)$", line)
+        if (part := folder / "gas.h5.part").exists():
+            stopped += 1
+            found = committed(part)
+            assert len(found["particles/disks/position/time"]) > 0
+            assert is_beginning(found, whole) == []
+        for path in folder.iterdir():
+            path.unlink()
+    assert stopped > 30
+
+
+def test_a_disk_that_others_fill_costs_no_earlier_sample(ricochet, started, tmp_path, small_disk):
+    write_input(tmp_path, PLANNED.replace("time = 0.01", "time = 0.001"))
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    part = small_disk(200_000) / "gas.h5.part"
+    process = started("gas.nml", "-o", "disk/gas.h5")
+    wait_for(lambda: frames_in(part) > 1000)
+    process.send_signal(signal.SIGUSR1)
+    fill = ["dd", "if=/dev/zero", "of=disk/other", "bs=1M"]
+    subprocess.run(fill, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    message = process.communicate()[1]
+    assert process.returncode == FILES and " bytes needed, " in message
+    assert is_beginning(committed(part), committed(tmp_path / "whole.h5")) == []
+    (tmp_path / "disk/other").unlink()
+    assert ricochet("gas.nml", "-o", "disk/gas.h5", "--resume").returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", tmp_path / "disk/gas.h5") == []
+
+
+def test_a_run_goes_on_when_there_is_room_again(ricochet, tmp_path, small_disk):
+    write_input(tmp_path, BUSY.replace("0.05", "0.005"))
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    small_disk(8000)
+    run = ricochet("gas.nml", "-o", "disk/gas.h5")
+    assert run.returncode == FILES and " free" in one_line(run)
+    assert (tmp_path / "disk" / "gas.chk.h5").exists()
+    small_disk(100000)
+    run = ricochet("gas.nml", "-o", "disk/gas.h5", "--resume")
+    assert run.returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", tmp_path / "disk" / "gas.h5") == []
+
+
+def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
+    write_input(tmp_path, BUSY)
+    run = subprocess.run(
+        ["bash", "-c", 'ulimit -f 3000; exec "$0" gas.nml -o gas.h5', program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == FILES and "gas.h5.part" in one_line(run)
+    assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+def test_the_planned_output_is_compared_with_the_room(ricochet, tmp_path, small_disk):
+    write_input(tmp_path, PLANNED)
+    small_disk(2000)
+    run = ricochet("gas.nml", "-o", "disk/gas.h5")
+    assert run.returncode == FILES
+    assert "will have" in one_line(run) and "are free" in one_line(run)
+
+
+def start_long(started, folder, *options):
+    """A run that takes its time, when it has written some frames."""
+    write_input(folder, BUSY)
+    process = started("gas.nml", "-o", "gas.h5", *LONG, *options)
+    wait_for(lambda: frames_in(folder / "gas.h5.part") > 10)
+    return process
