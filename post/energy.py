@@ -3,7 +3,9 @@
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
 Above: mean kinetic and potential energy per disk of each species in the first run.  Below: the
-relative change of the total energy in each run.  Prints the largest change of each.
+relative change of the total energy in each run.  Prints, for each run and relative to the energy
+at the start: the drift, that is the change over the whole run along a fitted line; the spread,
+the standard deviation from that line; and the largest change.
 """
 
 import numpy as np
@@ -23,6 +25,9 @@ from equipartition import windows
 from read_run import Run
 
 
+EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
+
+
 def method(run: Run) -> str:
     """How the run was integrated, for the legend."""
     if run.parameter("run", "dynamics", "events") == "steps":
@@ -34,6 +39,12 @@ def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Time and E / E(0) - 1 of the total energy."""
     time, energy = run.observable("total_energy")
     return time, energy / energy[0] - 1
+
+
+def drift_and_spread(time: np.ndarray, change: np.ndarray) -> tuple[float, float]:
+    """Rise of the straight line through a series from its first to its last time; scatter."""
+    line = np.polynomial.Polynomial.fit(time, change, 1)
+    return float(line(time[-1]) - line(time[0])), float(np.std(change - line(time)))
 
 
 def draw_species(axes: plt.Axes, run: Run) -> None:
@@ -53,7 +64,7 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         )
     axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    axes.legend(ncols=2, loc="upper right", title="means over 2 % of the time")
+    axes.legend(ncols=2, loc="upper right", title="means over 2 % of the time; faint: samples")
 
 
 def draw(runs: list[Run]) -> plt.Figure:
@@ -62,13 +73,13 @@ def draw(runs: list[Run]) -> plt.Figure:
     draw_species(top, runs[0])
     for run, colour in zip(runs, COLOURS[2:] + COLOURS[:2], strict=False):
         time, change = total_change(run)
-        size = np.maximum(np.abs(change), 1e-17)
+        size = np.maximum(np.abs(change), EPSILON / 2)
         bottom.semilogy(time, size, color=colour, lw=1, label=method(run))
     bottom.set(
         xlabel="time (reduced units)",
         ylabel="$|E(t)/E(0) - 1|$, total energy",
         xlim=(0, None),
-        ylim=(1e-17, 1e4 * bottom.get_ylim()[1]),
+        ylim=(EPSILON / 4, 30 * bottom.get_ylim()[1]),
     )
     bottom.legend(ncols=2, loc="upper right")
     return figure
@@ -77,11 +88,15 @@ def draw(runs: list[Run]) -> plt.Figure:
 def main() -> None:
     args = command_line(__doc__, "energy.png", table=True).parse_args()
     runs = read_all(args.runs)
+    changes = [total_change(run) for run in runs]
+    drift, spread = zip(*(drift_and_spread(*change) for change in changes), strict=True)
     result = {
         "run": [run.path.name for run in runs],
         "method": [method(run) for run in runs],
         "total_energy": [float(run.observable("total_energy").value[0]) for run in runs],
-        "largest_change": [float(np.abs(total_change(run)[1]).max()) for run in runs],
+        "drift": drift,
+        "spread": spread,
+        "largest_change": [float(np.abs(change).max()) for _, change in changes],
     }
     print_table(result)
     save(draw(runs), args.output, runs, "Energy")

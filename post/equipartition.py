@@ -3,11 +3,13 @@
     python post/equipartition.py runs/gravity_v0/*.h5 -o equipartition.png --csv times.csv
 
 Runs are put together by the width v0 of the start velocities; energies are means over the runs
-and over windows of --window.  T_therm is the first time from which the two agree within
---within for three windows.  A single pair of energies is no measure: with 30 + 30 disks their
-ratio fluctuates by 26 % in equilibrium, so take many runs.
+and over windows of --window.  T_therm is the middle of the first window from which the two agree
+within --within for three windows.  A single pair of energies is no measure: with 30 + 30 disks
+their ratio fluctuates by 26 % in equilibrium, so take many runs.  The equilibrium values in the
+table are means over the second half of the time.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -70,13 +72,41 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     return Approach(time, light, heavy, thermalisation_time(time, light.mean, heavy.mean, within))
 
 
+def settled(group: list[Run], quantity: Callable[[Run], str]) -> Estimate:
+    """Mean over runs of an observable's mean over the second half of the time."""
+    means = []
+    for run in group:
+        time, value = run.observable(quantity(run))
+        means.append(value[time >= (time[0] + time[-1]) / 2].mean())
+    return estimate(means)
+
+
+def energy_per_disk(group: list[Run]) -> Estimate:
+    """Total energy at the start over the number of disks."""
+    return estimate([run.observable("total_energy").value[0] / run.count for run in group])
+
+
+def tabulated(groups: list, results: list[Approach]) -> dict[str, list]:
+    """A row per v0."""
+    members = [runs for _, runs in groups]
+    energy = [energy_per_disk(runs) for runs in members]
+    light = [settled(r, lambda run: f"{run.names[lightest(run)]}/kinetic_energy") for r in members]
+    heavy = [settled(r, lambda run: f"{run.names[heaviest(run)]}/kinetic_energy") for r in members]
+    columns = {"v0": [v0 for v0, _ in groups], "runs": [len(runs) for runs in members]}
+    columns["T_therm"] = [result.thermalisation for result in results]
+    for name, values in (("energy", energy), ("K_light", light), ("K_heavy", heavy)):
+        columns[name] = [float(value.mean) for value in values]
+        columns[f"{name}_error"] = [float(value.error) for value in values]
+    return columns
+
+
 def start_width(run: Run) -> float:
     """v0: the largest `speed` that the input asks for."""
     species = run.parameters.get("species", {})
     return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
 
-def draw(groups: list, results: list[Approach], until: float) -> plt.Figure:
+def draw(groups: list, results: list[Approach], until: float, within: float) -> plt.Figure:
     """A panel per v0."""
     figure, panels = plt.subplots(
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
@@ -94,7 +124,7 @@ def draw(groups: list, results: list[Approach], until: float) -> plt.Figure:
                 color="0.5",
                 ls="--",
                 lw=1,
-                label=f"agree from t = {result.thermalisation:.2g}",
+                label=f"equal to {100 * within:g} % from t = {result.thermalisation:.3g}",
             )
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)
@@ -112,15 +142,14 @@ def main() -> None:
     runs = read_all(args.runs)
     groups = grouped(runs, start_width)
     results = [approach(members, args.window, args.within) for _, members in groups]
-    table = {
-        "v0": [v0 for v0, _ in groups],
-        "runs": [len(members) for _, members in groups],
-        "T_therm": [result.thermalisation for result in results],
-        "K_light": [float(r.light.mean[len(r.time) // 2 :].mean()) for r in results],
-        "K_heavy": [float(r.heavy.mean[len(r.time) // 2 :].mean()) for r in results],
-    }
+    table = tabulated(groups, results)
     print_table(table)
-    save(draw(groups, results, args.until), args.output, runs, "Equipartition under gravity")
+    save(
+        draw(groups, results, args.until, args.within),
+        args.output,
+        runs,
+        "Equipartition under gravity",
+    )
     if args.csv:
         write_csv(args.csv, table)
 

@@ -2,15 +2,22 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --after 20 --csv gravity.csv
 
-kT is the mean kinetic energy per disk after the time --after.  Laws:
+kT is the mean kinetic energy per disk after the time --after.  Laws, drawn solid:
 P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of the
-centre above its lowest place.  Slopes are fitted to the logarithm of the histograms; their
-errors come from ten blocks of time.
+centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
+fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i
+is kept out of the area pi s_ij^2 about each other disk, which multiplies its density by
+exp(-sum_j pi s_ij^2 n_j(h)) to first order: few per cent, near the floor.
+
+Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
+kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
+their errors come from ten blocks of time.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from drawing import (
     COLOURS,
@@ -26,12 +33,17 @@ from drawing import (
 from read_run import Run, RunError, read_run
 from theory import Estimate, estimate
 
+SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
+HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
+
 
 class Samples(NamedTuple):
-    """Of one species after the start: (F, n) squared speeds and heights."""
+    """Of one species after the start: (F, n) squared speeds, their x part, and heights."""
 
     mass: float
+    radius: float
     square: np.ndarray
+    square_x: np.ndarray
     height: np.ndarray
 
 
@@ -39,14 +51,20 @@ def samples(run: Run, name: str, after: float) -> Samples:
     """Squared speeds and heights above the lowest place."""
     mask = run.of_species(name)
     late = slice(int(np.searchsorted(run.time, after)), None)
-    square = np.sum(run.velocity[late][:, mask] ** 2, axis=2)
+    squares = run.velocity[late][:, mask] ** 2
     height = run.position[late][:, mask, 1] - (run.lower[1] + run.radius[mask])
-    return Samples(float(run.mass[mask][0]), square, height)
+    return Samples(
+        float(run.mass[mask][0]),
+        float(run.radius[mask][0]),
+        squares.sum(axis=2),
+        squares[..., 0],
+        height,
+    )
 
 
-def log_slope(values: np.ndarray, top: float, bins: int = 30) -> float:
-    """Decay constant of a histogram over 0..top, by a weighted line through its logarithm."""
-    counts, edges = np.histogram(values, bins, (0, top))
+def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
+    """Decay constant of a histogram, by a weighted line through its logarithm."""
+    counts, edges = np.histogram(values, bins, limits)
     good = counts >= 5
     if good.sum() < 3:
         return float("nan")
@@ -54,82 +72,149 @@ def log_slope(values: np.ndarray, top: float, bins: int = 30) -> float:
     return -float(np.polyfit(middle[good], np.log(counts[good]), 1, w=np.sqrt(counts[good]))[0])
 
 
-def slope_estimate(values: np.ndarray, top: float, blocks: int = 10) -> Estimate:
+def slope_estimate(values: np.ndarray, limits: tuple[float, float], blocks: int = 10) -> Estimate:
     """Slope of all values with an error from blocks of time."""
-    parts = [log_slope(part, top) for part in np.array_split(values, blocks)]
-    return Estimate(log_slope(values, top), estimate(parts).error)
+    parts = [log_slope(part, limits) for part in np.array_split(values, blocks)]
+    return Estimate(log_slope(values, limits), estimate(parts).error)
+
+
+def sharing(energy: np.ndarray, temperature: float, count: int) -> np.ndarray:
+    """Weight of a state of one disk, where `count` disks share a fixed energy; 1 at energy 0."""
+    return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
+
+
+def crowded_heights(
+    height: np.ndarray, species: list[Samples], pull: float, temperature: float, width: float
+) -> list[np.ndarray]:
+    """Densities of the heights, with the area that disks take from each other.
+
+    `width` is that of the box for centres.  A disk does not crowd itself.
+    """
+    numbers = [s.height.shape[1] for s in species]
+    ideal = [sharing(s.mass * pull * height, temperature, sum(numbers)) for s in species]
+    density = [normalised(height, weight) for weight in ideal]
+    for _ in range(50):
+        density = [
+            normalised(height, ideal[i] * np.exp(-taken(i, species, density, numbers) / width))
+            for i in range(len(species))
+        ]
+    return density
+
+
+def taken(i: int, species: list[Samples], density: list, numbers: list[int]) -> np.ndarray:
+    """Area per height that the other disks take from one of species i."""
+    return sum(
+        np.pi * (species[i].radius + s.radius) ** 2 * (numbers[j] - (i == j)) * density[j]
+        for j, s in enumerate(species)
+    )
+
+
+def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Density with the integral 1."""
+    return weight / np.trapezoid(weight, x)
+
+
+def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], count: int) -> float:
+    """What `log_slope` gives for `count` values that follow a density exactly."""
+    integral = cumulative_trapezoid(density, x, initial=0) / np.trapezoid(density, x)
+    ranks = (np.arange(count) + 0.5) / count
+    return log_slope(np.interp(ranks, integral, x), limits)
+
+
+def height_grid(run: Run, s: Samples) -> np.ndarray:
+    """All heights that a disk can have."""
+    return np.linspace(0, run.edges[1] - 2 * s.radius, 4001)
 
 
 def table(run: Run, species: list[Samples], temperature: float) -> dict[str, list]:
-    """Fitted slopes over those of the laws."""
+    """Fitted slopes over those of the exponential laws, and what the dashed laws make of them."""
     g = float(np.abs(run.gravity[1]))
+    grid = height_grid(run, species[0])
+    crowded = crowded_heights(grid, species, g, temperature, run.edges[0] - 2 * species[0].radius)
     rows = []
-    for name, s in zip(run.names, species, strict=True):
-        speed = slope_estimate(s.square, 10 * temperature / s.mass)
-        height = slope_estimate(s.height, 4 * temperature / (s.mass * g))
+    for name, s, density in zip(run.names, species, crowded, strict=True):
+        v_law, h_law = s.mass / (2 * temperature), s.mass * g / temperature
+        v_limits = tuple(np.array(SPEED_RANGE) / v_law)
+        h_limits = tuple(np.array(HEIGHT_RANGE) / h_law)
+        speed, height = slope_estimate(s.square, v_limits), slope_estimate(s.height, h_limits)
+        squares = np.linspace(0, 20 / v_law, 4001)
+        shared = sharing(0.5 * s.mass * squares, temperature, run.count)
         rows.append(
             {
                 "species": name,
                 "mass": s.mass,
-                "K": float(0.5 * s.mass * s.square.mean()),
                 "kT": temperature,
-                "speed_slope": speed.mean,
-                "speed_slope_error": float(speed.error),
-                "speed_slope_law": s.mass / (2 * temperature),
-                "height_slope": height.mean,
-                "height_slope_error": float(height.error),
-                "height_slope_law": s.mass * g / temperature,
+                "K": float(0.5 * s.mass * s.square.mean()),
+                "K_x": float(0.5 * s.mass * s.square_x.mean()),
+                "speed_slope": speed.mean / v_law,
+                "speed_error": float(speed.error) / v_law,
+                "speed_shared": law_slope(squares, shared, v_limits, s.square.size) / v_law,
+                "height_slope": height.mean / h_law,
+                "height_error": float(height.error) / h_law,
+                "height_crowded": law_slope(grid, density, h_limits, s.height.size) / h_law,
             }
         )
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
-def draw_law(
-    axes: plt.Axes, values: np.ndarray, slope: float, top: float, colour: str, label: str, law: str
-) -> None:
-    """Histogram and law with logarithmic ordinate."""
+def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
+    """The same histogram in a linear and a logarithmic panel; the whole sample is one."""
     bins = np.linspace(0, top, 51)
     density = np.histogram(values, bins)[0] / (values.size * np.diff(bins))
-    axes.stairs(density, bins, color=colour, fill=True, alpha=0.45, label=label)
-    x = np.linspace(0, top, 200)
-    axes.semilogy(x, slope * np.exp(-slope * x), color="black", lw=1.2, label=law)
-    axes.set_ylim(0.3 * slope * np.exp(-slope * top), 4 * slope)
-    axes.legend(loc="upper right")
+    for axes in panels:
+        axes.stairs(density, bins, color=colour, fill=True, alpha=0.3, label=label)
+
+
+def draw_laws(panels, x: np.ndarray, solid: np.ndarray, dashed: np.ndarray, colour: str) -> None:
+    """Exponential law and the one for disks of finite number and size."""
+    for axes in panels:
+        axes.plot(x, solid, color=colour, lw=1.4)
+        axes.plot(x, dashed, color="black", lw=1.0, ls="--")
+
+
+def slopes(run: Run, result: dict[str, list], kind: str, other: str) -> list[str]:
+    """Labels: fitted over exponential slope."""
+    return [
+        f"{species_label(run, name)}: {result[f'{kind}_slope'][k]:.3f}"
+        f" ± {result[f'{kind}_error'][k]:.3f} (dashed: {result[f'{kind}_{other}'][k]:.3f})"
+        for k, name in enumerate(run.names)
+    ]
 
 
 def draw(run: Run, species: list[Samples], result: dict[str, list], after: float) -> plt.Figure:
-    """A row per species: squared speed and height."""
-    figure, panels = plt.subplots(
-        len(species), 2, squeeze=False, figsize=(10, 3.3 * len(species) + 0.4)
+    """Squared speeds above, heights below; linear left, logarithmic right."""
+    figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
+    kt, g = result["kT"][0], float(np.abs(run.gravity[1]))
+    light = min(s.mass for s in species)
+    squares, grid = np.linspace(0, 18 * kt / light, 1000), height_grid(run, species[0])
+    crowded = crowded_heights(grid, species, g, kt, run.edges[0] - 2 * species[0].radius)
+    v_labels = slopes(run, result, "speed", "shared")
+    h_labels = slopes(run, result, "height", "crowded")
+    for k, s in enumerate(species):
+        colour, v_law, h_law = COLOURS[k], s.mass / (2 * kt), s.mass * g / kt
+        draw_histogram(panels[0], s.square.ravel(), squares[-1], colour, v_labels[k])
+        shared = sharing(0.5 * s.mass * squares, kt, run.count) * v_law * (1 - 0.5 / run.count)
+        draw_laws(panels[0], squares, v_law * np.exp(-v_law * squares), shared, colour)
+        draw_histogram(panels[1], s.height.ravel(), grid[-1], colour, h_labels[k])
+        draw_laws(panels[1], grid, normalised(grid, np.exp(-h_law * grid)), crowded[k], colour)
+    titles = (
+        "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
+        "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
     )
-    for k, (s, row) in enumerate(zip(species, panels, strict=True)):
-        colour, label = COLOURS[k], species_label(run, run.names[k])
-        v_law, h_law = result["speed_slope_law"][k], result["height_slope_law"][k]
-        speed = result["speed_slope"][k] / v_law, result["speed_slope_error"][k] / v_law
-        height = result["height_slope"][k] / h_law, result["height_slope_error"][k] / h_law
-        draw_law(
-            row[0],
-            s.square.ravel(),
-            v_law,
-            9 / v_law,
-            colour,
-            label,
-            f"$\\frac{{m}}{{2kT}}e^{{-mv^2/2kT}}$, slope fit/law {speed[0]:.3f} ± {speed[1]:.3f}",
-        )
-        draw_law(
-            row[1],
-            s.height.ravel(),
-            h_law,
-            min(9 / h_law, run.edges[1]),
-            colour,
-            label,
-            f"$\\frac{{mg}}{{kT}}e^{{-mgh/kT}}$, slope fit/law {height[0]:.3f} ± {height[1]:.3f}",
-        )
-        row[0].set(xlabel="$v^2$ (reduced units)", ylabel="probability density")
-        row[1].set(xlabel="height of the centre above its lowest place (reduced units)")
+    for row, title, lowest in zip(panels, titles, (1e-4, 1e-4), strict=True):
+        row[0].set(ylabel="probability density", xlim=(0, None))
+        row[0].legend(loc="upper right", title=title)
+        top = row[0].get_ylim()[1]
+        row[1].set(yscale="log", ylim=(lowest * top, 1.5 * top))
+        row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
+        row[1].plot([], [], color="black", lw=1, ls="--", label="finite number and size of disks")
+        row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
+    for axes in panels[0]:
+        axes.set_xlabel("$v^2$ (reduced units)")
+    for axes in panels[1]:
+        axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
     figure.suptitle(
-        f"{caption([run])},  t = {after:g} to {run.time[-1]:g},  kT = ⟨K⟩ = {result['kT'][0]:.4f}",
-        fontsize=10,
+        f"{caption([run])},  t = {after:g} to {run.time[-1]:g},  kT = ⟨K⟩ = {kt:.4f}", fontsize=10
     )
     return figure
 

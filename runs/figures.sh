@@ -85,6 +85,7 @@ HTML
   section container_film 'A round container, film' billiards
   section brownian 'Brownian motion' billiards
   section gravity_energy 'Gravity: energies, time steps and events' gravity
+  section gravity_missed 'Gravity: collisions that time steps miss' gravity
   section gravity_equipartition 'Gravity: equipartition' gravity
   section gravity_laws 'Gravity: speeds and heights' gravity
   section gravity_frames 'Gravity: frames' gravity

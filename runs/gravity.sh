@@ -6,15 +6,22 @@ python=${PYTHON:-.venv/bin/python}
 data=runs/gravity figures=runs/figures
 mkdir -p "$data" "$figures"
 
-# G1: event driven beside time steps.
+# G1: event driven beside time steps: the total energy; how many collisions steps miss.
 runs/ensemble.sh input/gravity.nml -d "$data/events" --seeds 1 "$@"
 runs/ensemble.sh input/gravity_steps.nml -d "$data/steps" --scan run.dt=0.004,0.002,0.001 "$@"
 "$python" post/energy.py "$data/events/seed_1.h5" "$data"/steps/dt_*.h5 \
   -o "$figures/gravity_energy.png" --csv "$figures/gravity_energy.csv"
+rates=(--seeds 1-32 --set stop.time=520 --set output.frames_every_time=520
+  --set output.observables_every_time=20)
+runs/ensemble.sh input/gravity.nml -d "$data/rates_events" "${rates[@]}" "$@"
+runs/ensemble.sh input/gravity_steps.nml -d "$data/rates_steps" "${rates[@]}" \
+  --scan run.dt=0.004,0.002,0.001 "$@"
+"$python" post/missed.py "$data"/rates_{events,steps}/*.h5 \
+  -o "$figures/gravity_missed.png" --csv "$figures/gravity_missed.csv"
 
-# G2: when kinetic energies agree, for four widths of the start velocities, 32 seeds each.
+# G2: when kinetic energies agree, for four widths of the start velocities, 100 seeds each.
 for v0 in 0.1 0.5 1 2; do
-  for seed in {1..32}; do
+  for seed in {1..100}; do
     printf 'v0_%s_seed_%s\t--set species.A.speed=%s --set species.B.speed=%s --set run.seed=%s\n' \
       "$v0" "$seed" "$v0" "$v0" "$seed"
   done
@@ -29,7 +36,9 @@ runs/ensemble.sh input/gravity.nml -d "$data/long" --seeds 1 --set stop.time=520
 "$python" post/gravity.py "$data/long/seed_1.h5" --after 20 -o "$figures/gravity_laws.png" \
   --csv "$figures/gravity_laws.csv"
 
-# G4: start, end and ten times between; a film of the first twelve time units.
-"$python" post/snapshot.py "$data/events/seed_1.h5" --count 12 --quiver \
-  -o "$figures/gravity_frames.png"
-"$python" post/animate.py "$data/events/seed_1.h5" --frames 300 -o "$figures/gravity_film"
+# G4: start, end and ten times between, closer together at first, when most happens; a film of the
+# first 20 time units, in time with the clock.
+"$python" post/snapshot.py "$data/events/seed_1.h5" --quiver \
+  --frames 0,10,20,30,50,75,125,250,500,1000,1750,2500 -o "$figures/gravity_frames.png"
+runs/ensemble.sh input/gravity.nml -d "$data/film" --seeds 1 --set stop.time=20 "$@"
+"$python" post/animate.py "$data/film/seed_1.h5" --frames 501 -o "$figures/gravity_film"

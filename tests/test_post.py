@@ -16,6 +16,7 @@ import equipartition
 import export
 import gravity
 import lyapunov
+import missed
 import mixture
 import scattering
 import snapshot
@@ -357,8 +358,8 @@ def test_thermalisation_time_ignores_a_passing_agreement():
     assert np.isnan(equipartition.thermalisation_time(time, np.ones(8), ratio + 1))
 
 
-def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1):
-    """An ideal gas in equilibrium in the gravity box."""
+def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=1.0):
+    """An ideal gas in equilibrium in the gravity box; `hits` pair collisions per frame."""
     mass, r = np.repeat([0.025, 0.05], 30), 0.04
     x = np.stack(
         [
@@ -388,7 +389,7 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
         edges=(8, 16),
         observables={
             **observables,
-            "collisions": np.arange(frames),
+            "collisions": hits * np.arange(frames),
             "total_energy": 80 * (1 + drift * time),
         },
         parameters={
@@ -407,10 +408,38 @@ def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     assert species[0].height.shape == (320, 30) and 0 <= species[0].height.min() < 0.01
     result = gravity.table(run, species, 0.7)
     for kind in ("speed", "height"):
-        ratio = np.array(result[f"{kind}_slope"]) / result[f"{kind}_slope_law"]
-        np.testing.assert_allclose(ratio, 1, atol=0.05)
-    np.testing.assert_allclose(result["height_slope_law"], [0.025 * 9.81 / 0.7, 0.05 * 9.81 / 0.7])
+        np.testing.assert_allclose(result[f"{kind}_slope"], 1, atol=0.06)
     np.testing.assert_allclose(result["K"], 0.7, rtol=0.03)
+    np.testing.assert_allclose(result["K_x"], 0.35, rtol=0.04)
+
+
+def test_slopes_are_fitted_in_the_range_that_is_asked_for(rng):
+    x = np.concatenate([rng.exponential(0.5, 200000), 2 + rng.exponential(1.0, 20000)])
+    assert gravity.log_slope(x, (0, 1.5)) == pytest.approx(2, rel=0.02)
+    assert gravity.log_slope(x[200000:], (2, 5)) == pytest.approx(1, rel=0.03)
+    grid = np.linspace(0, 20, 20001)
+    assert gravity.law_slope(grid, np.exp(-grid), (1, 5), 10**5) == pytest.approx(1, rel=1e-3)
+
+
+def test_disks_that_share_an_energy_have_the_mean_they_share():
+    e = np.linspace(0, 84, 20001)
+    density = gravity.normalised(e, gravity.sharing(e, 0.7, 60))
+    assert np.trapezoid(e * density, e) == pytest.approx(0.7, rel=1e-4)
+    assert gravity.sharing(np.array([85.0]), 0.7, 60) == 0
+
+
+def test_crowded_disks_spread_upwards(tmp_path, rng):
+    """To first order a small radius lowers the density by the area that is taken, times n."""
+    run = read_run(falling(tmp_path / "run.h5", rng))
+    h = np.linspace(0, 15.9, 4001)
+    species = [gravity.samples(run, name, 20.0) for name in run.names]
+    points = [s._replace(radius=0.0) for s in species]
+    ideal = gravity.crowded_heights(h, points, 9.81, 0.7, 8.0)
+    dense = gravity.crowded_heights(h, species, 9.81, 0.7, 8.0)
+    excess = np.pi * 0.08**2 / 8 * (29 * ideal[0] + 30 * ideal[1])
+    expected = -excess + np.trapezoid(excess * ideal[0], h)
+    np.testing.assert_allclose(dense[0] / ideal[0] - 1, expected, atol=0.006)
+    assert -0.06 < dense[0][0] / ideal[0][0] - 1 < -0.04 and np.trapezoid(dense[1], h) == 1
 
 
 def test_runs_are_put_together_by_the_largest_start_speed(tmp_path, rng):
@@ -422,6 +451,61 @@ def test_total_change_of_the_energy(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng, dynamics="steps", drift=1e-6))
     assert energy.total_change(run)[1][-1] == pytest.approx(1e-4)
     assert energy.method(run) == "time steps, Δt = 0.004"
+    wave = np.tile([1, -1, -1, 1], 100)
+    drift, spread = energy.drift_and_spread(run.time, 1e-3 * run.time + 5 * wave)
+    assert drift == pytest.approx(0.1, rel=1e-3) and spread == pytest.approx(5, rel=1e-3)
+
+
+def test_missed_share_is_that_of_chords_at_random_phases(rng):
+    for q in (0.1, 0.7, 1.0, 2.5):
+        half = np.sqrt(1 - rng.uniform(0, 1, 10**6) ** 2)
+        late = rng.uniform(0, q, 10**6) > half
+        assert missed.missed_share(q) == pytest.approx(late.mean(), abs=4e-3 * q)
+    assert missed.missed_share(9.99e-4) == pytest.approx(missed.missed_share(1.001e-3), rel=0.01)
+    assert missed.missed_share(1 - 1e-9) == pytest.approx(missed.missed_share(1.0))
+    assert missed.missed_share(0) == 0
+
+
+def test_missed_collisions_of_the_gravity_box(tmp_path, rng):
+    """Small steps: <q^2> / 6 with <g^2> = 3 kT / mu for every kind of pair."""
+    run = read_run(falling(tmp_path / "run.h5", rng, frames=2))
+    dt, s2 = 1e-4, 0.08**2
+    kinds = [3 * 0.7 / mu * dt**2 / s2 / 6 for mu in (0.0125, 0.05 / 3, 0.025)]
+    assert missed.missed_by_pair(dt, 0.7, 0.0125, 0.08) == pytest.approx(kinds[0], rel=1e-2)
+    n_a, n_b = 435, 435
+    weight = [n_a / 2 * 80**0.5, 900 / 1.5 * 60**0.5, n_b * 40**0.5]
+    assert missed.expected_share(run, dt, 0.7) == pytest.approx(
+        np.average(kinds, weights=weight), rel=1e-2
+    )
+    for step, percent in ((0.004, 6.0), (0.002, 1.36), (0.001, 0.334)):
+        assert 100 * missed.expected_share(run, step, 0.73) == pytest.approx(percent, rel=3e-3)
+
+
+def test_runs_with_equal_seeds_are_compared(tmp_path, rng):
+    def made(seed, hits, dynamics):
+        path = tmp_path / f"{dynamics}_{seed}.h5"
+        return read_run(falling(path, rng, frames=50, dynamics=dynamics, seed=seed, hits=hits))
+
+    events = [made(1, 10, "events"), made(2, 20, "events"), made(3, 40, "events")]
+    steps = [made(1, 9, "steps"), made(2, 16, "steps")]
+    rows = missed.compare(steps + events, 20.0)
+    assert [row.dt for row in rows] == [0, 0.004] and [row.runs for row in rows] == [3, 2]
+    assert rows[0].share.mean == 0 and rows[1].share.mean == pytest.approx(0.15)
+    assert rows[1].share.error == pytest.approx(0.05)
+    assert rows[1].rate.mean == pytest.approx(12.5 * 2 / 60 * 49 / 100)
+    for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
+        with pytest.raises(RunError, match=problem):
+            missed.compare(runs, 20.0)
+    with pytest.raises(RunError, match="ends before"):
+        missed.compare(steps + events, 100.0)
+
+
+def test_equilibrium_values_are_means_over_the_second_half(tmp_path, rng):
+    runs = [read_run(falling(tmp_path / f"{k}.h5", rng, temperature=k, seed=k)) for k in (1, 3)]
+    result = equipartition.tabulated([(0.5, runs)], [equipartition.approach(runs, 10, 0.1)])
+    assert result["runs"] == [2] and result["energy"][0] == pytest.approx(80 / 60)
+    assert result["K_light"][0] == pytest.approx(2, rel=0.03)
+    assert result["K_heavy_error"][0] == pytest.approx(1, rel=0.05)
 
 
 # --- frames, paths, export, cost ---
@@ -603,6 +687,14 @@ def runs_for(script, folder, rng):
         return [gas(folder / "gas.h5", rng, count=3, obstacles=[((0.5, 0.5), 0.5, 1)])]
     if script == "lyapunov":
         return neighbours(folder, rng)
+    if script == "missed":
+        return [
+            falling(
+                folder / f"{dynamics}_{k}.h5", rng, dynamics=dynamics, seed=k, hits=10 - k * step
+            )
+            for step, dynamics in enumerate(("events", "steps"))
+            for k in (1, 2)
+        ]
     if script == "cost":
         x = np.zeros((1, 3, 2))
         return [
@@ -630,6 +722,7 @@ def runs_for(script, folder, rng):
         "energy",
         "equipartition",
         "gravity",
+        "missed",
         "trajectory",
         "cost",
         "lyapunov",

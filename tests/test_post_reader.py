@@ -22,6 +22,7 @@ SCRIPTS = [
     "energy",
     "equipartition",
     "gravity",
+    "missed",
     "trajectory",
     "export",
     "cost",
