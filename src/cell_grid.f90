@@ -101,34 +101,68 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius
-    integer(int32) :: ix, iy, m, c, n
-    integer :: pass
+    integer(int32) :: c, m, n, count_c
+    if (allocated(self%obstacle_start)) deallocate (self%obstacle_start, self%obstacle_list)
     self%listed = box%obstacle
     self%listed_radius = radius
-    if (allocated(self%obstacle_list)) deallocate (self%obstacle_list)
-    allocate (self%obstacle_list(0))
-    do pass = 1, 2                                 ! count, then fill
-      if (pass == 2) then
-        deallocate (self%obstacle_list)
-        allocate (self%obstacle_list(n))
-      else
-        if (allocated(self%obstacle_start)) deallocate (self%obstacle_start)
-        allocate (self%obstacle_start(0:size(self%cells%cell)))
-      end if
-      n = 0
-      do c = 0, size(self%cells%cell, kind=int32) - 1
-        self%obstacle_start(c) = n + 1
-        ix = modulo(c, self%stride)
-        iy = c/self%stride
-        do m = 1, size(box%obstacle, kind=int32)
-          if (.not. in_reach(self, box, box%obstacle(m), radius, ix, iy)) cycle
-          n = n + 1
-          if (pass == 2) self%obstacle_list(n) = m
-        end do
-      end do
-      self%obstacle_start(size(self%cells%cell)) = n + 1
+    allocate (self%obstacle_start(0:size(self%cells%cell)), self%obstacle_list(0))
+    self%obstacle_start = 0
+    do m = 1, size(box%obstacle, kind=int32)       ! count,
+      call enter_obstacle(self, box, m, counting=.true.)
     end do
+    n = 1
+    do c = 0, size(self%cells%cell, kind=int32)    ! make room,
+      count_c = self%obstacle_start(c)
+      self%obstacle_start(c) = n
+      n = n + count_c
+    end do
+    deallocate (self%obstacle_list)
+    allocate (self%obstacle_list(n - 1))
+    do m = 1, size(box%obstacle, kind=int32)       ! fill: each cell's entries move its start to its end
+      call enter_obstacle(self, box, m, counting=.false.)
+    end do
+    self%obstacle_start = eoshift(self%obstacle_start, -1, boundary=1_int32)
   end subroutine list_obstacles
+
+  !> Counts obstacle m in every cell that it reaches into, or puts it into their lists.
+  subroutine enter_obstacle(self, box, m, counting)
+    class(cell_grid_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: m
+    logical, intent(in) :: counting
+    logical :: column(self%n(1)), row(self%n(2))
+    integer(int32) :: ix, iy, c
+    column = slices_near(self, box, m, 1)
+    row = slices_near(self, box, m, 2)
+    do iy = 1, self%n(2)
+      if (.not. row(iy)) cycle
+      do ix = 1, self%n(1)
+        if (.not. column(ix)) cycle
+        if (.not. in_reach(self, box, box%obstacle(m), self%listed_radius, ix, iy)) cycle
+        c = ix + self%stride*iy
+        if (.not. counting) self%obstacle_list(self%obstacle_start(c)) = m
+        self%obstacle_start(c) = self%obstacle_start(c) + 1
+      end do
+    end do
+  end subroutine enter_obstacle
+
+  !> Columns (axis 1) or rows in which a disk may touch obstacle m, of others it is certain that it cannot;
+  !> for a container all.
+  pure function slices_near(self, box, m, axis) result(near)
+    class(cell_grid_t), intent(in) :: self
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: m
+    integer, intent(in) :: axis
+    logical :: near(self%n(axis))
+    real(real64) :: middle(2)
+    integer(int32) :: k
+    do k = 1, self%n(axis)
+      middle = box%lower + (k - 0.5_real64)*self%width - box%obstacle(m)%centre
+      middle = middle - nearest_image(box, middle)
+      near(k) = box%obstacle(m)%inside .or. abs(middle(axis)) &
+        <= (0.5_real64*self%width(axis) + box%obstacle(m)%radius + self%listed_radius)*(1 + 2*spare_width)
+    end do
+  end function slices_near
 
   !> Whether a disk whose centre is in the cell can touch the obstacle.
   pure function in_reach(self, box, obstacle, radius, ix, iy) result(yes)
