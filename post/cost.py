@@ -3,9 +3,9 @@
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
 Reads the collisions per second of processor time that each run notes of itself; the best of equal
-runs counts.  Lines: powers of N fitted to the points from --fit-from disks on; below, what a
-collision costs anyway is not small beside the search.  Cells look at as many disks whatever N is;
-what rises is the cost of reaching them, when they no longer fit into the caches.
+runs counts.  Lines: powers of N fitted to the points with N in --fit.  Below it, what a collision
+costs anyway is not small beside the search; above it disks no longer fit into the caches, and each
+costs more to reach.
 """
 
 import numpy as np
@@ -38,18 +38,19 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return {search: tuple(np.array(sorted(points.items())).T) for search, points in least.items()}
 
 
-def fits(measured: dict, fit_from: int) -> dict[str, PowerLaw]:
-    """Search -> power of N through the points of at least so many disks, three or more."""
+def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
+    """Search -> power of N through the points with N from `low` to `high`, three or more."""
     laws = {}
     for search, (n, cost) in measured.items():
-        many = n >= fit_from
-        law = fit_power_law(n[many], cost[many], 1e-3 * cost[many])  # the scatter makes the error
+        inside = (n >= low) & (n <= high)
+        x, y = n[inside], cost[inside]
+        law = fit_power_law(x, y, 1e-3 * y)  # all alike: the scatter makes the error
         if law:
             laws[search] = law
     return laws
 
 
-def draw(measured: dict, laws: dict[str, PowerLaw], fit_from: int) -> plt.Figure:
+def draw(measured: dict, laws: dict[str, PowerLaw], low: float, high: float) -> plt.Figure:
     """Doubly logarithmic; the fits dotted where they are prolonged."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
@@ -64,7 +65,7 @@ def draw(measured: dict, laws: dict[str, PowerLaw], fit_from: int) -> plt.Figure
         law = laws[search]
         style = {"color": colour, "lw": 1}
         axes.plot(n, law(n), ls=":", **style)
-        fitted = n[n >= fit_from]
+        fitted = n[(n >= low) & (n <= high)]
         label = f"$\\propto N^{{{law.exponent:.3f} \\pm {law.exponent_error:.3f}}}$"
         axes.plot(fitted, law(fitted), label=label, **style)
     axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
@@ -74,11 +75,13 @@ def draw(measured: dict, laws: dict[str, PowerLaw], fit_from: int) -> plt.Figure
 
 def main() -> None:
     parser = command_line(__doc__, "cost.png", table=True)
-    parser.add_argument("--fit-from", type=int, default=128, metavar="N", help="[128]")
+    parser.add_argument(
+        "--fit", type=float, nargs=2, default=[128, 1e4], metavar="N", help="[128 1e4]"
+    )
     args = parser.parse_args()
     runs = read_all(args.runs)
     measured = costs(runs)
-    laws = fits(measured, args.fit_from)
+    laws = fits(measured, *args.fit)
     table = {
         "search": [search for search, (n, _) in measured.items() for _ in n],
         "N": [int(k) for n, _ in measured.values() for k in n],
@@ -87,7 +90,7 @@ def main() -> None:
     print_table(table)
     for search, law in laws.items():
         print(f"exponent_{search} = {law.exponent:.3f} +- {law.exponent_error:.3f}")
-    save(draw(measured, laws, args.fit_from), args.output, runs, "Cost of a collision")
+    save(draw(measured, laws, *args.fit), args.output, runs, "Cost of a collision")
     if args.csv:
         write_csv(args.csv, table)
 

@@ -28,7 +28,7 @@ measure() { # collisions, collisions per disk, power of N to divide the first by
 for repeat in 1 2 3; do # the best of three counts: a disturbance can only add
   measure 200000000 0 2 rescan 16 32 64 128 256 512 1024
   measure 100000000 10 1 pairs 16 32 64 128 256 512 1024 2048 4096 8192
-  measure 1000000 10 0 cells 16 64 256 1024 4096 16384 65536 262144
+  measure 1000000 10 0 cells 16 32 64 128 256 512 1024 2048 4096 8192 16384 65536 262144
   measure 1000000 5 0 cells 1048576
 done >"$data/members.txt"
 

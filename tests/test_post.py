@@ -585,11 +585,12 @@ def test_cost_takes_the_best_of_equal_runs(tmp_path):
 
 def test_cost_fits_a_power_of_n_to_many_disks():
     n = np.array([16, 128, 256, 512, 1024])
-    measured = {"rescan": (n, np.where(n < 100, 9, 3e-3 * n**1.9)), "cells": (n[:3], n[:3])}
-    laws = cost.fits(measured, 128)
+    measured = {"rescan": (n, np.where(n == 16, 9, 3e-3 * n**1.9)), "cells": (n[:3], n[:3])}
+    laws = cost.fits(measured, 128, 1e4)
     assert laws["rescan"].exponent == pytest.approx(1.9) and "cells" not in laws
     assert laws["rescan"].factor == pytest.approx(3e-3)
-    bent = cost.fits({"pairs": (n, n * np.array([1, 1, 1.1, 1, 1.1]))}, 16)["pairs"]
+    assert "rescan" not in cost.fits(measured, 128, 300)
+    bent = cost.fits({"pairs": (n, n * np.array([1, 1, 1.1, 1, 1.1]))}, 16, 1e4)["pairs"]
     assert 0 < abs(bent.exponent - 1) < 2 * bent.exponent_error < 0.1
 
 
