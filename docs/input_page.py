@@ -1,0 +1,77 @@
+"""Write docs/input.md from what the program says of its variables.
+
+python docs/input_page.py build/ricochet > docs/input.md
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+GROUPS = {
+    "run": "What is run, and by which method.",
+    "box": "The box and the gravity in it.",
+    "obstacle": "A circular wall; the group is repeated for each.",
+    "species": "Disks of one kind; the group is repeated for each.",
+    "contact": "What happens at a contact.",
+    "stop": "When the run ends: at the first of these that is met. At least one is needed.",
+    "output": "What is written, and when. The initial and the final state are always written.",
+}
+
+HEAD = """\
+# Input: every variable
+
+A file is made of groups `&name ... /` that hold `variable = value`; only what differs from the
+default is needed. The rules, and the ways to describe disks, are in
+[input/README](../input/README.md); [input/reference.nml](../input/reference.nml) is a file with
+all variables. `ricochet --explain VARIABLE` says the same as this page, which
+`docs/input_page.py` makes from it.
+
+A variable is set from the command line as `--set GROUP.VARIABLE=VALUE`; a species or an obstacle
+goes by its name: `--set species.projectile.mass=50`. Units are those of the file itself: whatever
+it takes as length, time and mass.
+"""
+
+ENTRY = re.compile(
+    r"^(?P<name>\S+?)(?:  \[(?P<unit>.*)\])?\n"
+    r"    (?P<help>.*)\n    allowed: (?P<allowed>.*)\n"
+    r"    (?P<kind>default|example): (?P<value>.*)$",
+    re.MULTILINE,
+)
+
+
+def explained(program: Path, group: str) -> list[dict]:
+    """The variables of a group as the program explains them."""
+    command = [program, "--explain", group]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    entries = [found.groupdict() for found in ENTRY.finditer(text)]
+    if 4 * len(entries) != len(text.splitlines()):
+        raise SystemExit(f"input_page.py: does not understand ricochet --explain {group}")
+    return entries
+
+
+def row(entry: dict) -> str:
+    """A line of the table."""
+    value = (
+        f"`{entry['value']}`" if entry["kind"] == "default" else f"none; e.g. `{entry['value']}`"
+    )
+    unit = entry["unit"] or ""
+    name = entry["name"].split(".")[-1]
+    cells = (f"`{name}`", entry["help"], entry["allowed"], value, unit)
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("**", "^") for cell in cells) + " |"
+
+
+def page(program: Path) -> str:
+    """The whole page."""
+    lines = [HEAD]
+    for group, words in GROUPS.items():
+        lines += [f"## &{group}", "", words, ""]
+        lines += ["| variable | meaning | allowed | default | unit |", "|---|---|---|---|---|"]
+        lines += [row(entry) for entry in explained(program, group)] + [""]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    sys.stdout.write(page(Path(sys.argv[1]).resolve()))
