@@ -14,7 +14,8 @@ module encounters
 
 contains
 
-  !> Lets disk i collide at the time t with what `code` names, and lists the collision if the log is on.
+  !> Lets disk i collide at the time t with what `code` names, and lists the collision if the log is on:
+  !> the same line whichever of two disks expected it.
   subroutine collide(sim, i, code, t, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -22,27 +23,24 @@ contains
     real(real64), intent(in) :: t
     type(event_log_t), intent(inout) :: log
     real(real64) :: v(2)
-    if (log%is_on()) v = flight_velocity(sim%disk(i)%v, sim%box%gravity, t - sim%disk(i)%clock)
+    integer(int32) :: first
+    first = merge(min(i, code), i, code > 0)
+    if (log%is_on()) v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
     if (code > 0) then
-      call collide_pair(sim, min(i, code), max(i, code), t)
+      call collide_pair(sim, first, max(i, code), t)
     else
       call collide_wall(sim, i, code, t)
     end if
     if (.not. log%is_on()) return
-    associate (tag => sim%tag(i), impulse => norm2(sim%disk(i)%v - v))
-      call log%append(sim%epoch + t, tag%id, name_of(sim, code), &
-        impulse*sim%species(tag%species)%mass)
+    associate (impulse => sim%species(sim%tag(first)%species)%mass*norm2(sim%disk(first)%v - v))
+      if (code > 0) then
+        call log%append(sim%epoch + t, min(sim%tag(i)%id, sim%tag(code)%id), &
+          max(sim%tag(i)%id, sim%tag(code)%id), impulse)
+      else
+        call log%append(sim%epoch + t, sim%tag(i)%id, code, impulse)
+      end if
     end associate
   end subroutine collide
-
-  !> What `code` names in the order of the input file.
-  pure function name_of(sim, code) result(id)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: code
-    integer(int32) :: id
-    id = code
-    if (code > 0) id = sim%tag(code)%id
-  end function name_of
 
   !> Brings a disk's own state to the time t: `flight` and `flight_velocity`, in place.
   pure subroutine land(disk, gravity, t)

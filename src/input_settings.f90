@@ -48,6 +48,7 @@ contains
         call take_contact(groups(k), settings%species, settings%contact, problems)
     end do
     call check_geometry(groups(o(1):o(2)), groups(s(1):s(2)), settings, problems)
+    call check_end(settings, problems)
   end subroutine resolve_settings
 
   !> First and last of the groups of one name; the last before the first if there are none.
@@ -161,6 +162,24 @@ contains
         'collisions, collisions_per_disk, events, energy_fraction, wall_clock')
     end if
   end subroutine take_stop
+
+  !> Whether the run can end at all: one disk meets no other, and elastic collisions cost no energy.
+  subroutine check_end(settings, problems)
+    type(settings_t), intent(in) :: settings
+    type(problem_list_t), intent(inout) :: problems
+    logical :: alone, elastic
+    associate (stop_rules => settings%stop)
+      if (min(stop_rules%time, stop_rules%wall_clock) < never .or. stop_rules%events < unlimited) return
+      alone = sum(settings%species%count) == 1 .and. stop_rules%energy_fraction <= 0
+      elastic = stop_rules%energy_fraction > 0 .and. stop_rules%collisions == unlimited &
+        .and. .not. stop_rules%collisions_per_disk < never &
+        .and. all(settings%contact%restitution >= 1) .and. settings%contact%wall_restitution >= 1
+      if (alone .and. (stop_rules%collisions < unlimited .or. stop_rules%collisions_per_disk < never)) &
+        call problems%add(0, 'stop', 'one disk never collides with another; give time or events')
+      if (elastic) call problems%add(0, 'stop.energy_fraction', &
+        'is never reached by elastic collisions; give another rule, or a restitution below 1')
+    end associate
+  end subroutine check_end
 
   subroutine take_output(group, output)
     type(parameter_group_t), intent(in) :: group

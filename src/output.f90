@@ -10,7 +10,7 @@ module output
   use observables, only: observable_list, observed_values
   use parameter_values, only: parameter_group_t
   use run_description, only: describe_cost, describe_run
-  use run_files, only: checkpoint_of, is_file, lock_of, new_part_of, part_of, &
+  use run_files, only: checkpoint_of, is_file, is_hdf5_file, lock_of, new_part_of, part_of, &
     remove_checkpoints
   use settings, only: settings_t
   use simulation_state, only: simulation_t
@@ -67,9 +67,16 @@ contains
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: frames, samples
+    logical :: exists, foreign
     call self%claim(path, error)
     if (allocated(error)) return
-    if (is_file(path) .and. .not. force) then
+    exists = is_file(path)
+    foreign = exists
+    if (exists) foreign = .not. is_hdf5_file(path)
+    if (foreign) then
+      call fail(error, exit_files, path//": is there already, and is no output of a run: it is left " &
+        //"as it is; choose another name")
+    else if (exists .and. .not. force) then
       call fail(error, exit_files, path//": is there already, from a finished run; --force replaces it")
     else if (is_file(checkpoint_of(path)) .and. .not. force) then
       call fail(error, exit_files, checkpoint_of(path)//": is there already, from a run that was " &

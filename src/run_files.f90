@@ -4,7 +4,7 @@ module run_files
   implicit none
   private
   public :: part_of, new_part_of, lock_of, checkpoint_of, earlier_checkpoint_of, new_checkpoint_of
-  public :: is_file, remove_checkpoints
+  public :: is_file, is_hdf5_file, remove_checkpoints
 
 contains
 
@@ -56,6 +56,21 @@ contains
     stem = path
     if (index(path//"|", ".h5|") > 1) stem = path(:len(path) - 3)
   end function stem_of
+
+  !> Whether the file is in HDF5 format, by its first bytes: nothing else is ever replaced.
+  function is_hdf5_file(path) result(yes)
+    character(len=*), intent(in) :: path
+    logical :: yes
+    character(len=8) :: first
+    integer :: unit, status
+    yes = .false.
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", &
+      status="old", iostat=status)
+    if (status /= 0) return
+    read (unit, iostat=status) first
+    if (status == 0) yes = first == achar(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+    close (unit)
+  end function is_hdf5_file
 
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
