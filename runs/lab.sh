@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# L1: 10 x 10 disks on a grid: frames, speeds of the last and of every 100th state, a film.
+# L1: 10 x 10 disks on a grid: frames, speeds of the last and of every 100th state, a film; and the
+# same with different masses.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python}
@@ -14,3 +15,8 @@ runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 
 "$python" post/snapshot.py "$data/start/seed_1.h5" --frames 0,50,100,300 --quiver \
   -o "$figures/lab_frames.png"
 "$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab_film"
+
+runs/ensemble.sh input/lab_masses.nml -d "$data/masses" --seeds 1 "$@"
+"$python" post/snapshot.py "$data/masses/seed_1.h5" --frames 0,10,600 --quiver \
+  -o "$figures/lab_masses.png"
+"$python" post/mixture.py "$data/masses/seed_1.h5" -o "$figures/lab_masses_speeds.png"
