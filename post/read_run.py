@@ -35,6 +35,15 @@ class Series(NamedTuple):
     value: np.ndarray
 
 
+class Events(NamedTuple):
+    """The event log: collisions of any kind in their order, (E,) each."""
+
+    time: np.ndarray
+    i: np.ndarray  # id of a disk
+    j: np.ndarray  # its partner; 0, -1, -2, -3 left, right, bottom, top side, -4, ... obstacles
+    impulse: np.ndarray  # length of the change of momentum
+
+
 class Obstacle(NamedTuple):
     """A circular wall; `inside` tells that the disks are kept in."""
 
@@ -145,6 +154,17 @@ class Run:
         return Series(
             read_values(self.path, f"observables/{name}/time", chosen),
             read_values(self.path, f"observables/{name}/value", chosen),
+        )
+
+    @cached_property
+    def events(self) -> Events:
+        """All collisions; needs `output.event_log = .true.` in the input file."""
+        with open_file(self.path) as file:
+            if "events" not in file:
+                raise RunError(f"{self.path}: has no event log, set output.event_log = .true.")
+            count = committed(file, "events", file["events/time"].shape[0])
+        return Events(
+            *(read_values(self.path, f"events/{name}", slice(0, count)) for name in Events._fields)
         )
 
     @cached_property
