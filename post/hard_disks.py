@@ -1,0 +1,152 @@
+"""What is known of hard disks: equation of state, collision rates, cooling, diffusion.
+
+eta = packing fraction, n = disks per area, s = diameter, m = mass, w = pair collisions per disk and
+time, chi = pair correlation at contact, Z = P / (n kT).
+"""
+
+import math
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+# Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
+# above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
+FLUID = np.array(
+    [
+        (0.05, 1.10839),
+        (0.10, 1.23614),
+        (0.15, 1.38804),
+        (0.20, 1.57037),
+        (0.25, 1.79159),
+        (0.30, 2.06326),
+        (0.35, 2.40150),
+        (0.40, 2.82933),
+        (0.45, 3.38054),
+        (0.50, 4.10636),
+        (math.pi / math.sqrt(12) / 1.6, 5.4963),
+        (math.pi / math.sqrt(12) / 1.5, 6.6074),
+        (math.pi / math.sqrt(12) / 1.4, 8.306),
+    ]
+)
+# Z_N = Z + c / N in a periodic box, at the first ten packing fractions.
+SHIFT = np.array(
+    [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
+)
+CLOSE_PACKING = math.pi / math.sqrt(12)
+
+# Z (1 - eta)^2 hardly differs from 1: what lies between the points is safe.
+_smooth = CubicSpline(np.append(0, FLUID[:, 0]), np.append(1, FLUID[:, 1] * (1 - FLUID[:, 0]) ** 2))
+_shift = CubicSpline(np.append(0, FLUID[:10, 0]), np.append(0, SHIFT))
+
+
+def henderson(eta: np.ndarray) -> np.ndarray:
+    """Z of the fluid by Henderson, Mol. Phys. 30, 971 (1975)."""
+    return (1 + eta**2 / 8) / (1 - eta) ** 2
+
+
+def luding(eta: np.ndarray) -> np.ndarray:
+    """Z with the next term, Luding, Phys. Rev. E 63, 042201 (2001)."""
+    return henderson(eta) - eta**4 / (64 * (1 - eta) ** 4)
+
+
+def simulated(eta: np.ndarray) -> np.ndarray:
+    """Z of the fluid between the points of `FLUID`; NaN beyond the last."""
+    eta = np.asarray(eta, dtype=float)
+    return np.where(eta <= FLUID[-1, 0], _smooth(eta) / (1 - eta) ** 2, np.nan)
+
+
+def simulated_finite(eta: np.ndarray, count: int) -> np.ndarray:
+    """The same for `count` disks in a periodic box, eta up to 0.5."""
+    return simulated(eta) + _shift(eta) / count
+
+
+def crystal(eta: np.ndarray) -> np.ndarray:
+    """Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968)."""
+    alpha = CLOSE_PACKING / eta - 1
+    return 2 / alpha + 1.90 + 0.67 * alpha + 1.51 * alpha**2
+
+
+def contact_value(z: float, eta: float) -> float:
+    """The chi of Z = 1 + 2 eta chi."""
+    return (z - 1) / (2 * eta)
+
+
+def finite_rate(free: int) -> float:
+    """c_N: mean relative speed for fixed energy over that of the Maxwell law.
+
+    `free` = N between walls, N - 1 in a periodic box at rest as a whole.
+    """
+    return math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
+
+
+def collision_rate(z: float, diameter: float, free: int, kt: float = 1.0, mass: float = 1.0):
+    """The w that belongs to Z."""
+    return 4 * (z - 1) * finite_rate(free) / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
+
+
+def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
+    """chi_ij of a mixture, Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987)."""
+    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
+    eta = math.pi / 4 * np.sum(n * s**2)
+    mean = np.sum(n * s) / np.sum(n * s**2)
+    pair = (s[:, None] + s) / 2
+    return 1 / (1 - eta) + 9 / 16 * eta / (1 - eta) ** 2 * (s[:, None] * s / pair) * mean
+
+
+def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
+    """w_ij: collisions of a disk of species i with those of species j, per time."""
+    s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
+    pair = (s[:, None] + s) / 2
+    reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
+    return n * pair * mixture_contact(s, n) * np.sqrt(reduced)
+
+
+def mixture_z(diameters, density) -> float:
+    """Z of a mixture with the contact values above."""
+    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
+    pair, share = (s[:, None] + s) / 2, n / np.sum(n)
+    return float(1 + math.pi / 2 * np.sum(n) * share @ (pair**2 * mixture_contact(s, n)) @ share)
+
+
+def cooling_kurtosis(xi: float) -> float:
+    """a2 of the homogeneously cooling gas, van Noije and Ernst, Granular Matter 1, 57 (1998)."""
+    return 16 * (1 - xi) * (1 - 2 * xi**2) / (57 - 25 * xi + 30 * xi**2 * (1 - xi))
+
+
+def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
+    """K / K0 after tau collisions per disk, while the gas stays homogeneous."""
+    return np.exp(-(1 - xi**2) * (1 + cooling_kurtosis(xi) / 4) * np.asarray(tau) / 2)
+
+
+def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
+    """K / K0 after the time t, w0 = w at the start; Haff, J. Fluid Mech. 134, 401 (1983)."""
+    return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
+
+
+def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
+    """T_heavy / T_light of a dilute cooling mixture of disks of equal size.
+
+    Both species cool at the same rate; rates with Maxwellian velocities as in Garzo and Dufty,
+    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` = heavy disks over all.
+    """
+    mass, part = np.array([1.0, mass_ratio]), np.array([1 - share, share])
+
+    def difference(ratio: float) -> float:
+        square = np.array([1.0, ratio]) / mass  # kT / m
+        opposite = mass / (mass[:, None] + mass)  # m_j / (m_i + m_j)
+        total = square[:, None] + square
+        gain = 1 - opposite * (1 + xi) / 2 * total / square[:, None]
+        rates = np.sum(part * opposite * np.sqrt(total) * gain, axis=1)
+        return rates[1] - rates[0]
+
+    low, high = 0.1, 10.0
+    while high - low > 1e-12:
+        middle = (low + high) / 2
+        low, high = (low, middle) if difference(middle) > 0 else (middle, high)
+    return (low + high) / 2
+
+
+def enskog_diffusion(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
+    """D_E, first Sonine approximation."""
+    density = 4 * eta / (math.pi * diameter**2)
+    return math.sqrt(kt / (math.pi * mass)) / (2 * density * diameter * contact_value(z, eta))
