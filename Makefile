@@ -169,6 +169,7 @@ check:  ## validates the physics and provokes faults (minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) all
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
 bench: all  ## measures collisions per second
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh

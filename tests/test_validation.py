@@ -1,0 +1,89 @@
+"""The quick part of the validation with every `make test`, and that its verdicts can be trusted."""
+
+import json
+
+import numpy as np
+import pytest
+
+from validation import report
+from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relative, sigmas, within
+from validation.running import validate
+from validation.tables import CASES
+
+from theory import Estimate  # isort: skip, validation knows where it is
+
+QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-03", "P9-09", "P9-1", "P10-01", "P10-07")
+QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07")
+
+
+def case(measure, reference, tolerance, members=()) -> Case:
+    return Case("T", "a case for a test", tuple(members), measure, reference, tolerance, "test")
+
+
+def verdict(value, reference, tolerance) -> bool:
+    return judge(case(lambda: value, reference, tolerance), []).passed
+
+
+def test_exact_cases_hold(program, tmp_path):
+    cases = [case for case in CASES if case.id.startswith(QUICK)]
+    verdicts = list(validate(cases, program, tmp_path, jobs=2))
+    assert len(verdicts) == len(cases) > 60
+    bad = [f"{v.case.id} {v.case.what}: {v.measured} {v.problem}" for v in verdicts if not v.passed]
+    assert not bad, "\n".join(bad)
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "tolerance", "passed"),
+    [
+        (1.01, 1, within(0.02), True),
+        (0.97, 1, within(0.02), False),
+        ([1, 2.1], [1, 2], relative(0.06), True),
+        ([1, 2.1], [1, 2], relative(0.04), False),
+        (Estimate(1.1, 0.05), 1, sigmas(3), True),
+        (Estimate(1.1, 0.05), 1, sigmas(3, 0.05), False),
+        (Estimate(1.1, 0.03), 1, sigmas(3), False),
+        (0, 0, relative(0.1), True),
+        (1e-300, 0, EXACT, False),
+        (True, True, EXACT, True),
+        (0.9, 1, AT_MOST, True),
+        (1.1, 1, AT_MOST, False),
+        (1.1, 1, AT_LEAST, True),
+        (0.9, 1, AT_LEAST, False),
+        (np.nan, 1, AT_MOST, False),
+        ([1, np.nan], 1, within(9), False),
+        (np.inf, 1, AT_MOST, False),
+        ([1, 1], [1, 1, 1], within(9), False),
+    ],
+)
+def test_verdicts(value, reference, tolerance, passed):
+    assert verdict(value, reference, tolerance) is passed
+
+
+def test_failures_are_reported_and_do_not_stop_the_others(program, tmp_path):
+    cases = [
+        case(lambda run: 0, 0, EXACT, [Member("&stop time = 1 /\n")]),
+        case(lambda: 1 / 0, 0, EXACT),
+        case(lambda: 2, 2, EXACT),
+        case(lambda: 3, 2, within(0.5)),
+    ]
+    verdicts = list(validate(cases, program, tmp_path, jobs=1))
+    assert [v.passed for v in verdicts] == [False, False, True, False]
+    assert "ended with 2" in verdicts[0].problem and "species" in verdicts[0].problem
+    assert "ZeroDivisionError" in verdicts[1].problem
+    report.write(tmp_path / "deep" / "report", verdicts, "ricochet 0", 60.0)
+    data = json.loads((tmp_path / "deep" / "report.json").read_text())
+    assert [c["verdict"] for c in data["cases"]] == ["fail", "fail", "pass", "fail"]
+    assert data["cases"][3]["error"] == 1 and data["cases"][0]["measured"] is None
+    text = (tmp_path / "deep" / "report.md").read_text()
+    assert text.count("**FAIL**") == 3 and "4 cases in 1.0 minutes" in text
+
+
+def test_other_seeds_give_other_runs(program, tmp_path):
+    text = "&run\n  seed = 1\n/\n&species count = 5 radius = 0.05 speed = 1 /\n"
+    text += "&stop collisions = 3 /\n"
+    last = case(lambda run: run.time[-1], 0, within(9), [Member(text)])
+    first, again, other = (
+        next(validate([last], program, tmp_path / str(k), 1, shift)).measured
+        for k, shift in enumerate((0, 0, 1))
+    )
+    assert first == again != other

@@ -1,0 +1,117 @@
+"""Section 12: billiards."""
+
+from math import pi, radians
+
+import numpy as np
+
+from read_run import Run
+
+from .case import AT_MOST, Case, Member, relative, within
+from .inputs import EVERY_EVENT, disk, namelist
+
+ROUND_BOX = {"lower": (-1, -1), "upper": (1, 1)}
+CONTAINER = {"centre": (0, 0), "radius": 1.0, "side": "inside"}
+
+ROUND = Member(
+    namelist(
+        box=ROUND_BOX, obstacle=CONTAINER, species=disk((0.3, 0), (0.6, 0.8), 0.05),
+        stop={"events": 101}, output=EVERY_EVENT,
+    )
+)  # fmt: skip
+
+
+def angles(run: Run) -> np.ndarray:
+    """Polar angles of the hits, without jumps."""
+    x = run.position[1 : len(run.events.time) + 1][:, 0]
+    return np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
+
+
+def spins(run: Run) -> np.ndarray:
+    """Angular momentum about the origin in all frames."""
+    x, v = run.position[:], run.velocity[:]
+    return np.sum(run.mass * (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]), axis=1)
+
+
+def sinai(radius: float, centre: tuple, hole: float, velocity: tuple) -> Member:
+    return Member(
+        namelist(
+            obstacle={"centre": centre, "radius": hole},
+            species=disk((0.1, 0.2), velocity, radius),
+            stop={"events": 2_000_000},
+        )
+    )
+
+
+SINAI = sinai(0.01, (0.5, 0.5), 0.25, (0.8, 0.6))
+HEAVY = Member(
+    namelist(
+        species=[
+            {"name": "heavy", **disk((0.5, 0.5), (0, 0), 0.2, 1e15)},
+            {"name": "light", **disk((0.1, 0.2), (0.8, 0.6), 0.01)},
+        ],
+        stop={"collisions": 1_000_000},
+    )
+)
+
+
+def last(run: Run, name: str) -> float:
+    """Sum of an observable at the end."""
+    return float(np.sum(run.observable(name).value[-1]))
+
+
+def free_path(run: Run) -> float:
+    """Length of the path over the number of hits, speed 1."""
+    return run.time[-1] / (last(run, "wall_collisions") + last(run, "obstacle_collisions"))
+
+
+def open_region(radius: float, hole: float) -> tuple[float, float]:
+    """Area and perimeter open to the centre, in the unit box with one scatterer."""
+    a, reach = 1 - 2 * radius, hole + radius
+    return a**2 - pi * reach**2, 4 * a + 2 * pi * reach
+
+
+def mean_path(radius: float, hole: float) -> float:
+    """Pi Q / p."""
+    area, perimeter = open_region(radius, hole)
+    return pi * area / perimeter
+
+
+STEP = radians(150.733419431936)
+CASES = [
+    Case(
+        "P12-01", "round container: first hit, place; interval; polar step",
+        (ROUND,),
+        lambda run: [
+            run.events.time[0], *run.position[1][0], np.diff(run.events.time[:2])[0],
+            np.diff(angles(run)[:2])[0],
+        ],
+        [0.739184421103839, 0.743510652662303, 0.591347536883071, 1.83836884220768, STEP],
+        relative(1e-12), "D",
+    ),
+    Case(
+        "P12-02", "100 further hits: angular momentum, polar steps",
+        (ROUND,), lambda run: [*(spins(run) / 0.24), *(np.diff(angles(run)) / STEP)],
+        1, within(1e-9), "D",
+    ),
+    Case(
+        "P12-02", "the same: time and polar angle of the last",
+        (ROUND,), lambda run: [run.events.time[100], angles(run)[100] % (2 * pi)],
+        [184.576068641872, 6.14074471547], relative(1e-9), "D",
+    ),
+    Case(
+        "P12-03", "Sinai's billiard, 2e6 hits: mean free path",
+        (SINAI,), free_path, mean_path(0.01, 0.25), relative(0.005), "Santalo; Chernov 1997",
+    ),
+    Case(
+        "P12-04", "light disk about a very heavy one: hits per time on disk and sides",
+        (HEAVY,),
+        lambda run: [
+            last(run, "collisions") / run.time[-1], last(run, "wall_collisions") / run.time[-1]
+        ],
+        [0.511039, 1.518241], relative(0.005), "D, R",
+    ),
+    Case(
+        "P12-04", "the same: path of the heavy disk in 2e6 time units",
+        (HEAVY,), lambda run: np.linalg.norm(run.position[-1][0] - 0.5), 1e-3, AT_MOST, "D",
+    ),
+]  # fmt: skip

@@ -1,0 +1,115 @@
+"""A case of the validation, and the verdict on it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from theory import Estimate
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run of the program. Its input may be made from runs that come before it."""
+
+    text: str | Callable[..., str]
+    after: tuple["Member", ...] = ()
+    exit_code: int = 0  # a run that breaks off on purpose is read from its .part file
+
+
+class Tolerance(NamedTuple):
+    """How far a measured value may be from the reference."""
+
+    text: str
+    allowed: Callable[[np.ndarray, np.ndarray], np.ndarray]  # of reference and standard error
+    one_sided: int = 0  # +1: only too large is wrong, -1: only too small
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the tables."""
+
+    id: str
+    what: str
+    members: tuple[Member, ...]
+    measure: Callable[..., ArrayLike | Estimate]  # of the runs of the members
+    reference: ArrayLike
+    tolerance: Tolerance
+    source: str
+
+
+class Verdict(NamedTuple):
+    """The value, of several the one that comes nearest to its tolerance, and whether all pass."""
+
+    case: Case
+    values: int
+    reference: float
+    measured: float
+    error: float  # standard error, zero if there is none
+    used: float  # deviation over allowed deviation
+    problem: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return not self.problem and self.used <= 1
+
+
+def within(deviation: float) -> Tolerance:
+    """An absolute tolerance."""
+    return Tolerance(f"{deviation:g}", lambda ref, _: np.full_like(ref, deviation))
+
+
+def relative(deviation: float) -> Tolerance:
+    """A relative tolerance."""
+    text = f"{100 * deviation:.3g} %" if deviation >= 1e-4 else f"{deviation:g} relative"
+    return Tolerance(text, lambda ref, _: deviation * np.abs(ref))
+
+
+def sigmas(count: float, deviation: float = np.inf) -> Tolerance:
+    """So many standard errors of the measurement, and a relative tolerance."""
+    text = f"{count:g} sigma" + (f" and {100 * deviation:.3g} %" if deviation < np.inf else "")
+    return Tolerance(text, lambda ref, error: np.minimum(count * error, deviation * np.abs(ref)))
+
+
+EXACT = Tolerance("exact", lambda ref, _: np.zeros_like(ref))
+AT_MOST = Tolerance("at most", lambda ref, _: np.zeros_like(ref), +1)
+AT_LEAST = Tolerance("at least", lambda ref, _: np.zeros_like(ref), -1)
+
+
+def judge(case: Case, runs: list) -> Verdict:
+    """Measure a case; whatever goes wrong in that is a failed case, not the end of the others."""
+    try:
+        result = case.measure(*runs)
+    except Exception as problem:
+        return failed(case, f"{type(problem).__name__}: {problem}")
+    mean, error = result if isinstance(result, Estimate) else (result, 0.0)
+    measured = np.atleast_1d(np.asarray(mean, dtype=float))
+    reference = np.atleast_1d(np.asarray(case.reference, dtype=float))
+    if measured.shape != reference.shape and reference.size != 1:
+        return failed(case, f"{measured.size} values instead of {reference.size}")
+    reference = np.broadcast_to(reference, measured.shape).copy()
+    error = np.broadcast_to(np.asarray(error, dtype=float), measured.shape)
+    used = shares(case.tolerance, measured, reference, error)
+    k = int(np.argmax(used))
+    return Verdict(
+        case, measured.size, reference[k], float(measured[k]), float(error[k]), float(used[k])
+    )
+
+
+def shares(
+    tolerance: Tolerance, measured: np.ndarray, reference: np.ndarray, error: np.ndarray
+) -> np.ndarray:
+    """Deviation over allowed deviation; infinite where none is allowed, NaN (no pass) for NaN."""
+    same = measured == reference  # infinite values too
+    with np.errstate(invalid="ignore", divide="ignore"):
+        deviation = np.where(same, 0.0, measured - reference)
+        deviation = deviation * tolerance.one_sided if tolerance.one_sided else np.abs(deviation)
+        used = deviation / tolerance.allowed(reference, error)
+    return np.where(deviation <= 0, 0.0, used)
+
+
+def failed(case: Case, problem: str) -> Verdict:
+    """A case that could not be measured."""
+    return Verdict(case, 0, np.nan, np.nan, np.nan, np.inf, problem)

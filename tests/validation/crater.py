@@ -1,0 +1,181 @@
+"""Section 10: a projectile hits a bed; random sequential insertion."""
+
+from math import pi
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial import cKDTree
+
+from read_run import Run
+from theory import estimate
+
+from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, Tolerance, relative
+from .estimators import closest_gap, differences
+from .inputs import PERIODIC, namelist
+
+
+def crater(
+    count: int, seed: int = 1, mass: float = 25, speed: float = 5, exit_code: int = 0, **more
+) -> Member:
+    """A bed in the lower half at packing 1/2, a projectile five times as wide as its disks."""
+    groups = {
+        "contact": {"restitution": 0.5, "contact_time": 2.0**-17 * 5 / speed},
+        "stop": {"energy_fraction": 0.1},
+        "output": {"event_log": True},
+    }
+    for name in more:
+        groups[name] = groups[name] | more[name]
+    return Member(
+        namelist(
+            run={"seed": seed},
+            species=[
+                {"name": "bed", "count": count, "packing_fraction": 0.5, "region": (0, 1, 0, 0.5)},
+                {
+                    "name": "projectile", "relative_to": "bed", "mass": float(mass), "radius": 5.0,
+                    "position": (0.5, 0.75), "velocity": (0, -speed),
+                },
+            ],
+            **groups,
+        ),
+        exit_code=exit_code,
+    )  # fmt: skip
+
+
+def hit(run: Run) -> int:
+    """Bed disks that had a collision with a disk."""
+    log = run.events
+    pairs = log.j > 0
+    return len(np.union1d(log.i[pairs], log.j[pairs])) - 1
+
+
+MASSES = (1, 5, 10, 15, 20, 25)
+SCAN = tuple(crater(2000, seed, mass) for mass in MASSES for seed in range(1, 13))
+
+
+def rises(*runs: Run) -> np.ndarray:
+    """Growth of the mean number of disks hit from one mass to the next, in its errors."""
+    means, errors = estimate(np.reshape([hit(run) for run in runs], (len(MASSES), -1)), axis=1)
+    return np.diff(means) / np.hypot(errors[1:], errors[:-1])
+
+
+def hit_less_bound(run: Run) -> float:
+    """Disks hit less M (1/f - 1), if the sides played no part."""
+    if np.sum(run.observable("wall_collisions").value[-1]) > 0:
+        raise ValueError("a disk has hit a side")
+    return hit(run) - 25 * (1 / 0.1 - 1)
+
+
+def fraction_left(run: Run) -> np.ndarray:
+    """Energy over the first, event by event."""
+    lost = run.observable("dissipated_energy").value
+    return 1 - lost / run.observable("total_energy").value[0]
+
+
+CRATERS = [
+    Case(
+        "P10-01", "twice as fast, half the contact time: differences, all bits",
+        (crater(2000), crater(2000, speed=10)), lambda *runs: differences(*runs, 2.0),
+        0, EXACT, "D",
+    ),
+    Case(
+        "P10-02", "bed of 20 000, before a side is hit: disks hit less M (1/f - 1)",
+        (crater(20000),), hit_less_bound, 0, AT_LEAST, "D",
+    ),
+    Case(
+        "P10-03", "masses 1 to 25, 12 beds each: rises of the disks hit, in their errors",
+        SCAN, rises, 2, AT_LEAST, "granulargas, R",
+    ),
+    Case(
+        "P10-04", "no TC model, 3 beds of 2000: reported as collapse; packing of the bed",
+        tuple(
+            crater(
+                2000, seed, exit_code=4, contact={"contact_time": 0}, output={"event_log": False}
+            )
+            for seed in (1, 2, 3)
+        ),
+        lambda *runs: [np.sum(pi * run.radius[:-1] ** 2) / 0.5 for run in runs],
+        0.5, relative(1e-12), "R",
+    ),
+    Case(
+        "P10-07", "energy after each event: largest rise",
+        (crater(500, output={"observables_every_events": 1}),),
+        lambda run: np.max(np.diff(fraction_left(run))), 0, AT_MOST, "EX",
+    ),
+    Case(
+        "P10-07", "the same: E/E0 at the end is at most .1, and one event earlier above it",
+        (crater(500, output={"observables_every_events": 1}),),
+        lambda run: [fraction_left(run)[-1] <= 0.1, fraction_left(run)[-3] > 0.1],
+        [True, True], EXACT, "EX",
+    ),
+]  # fmt: skip
+
+# --- random sequential insertion ---
+
+BED = 10000
+
+
+def inserted(packing: float) -> tuple[Member, ...]:
+    """Periodic boxes filled at random, as they start."""
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed}, box=PERIODIC,
+                species={"count": BED, "packing_fraction": packing}, stop={"events": 1},
+            )
+        )
+        for seed in (1, 2, 3, 4)
+    )  # fmt: skip
+
+
+def free_part(*runs: Run, probes: int = 200_000) -> float:
+    """Fraction of the area where one more disk fits, mean over runs."""
+    parts = []
+    for run in runs:
+        tree = cKDTree(run.position[0], boxsize=run.edges)
+        places = np.random.default_rng(run.seed).random((probes, 2)) * run.edges
+        distance, _ = tree.query(places, distance_upper_bound=2 * run.radius[0])
+        parts.append(np.mean(np.isinf(distance)))
+    return float(np.mean(parts))
+
+
+GRID = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.43, 0.46, 0.48, 0.49, 0.5)
+FILLED = tuple(member for packing in GRID for member in inserted(packing))
+
+
+def attempts(*runs: Run) -> list[float]:
+    """Attempts x disk area to reach .1, .2, .3, .4, .5: the integral of 1 / free part."""
+    free = [1.0, *(free_part(*runs[k : k + 4]) for k in range(0, len(runs), 4))]
+    inverse = PchipInterpolator([0, *GRID], -np.log(free))
+    fine = np.linspace(0, 0.5, 5001)
+    sums = np.concatenate([[0], np.cumsum(np.diff(fine) * np.exp(inverse(fine[1:] - 5e-5)))])
+    return [float(np.interp(t, fine, sums)) for t in (0.1, 0.2, 0.3, 0.4, 0.5)]
+
+
+RSA = [
+    Case(
+        "P10-05", "bed at packing 1/2: closest gap",
+        (crater(2000, stop={"events": 1}),), closest_gap, -1e-12, AT_LEAST, "R",
+    ),
+    Case(
+        "P10-05", "random placement at 0.56, beyond saturation: refused, not attempted for ever",
+        (
+            Member(
+                namelist(species={"count": 2000, "packing_fraction": 0.56}, stop={"events": 1}),
+                exit_code=2,
+            ),
+        ),
+        lambda run: run is None, True, EXACT, "Zhang and Torquato 2013",
+    ),
+    Case(
+        "P10-06", "part of the area free for one more at coverage .1, .2",
+        inserted(0.1) + inserted(0.2), lambda *runs: [free_part(*runs[:4]), free_part(*runs[4:])],
+        [0.6345, 0.3436], relative(0.01), "Schaaf and Talbot 1989, R",
+    ),
+    Case(
+        "P10-06", "attempts x disk area to reach .1, .2, .3, .4, .5",
+        FILLED, attempts, [0.126, 0.339, 0.807, 2.33, 25.6],
+        Tolerance("1 / 1 / 3 / 3 / 10 %", lambda ref, _: ref * [0.01, 0.01, 0.03, 0.03, 0.1]), "R",
+    ),
+]  # fmt: skip
+
+CASES = CRATERS + RSA

@@ -1,0 +1,101 @@
+"""Section 14: velocity autocorrelation and diffusion."""
+
+import numpy as np
+
+import hard_disks as hd
+from read_run import Run
+from theory import estimate
+
+from .case import Case, Member, relative, within
+from .inputs import gas
+
+N = 1024
+PACKINGS = (0.05, 0.2, 0.4)
+SEEDS = (1, 2, 3, 4)
+
+
+def rate(eta: float) -> float:
+    """W at kT = 1."""
+    diameter = 2 * np.sqrt(eta / (np.pi * N))
+    return hd.collision_rate(float(hd.simulated_finite(eta, N)), diameter, N - 1)
+
+
+def watched(eta: float, seed: int, step: float, frames: int) -> Member:
+    """Frames `step` mean free times apart."""
+    interval = step / rate(eta)
+    return Member(
+        gas(
+            N, seed=seed, packing_fraction=eta, periodic=True, temperature=1.0,
+            stop={"time": interval * frames}, output={"frames_every_time": interval},
+        )
+    )  # fmt: skip
+
+
+def memory(eta: float) -> tuple[Member, ...]:
+    return tuple(watched(eta, seed, 0.05, 1000) for seed in SEEDS)
+
+
+def autocorrelation(run: Run, lags: tuple[int, ...]) -> np.ndarray:
+    """Normalised VACF at lags in frames; all frames are origins."""
+    v = run.velocity[:]
+    square = np.mean(v**2)
+    return np.array([np.mean(v[lag:] * v[: len(v) - lag]) / square for lag in lags])
+
+
+def mean_free_time(run: Run) -> float:
+    """1 / w of this run: its energy is its own."""
+    return run.count * run.time[-1] / (2 * run.observable("collisions").value[-1])
+
+
+def half_and_one(run: Run) -> list[float]:
+    """The psi at w t = 1/2 and 1, interpolated between frames."""
+    lags = np.arange(31)
+    t = lags * (run.time[1] - run.time[0]) / mean_free_time(run)
+    return list(np.exp(np.interp((0.5, 1.0), t, np.log(autocorrelation(run, tuple(lags))))))
+
+
+def slope(run: Run) -> float:
+    """-psi'(0) / w, by extrapolation from two short lags."""
+    x = np.arange(1, 3) * (run.time[1] - run.time[0]) / mean_free_time(run)
+    one, two = (1 - autocorrelation(run, (1, 2))) / x
+    return float(2 * one - two)
+
+
+SPREAD = tuple(watched(0.05, seed, 1.0, 1500) for seed in range(1, 7))
+
+
+def enskog_ratio(run: Run) -> float:
+    """Slope of <dx^2> / 4 between w t = 8 and 28, over the Enskog value."""
+    unwrapped = run.unwrapped(slice(None))
+    unwrapped -= unwrapped.mean(axis=1, keepdims=True)
+    low, high = (np.mean((unwrapped[k:] - unwrapped[:-k]) ** 2) * 2 for k in (8, 28))
+    step = run.time[1] - run.time[0]
+    kt = np.sum(run.kinetic_energy(0)) / (run.count - 1)
+    eta = 0.05
+    expected = hd.enskog_diffusion(float(hd.simulated(eta)), eta, 2 * run.radius[0], kt)
+    return (high - low) / (4 * 20 * step) / expected
+
+
+CASES = [
+    *[
+        Case(
+            "P14-01", f"packing {eta}: velocity autocorrelation at w t = .5, 1",
+            memory(eta), lambda *runs: estimate([half_and_one(run) for run in runs]),
+            [0.609, 0.3755], within(0.01), "D, R",
+        )
+        for eta in PACKINGS
+    ],
+    *[
+        Case(
+            "P14-01", f"packing {eta}: its slope at 0 over -w",
+            memory(eta), lambda *runs: estimate([slope(run) for run in runs]),
+            1, within(0.01), "D",
+        )
+        for eta in PACKINGS
+    ],
+    Case(
+        "P14-02", "packing .05: diffusion at w t = 8 to 28 over Enskog's",
+        SPREAD, lambda *runs: estimate([enskog_ratio(run) for run in runs]),
+        1.05, relative(0.05), "D, R",
+    ),
+]  # fmt: skip

@@ -1,0 +1,335 @@
+"""Section 9: gases that lose energy, the TC model, collapse."""
+
+from itertools import pairwise
+from math import log, sqrt
+
+import numpy as np
+
+import hard_disks as hd
+from read_run import Run
+from theory import Estimate, estimate
+
+from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
+from .estimators import at_collisions
+from .inputs import PERIODIC, disk, gas, namelist
+
+# --- one kind of disk ---
+
+ETA = 0.02
+
+
+def cooling(xi: float, tau: float) -> tuple[Member, ...]:
+    """Ten gases that start in equilibrium."""
+    return tuple(
+        Member(
+            gas(
+                1000, seed=seed, packing_fraction=ETA, periodic=True, temperature=1.0,
+                contact={"restitution": xi}, stop={"collisions_per_disk": tau},
+                output={"observables_every_collisions": 50},
+            )
+        )
+        for seed in range(1, 11)
+    )  # fmt: skip
+
+
+COOLING = {0.9: cooling(0.9, 20.2), 0.8: cooling(0.8, 10.2)}
+
+
+def left(run: Run, tau: float) -> float:
+    """K over K at the start."""
+    energy = at_collisions(run, "all/kinetic_energy", tau)
+    return float(energy / run.observable("all/kinetic_energy").value[0])
+
+
+def left_at_time(run: Run, w0_t: float) -> float:
+    """The same after a time in units of the first mean free time."""
+    time, energy = run.observable("all/kinetic_energy")
+    kt = energy[0] * run.count / (run.count - 1)
+    z = hd.simulated_finite(ETA, run.count)
+    w0 = hd.collision_rate(z, 2 * run.radius[0], run.count - 1, kt)
+    return float(np.interp(w0_t / w0, time, energy) / energy[0])
+
+
+LEDGER = tuple(
+    Member(
+        gas(
+            200, radius=0.02, contact=contact, stop={"collisions_per_disk": 20},
+            output={"observables_every_collisions": 20},
+        )
+    )
+    for contact in (
+        {"restitution": 0.9},
+        {"restitution": 0.7, "wall_restitution": 0.95, "wall_rule": "normal"},
+        {"restitution": 0.8, "contact_time": 1e-4},
+    )
+)  # fmt: skip
+
+
+def ledger(run: Run) -> float:
+    """Largest gap between energy lost and energy booked as lost, over the first energy."""
+    total = run.observable("total_energy").value
+    booked = run.observable("dissipated_energy").value
+    return float(np.max(np.abs(total + booked - total[0])) / total[0])
+
+
+def slow_loss(rule: str) -> tuple[Member, ...]:
+    """Walls that take so little that the gas stays in equilibrium."""
+    return tuple(
+        Member(
+            gas(
+                1000, seed=seed, radius=0.001, temperature=1.0,
+                contact={"restitution": 1, "wall_restitution": 0.9999, "wall_rule": rule},
+                stop={"collisions_per_disk": 1500}, output={"observables_every_collisions": 5000},
+            )
+        )
+        for seed in range(1, 5)
+    )  # fmt: skip
+
+
+def loss_per_hit(run: Run) -> float:
+    """Mean energy lost per hit on a side, over (1 - xi^2) kT."""
+    energy = run.observable("total_energy").value
+    hits = run.observable("wall_collisions").value.sum(axis=1)
+    return -log(energy[-1] / energy[0]) * run.count / hits[-1] / (1 - 0.9999**2)
+
+
+GAS = [
+    *[
+        Case(
+            "P9-01", f"cooling, restitution {xi}: K / K0 after {tau} collisions per disk",
+            COOLING[xi], lambda *runs, tau=tau: estimate([left(run, tau) for run in runs]),
+            hd.haff_by_collisions(tau, xi), relative(0.03), "van Noije and Ernst; R",
+        )
+        for xi, tau in ((0.9, 10), (0.9, 20), (0.8, 10))
+    ],
+    Case(
+        "P9-02", "cooling, restitution 0.9: K / K0 at w0 t = 12.8",
+        COOLING[0.9], lambda *runs: estimate([left_at_time(run, 12.8) for run in runs]),
+        hd.haff_by_time(12.8, 0.9), relative(0.015), "Haff 1983; R",
+    ),
+    Case(
+        "P9-03", "energy lost and energy booked, in 3 gases with walls, over the first energy",
+        LEDGER, lambda *runs: [ledger(run) for run in runs], 1e-10, AT_MOST, "D",
+    ),
+    *[
+        Case(
+            "P9-04", f"walls, rule '{rule}': mean loss per hit over (1 - xi^2) kT",
+            slow_loss(rule), lambda *runs: estimate([loss_per_hit(run) for run in runs]),
+            share * 2000 / 2001, sigmas(3, 0.01), "D",
+        )
+        for rule, share in (("velocity", 1.5), ("normal", 1.0))
+    ],
+]  # fmt: skip
+
+# --- mixture ---
+
+
+def mixture(xi: float, seed: int, walls: bool) -> Member:
+    disks = {"count": 500, "radius": 0.004 if walls else 0.001, "speed": 1.0}
+    return Member(
+        namelist(
+            run={"seed": seed}, box={} if walls else PERIODIC,
+            species=[{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}],
+            contact={"restitution": xi}, stop={"collisions_per_disk": 20},
+            output={"observables_every_collisions": 100},
+        )
+    )  # fmt: skip
+
+
+def mixtures(xi: float, walls: bool = False, seeds: int = 16) -> tuple[Member, ...]:
+    return tuple(mixture(xi, seed, walls) for seed in range(1, seeds + 1))
+
+
+def temperature_ratio(*runs: Run) -> Estimate:
+    """K_heavy / K_light from 10 to 20 collisions per disk."""
+    tau = np.linspace(10, 20, 21)
+    parts = [
+        np.mean(
+            at_collisions(run, "heavy/kinetic_energy", tau)
+            / at_collisions(run, "light/kinetic_energy", tau)
+        )
+        for run in runs
+    ]
+    return estimate(parts)
+
+
+def steps(*runs: Run) -> float:
+    """Smallest rise of the ratio from one of three groups of runs to the next, in its errors."""
+    groups = [temperature_ratio(*part) for part in np.array_split(np.array(runs, object), 3)]
+    return min((b.mean - a.mean) / np.hypot(a.error, b.error) for a, b in pairwise(groups))
+
+
+EXAM = mixtures(1.0, True, 8) + mixtures(0.9, True, 8) + mixtures(0.8, True, 8)
+MIXTURE = [
+    Case(
+        "P9-05", "mixture between walls: ratio rises from xi = 1 to .9 to .8, in its errors",
+        EXAM, steps, 3, AT_LEAST, "EX; Garzo and Dufty 1999",
+    ),
+    Case(
+        "P9-05", "the same, xi = 1: K_heavy / K_light after 10 collisions per disk",
+        EXAM[:8], temperature_ratio, 1, sigmas(3, 0.05), "D",
+    ),
+    Case(
+        "P9-05", "the same, xi = .9, .8: K of each species over twice its last value, at least",
+        EXAM[8:],
+        lambda *runs: min(
+            run.observable(f"{name}/kinetic_energy").value[0]
+            / run.observable(f"{name}/kinetic_energy").value[-1] / 2
+            for run in runs for name in run.names
+        ),
+        1, AT_LEAST, "EX",
+    ),
+    *[
+        Case(
+            "P9-06", f"dilute periodic mixture, xi = {xi}: K_heavy / K_light",
+            mixtures(xi, seeds=64), temperature_ratio, hd.cooling_ratio(4, xi),
+            relative(0.03), "Garzo and Dufty 1999; D",
+        )
+        for xi in (0.9, 0.8)
+    ],
+]  # fmt: skip
+
+# --- TC model ---
+
+
+def flagged(run: Run, contact_time: float) -> np.ndarray:
+    """Which events find a partner that had its last less than `contact_time` ago."""
+    log = run.events
+    last = np.full(run.count + 1, -np.inf)
+    flags = np.empty(len(log.time), dtype=bool)
+    for k, (t, i, j) in enumerate(zip(log.time, log.i, log.j, strict=True)):
+        partners = [i, j] if j > 0 else [i]
+        flags[k] = np.any(t - last[partners] < contact_time)
+        last[partners] = t
+    return flags
+
+
+FLAG_TIMES = (0.01, 0.05, 0.1, 0.2, 0.5, 1, 2)
+ELASTIC = Member(
+    gas(
+        1000, packing_fraction=0.1, periodic=True, temperature=1.0,
+        stop={"collisions_per_disk": 100}, output={"event_log": True},
+    )
+)  # fmt: skip
+
+
+def flag_fractions(run: Run) -> list[float]:
+    """Fractions of collisions that would be elastic, at w t_c of `FLAG_TIMES`."""
+    rate = 2 * len(run.events.time) / run.count / run.time[-1]
+    settled = run.events.time > 10 / rate
+    return [np.mean(flagged(run, x / rate)[settled]) for x in FLAG_TIMES]
+
+
+def flagged_gas(contact_time: float) -> Member:
+    return Member(
+        gas(
+            100, radius=0.02, contact={"restitution": 0.5, "contact_time": contact_time},
+            stop={"events": 2000}, output={"observables_every_events": 1, "event_log": True},
+        )
+    )  # fmt: skip
+
+
+def wrong_flags(run: Run) -> int:
+    """Events whose loss contradicts the rule of the TC model."""
+    lost = np.diff(run.observable("dissipated_energy").value) > 0
+    return int(np.sum(lost == flagged(run, run.parameter("contact", "contact_time"))))
+
+
+def unequal_before_flag(run: Run, plain: Run) -> int:
+    """Differences of two logs up to the first elastic collision of the first run."""
+    contact_time = run.parameter("contact", "contact_time")
+    first = int(np.argmax(flagged(run, contact_time)))
+    if first < 20:
+        raise ValueError("the first elastic collision comes too soon")
+    logs = zip(run.events, plain.events, strict=True)
+    return sum(int(np.sum(a[:first] != b[:first])) for a, b in logs)
+
+
+TC = [
+    Case(
+        "P9-07", "collisions less than t_c after another, w t_c = .01 to 2: fraction",
+        (ELASTIC,), flag_fractions, [0.0186, 0.090, 0.172, 0.32, 0.62, 0.86, 0.98],
+        within(0.01), "R",
+    ),
+    Case(
+        "P9-07", "TC model: events that are elastic and should not be, or the other way",
+        (flagged_gas(0.01), flagged_gas(1e-3)), lambda *runs: [wrong_flags(run) for run in runs],
+        [0, 0], EXACT, "Luding and McNamara 1998",
+    ),
+    Case(
+        "P9-08", "the same, t_c without limit: elastic from the second collision on",
+        (flagged_gas(1e9),), wrong_flags, 0, EXACT, "D",
+    ),
+    Case(
+        "P9-09", "t_c = 1e-4 against 0: differences before the first elastic collision",
+        (flagged_gas(1e-4), flagged_gas(0)), unequal_before_flag, 0, EXACT, "D",
+    ),
+]  # fmt: skip
+
+# --- collapse ---
+
+
+def line_of_three(xi: float, places: tuple, velocities: tuple, time: float) -> Member:
+    """Three disks on a line, with much room on both sides."""
+    return Member(
+        namelist(
+            box={"lower": (-1000, 0), "upper": (1001, 1)},
+            species=[
+                disk((x, 0.5), (v, 0), 0.05) for x, v in zip(places, velocities, strict=True)
+            ],
+            contact={"restitution": xi}, stop={"time": time},
+            output={"event_log": True, "frames_every_events": 1},
+        )
+    )  # fmt: skip
+
+
+def symmetric(*factors: float) -> tuple[Member, ...]:
+    """Outer disks that come in with equal speeds, one a little later; xi over the critical one."""
+    return tuple(
+        line_of_three(factor * CRITICAL, (0.3, 0.5, 0.7001), (1, 0, -1), 100.0)
+        for factor in factors
+    )
+
+
+def spread(run: Run) -> float:
+    """Largest difference of the velocities at the end."""
+    return float(np.ptp(run.velocity[-1][:, 0]))
+
+
+CRITICAL = 7 - 4 * sqrt(3)
+COLLAPSED, DISPERSED = (line_of_three(xi, (0.3, 0.5, 0.7), (1, 0, -0.5), 2.0) for xi in (0.05, 0.1))
+FIRST_SIX = [
+    0.1, 0.148780487804878, 0.153777208706786, 0.155026293727612, 0.155392587099469,
+    0.155504860274233,
+]  # fmt: skip
+COLLAPSE = [
+    Case(
+        "P9-10", "three on a line, 1.03 and 1.4 of the critical xi: they part, with a speed of",
+        symmetric(1.03, 1.4), lambda *runs: [spread(run) for run in runs], 1e-12, AT_LEAST,
+        "Bernu and Mazighi 1990",
+    ),
+    Case(
+        "P9-10", "the same, 0.97 and 0.7 of it: they collapse, the run ends, speed left",
+        symmetric(0.97, 0.7), lambda *runs: [spread(run) for run in runs], 1e-16, AT_MOST,
+        "Bernu and Mazighi 1990",
+    ),
+    Case(
+        "P9-11", "xi = .05: times of the first six collisions",
+        (COLLAPSED,), lambda run: run.events.time[:6], FIRST_SIX, within(1e-12), "D, 120 digits",
+    ),
+    Case(
+        "P9-11", "the same: time, velocities, place of the collapse",
+        (COLLAPSED,),
+        lambda run: [run.events.time[26], *run.velocity[-1][:, 0], run.position[27][1, 0]],
+        [7 / 45, 1 / 6, 1 / 6, 1 / 6, 0.525925925925926], within(1e-9), "D, 120 digits",
+    ),
+    Case(
+        "P9-11", "xi = .1: collisions, time of the last, velocities",
+        (DISPERSED,),
+        lambda run: [len(run.events.time), run.events.time[-1], *run.velocity[-1][:, 0]],
+        [6, 0.195077620020993, 0.1659559375, 0.166739203125, 0.167304859375],
+        within(1e-12), "D",
+    ),
+]  # fmt: skip
+
+CASES = GAS + MIXTURE + TC + COLLAPSE

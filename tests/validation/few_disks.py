@@ -1,0 +1,477 @@
+"""Sections 1 to 4: one, two and ten disks, exact results."""
+
+from math import acos, log, pi, sqrt
+
+import numpy as np
+
+from read_run import Run
+from theory import scattering_angle
+
+from .case import AT_MOST, EXACT, Case, Member, relative, within
+from .inputs import EVERY_EVENT, disk, namelist
+
+G = {"upper": (8, 16), "gravity": (0, -9.81)}
+SMALL = 0.04
+
+
+def few(*species: dict, box=None, contact=None, output=None, **stop) -> Member:
+    """Some disks with every event on record."""
+    return Member(
+        namelist(
+            box=box or {},
+            species=list(species),
+            contact=contact or {},
+            stop=stop,
+            output=EVERY_EVENT | (output or {}),
+        )
+    )
+
+
+def final(run: Run) -> np.ndarray:
+    """Velocities at the end."""
+    return run.velocity[-1].ravel()
+
+
+# --- one disk ---
+
+
+def straight(velocity: tuple, start=(0.2, 0.5), radius=0.05, **more) -> Member:
+    return few(disk(start, velocity, radius), **more)
+
+
+def square_path(contact: dict, events: int = 6, start=(0.5, 0.25)) -> Member:
+    """P1-04: a closed path in the unit box, 4 hits long."""
+    return few(disk(start, (1, 1), 0.1), contact=contact, events=events)
+
+
+def dropped(height: float, events: int, speed=(0, 0), contact=None, width=8.0) -> Member:
+    """A disk above the floor."""
+    box = {"upper": (width, 16), "gravity": (0, -9.81)}
+    return few(disk((1, height), speed, SMALL), box=box, contact=contact, events=events)
+
+
+def impacts(xi: float, count: int) -> np.ndarray:
+    """Times of the impacts after a drop from 1 above the floor."""
+    flights = np.append(0.5, xi ** np.arange(1, count))
+    return 2 * sqrt(2 / 9.81) * np.cumsum(flights)
+
+
+def until_rest(xi: float) -> int:
+    """Impacts until the next flight is shorter than 1e-12."""
+    return int(np.ceil(log(1e-12 / (2 * sqrt(2 / 9.81))) / log(xi)))
+
+
+def mean_interval(run: Run) -> float:
+    time = run.events.time
+    return (time[-1] - time[0]) / (len(time) - 1)
+
+
+def dissipating(run: Run) -> int:
+    """Number of events that took energy."""
+    return int(np.sum(np.diff(run.observable("dissipated_energy").value) > 0))
+
+
+def last_flight(run: Run) -> float:
+    """Mean length of the flights when no more energy is lost."""
+    first = dissipating(run)
+    time = run.events.time[first - 1 :]
+    return (time[-1] - time[0]) / (len(time) - 1)
+
+
+def apexes(run: Run) -> np.ndarray:
+    """Heights of the centre that the speeds after the impacts reach."""
+    return run.position[1:][:, 0, 1] + run.velocity[1:][:, 0, 1] ** 2 / (2 * 9.81)
+
+
+ELASTIC, VELOCITY, NORMAL = {}, {"wall_restitution": 0.9}, {"wall_restitution": 0.9}
+NORMAL = VELOCITY | {"wall_rule": "normal"}
+PATH_TIMES = [0.4, 0.677777777777778, 1.35679012345679, 1.69972565157750, 2.53801249809480]
+PATH_TIMES += [2.96138969330556]
+REST = (0.5, 0.8, 0.9, 0.95)
+REST_TIMES = [1.35457092295719, 4.06371276887158, 8.57894917872889, 17.6094219984435]
+
+
+def bouncing(rule: str = "velocity", vx: float = 0) -> tuple[Member, ...]:
+    """Drops for the restitutions of `REST`, until they are practically at rest."""
+    return tuple(
+        dropped(1.04, until_rest(xi), (vx, 0), {"wall_restitution": xi, "wall_rule": rule}, 40.0)
+        for xi in REST
+    )
+
+
+def contact_times(contact_time: float) -> Member:
+    """P1-14: a drop with the TC model."""
+    contact = {"wall_restitution": 0.5, "contact_time": contact_time}
+    return dropped(1.04, 200, contact=contact)
+
+
+ONE = [
+    Case(
+        "P1-01", "time to the wall, both directions",
+        (straight((0.5, 0), events=1), straight((-0.5, 0), events=1)),
+        lambda *runs: [run.events.time[0] for run in runs],
+        [1.5, 0.3], within(1e-15), "EX eq. 1",
+    ),
+    Case(
+        "P1-02", "no velocity across: hits of those walls",
+        (straight((0.5, 0), events=10),),
+        lambda run: np.sum(run.events.j < -1), 0, EXACT, "EX eq. 1",
+    ),
+    Case(
+        "P1-03", "straight on and oblique: normal velocity reversed, angle kept",
+        (straight((0.5, 0), events=1), straight((0.5, 0.125), events=1)),
+        lambda *runs: [*final(runs[0]), *final(runs[1])],
+        [-0.5, 0, -0.5, 0.125], within(1e-15), "EX B.1",
+    ),
+    Case(
+        "P1-04", "closed path: order and times of the hits",
+        (square_path(ELASTIC, 4),),
+        lambda run: [*run.events.j, *run.events.time],
+        [-1, -3, 0, -2, 0.4, 0.65, 1.2, 1.45], within(1e-14), "EX B.1",
+    ),
+    Case(
+        "P1-04", "closed path: back after 2 (1 - 2r) / v",
+        (few(disk((0.5, 0.25), (1, 1), 0.1), time=1.6),),
+        lambda run: [*run.position[-1][0], *final(run), len(run.events.time)],
+        [0.5, 0.25, 1, 1, 4], within(1e-14), "EX B.1",
+    ),
+    Case(
+        "P1-04", "from the middle, into corners: back after 4 hits",
+        (few(disk((0.5, 0.5), (1, 1), 0.1), time=1.6),),
+        lambda run: [*run.position[-1][0], *final(run), len(run.events.time)],
+        [0.5, 0.5, 1, 1, 4], within(1e-14), "EX B.1",
+    ),
+    Case(
+        "P1-05", "walls without rebound: velocity and events",
+        (few(disk((0.5, 0.25), (1, 1), 0.1), contact={"wall_restitution": 0}, time=2),),
+        lambda run: [*final(run), len(run.events.time), run.time[-1]],
+        [0, 0, 1, 2], EXACT, "EX B.1",
+    ),
+    Case(
+        "P1-06", "walls with 0.9, whole velocity: times of 6 hits",
+        (square_path(VELOCITY),), lambda run: run.events.time, PATH_TIMES, within(1e-13), "D",
+    ),
+    Case(
+        "P1-06", "the same: speeds .9^k",
+        (square_path(VELOCITY),), lambda run: np.abs(run.velocity[:]).ravel(),
+        np.repeat(0.9 ** np.arange(7), 2), within(1e-13), "D",
+    ),
+    Case(
+        "P1-06", "the same: the path is that of elastic walls",
+        (square_path(VELOCITY), square_path(ELASTIC)),
+        lambda run, other: (run.position[:-1] - other.position[:-1]).ravel(),
+        0, within(1e-13), "D",
+    ),
+    Case(
+        "P1-07", "walls with 0.9, normal velocity: 4 hits, velocity",
+        (square_path(NORMAL, 4),), lambda run: [*run.events.time, *final(run)],
+        [0.4, 0.65, 1.288888888888889, 1.538888888888889, 0.81, 0.81], within(1e-13), "D",
+    ),
+    Case(
+        "P1-08", "bounces from a height of 1: first period",
+        (dropped(1.04, 10001),), lambda run: run.events.time[1] - run.events.time[0],
+        0.903047281971462, relative(1e-12), "D",
+    ),
+    Case(
+        "P1-08", "the same: time of the bounce 10 000, apex of all",
+        (dropped(1.04, 10001),), lambda run: [mean_interval(run), *apexes(run)],
+        [0.903047281971462, *[1.04] * 10001], relative(1e-9), "D",
+    ),
+    Case(
+        "P1-09", "bounces from y = 5: period, speed",
+        (dropped(5.0, 2),), lambda run: [mean_interval(run), run.velocity[1][0, 1]],
+        [2.01118178980449, 9.86484667899101], relative(1e-12), "D",
+    ),
+    Case(
+        "P1-10", "thrown up with 20: time to ceiling and back, speed at the ceiling",
+        (dropped(SMALL, 2, (0, 20)),),
+        lambda run: [run.events.time[1], -run.velocity[1][0, 1]],
+        [2.16877950901169, 9.36213650829766], relative(1e-12), "D",
+    ),
+    Case(
+        "P1-11", "restitution .5: times of the first 5 impacts",
+        (bouncing()[0],), lambda run: run.events.time[:5],
+        [
+            0.451523640985731, 0.903047281971462, 1.12880910246433, 1.24169001271076,
+            1.29813046783398,
+        ],
+        relative(1e-13), "D",
+    ),
+    *[
+        Case(
+            "P1-12", f"restitution {xi}: all impacts until flights of 1e-12",
+            (member,), lambda run: run.events.time, impacts(xi, until_rest(xi)),
+            relative(1e-12), "D",
+        )
+        for xi, member in zip(REST, bouncing(), strict=True)
+    ],
+    Case(
+        "P1-12", "restitution .5, .8, .9, .95: comes to rest at t0 (1 + xi) / (1 - xi)",
+        bouncing(), lambda *runs: [run.events.time[-1] for run in runs],
+        REST_TIMES, relative(1e-11), "D",
+    ),
+    Case(
+        "P1-12", "the same: never later than that",
+        bouncing(),
+        lambda *runs: [run.events.time[-1] for run in runs], REST_TIMES, AT_MOST, "D",
+    ),
+    Case(
+        "P1-13", "distance until rest, normal velocity reduced",
+        bouncing("normal", 1), lambda *runs: [run.position[-1][0, 0] - 1 for run in runs],
+        REST_TIMES, relative(1e-9), "D",
+    ),
+    Case(
+        "P1-13", "distance until rest, whole velocity reduced",
+        bouncing("velocity", 1)[:3], lambda *runs: [run.position[-1][0, 0] - 1 for run in runs],
+        [0.752539401642885, 2.05694103115722, 4.30135679044302], relative(1e-9), "D",
+    ),
+    Case(
+        "P1-14", "TC model, t_c = 1e-3 and 1e-6: impacts that take energy",
+        (contact_times(1e-3), contact_times(1e-6)),
+        lambda *runs: [dissipating(run) for run in runs], [10, 20], EXACT, "D",
+    ),
+    Case(
+        "P1-14", "the same: length of the flights for ever after",
+        (contact_times(1e-3), contact_times(1e-6)),
+        lambda *runs: [last_flight(run) for run in runs],
+        [8.81882111300256e-4, 8.61212999316656e-7], relative(1e-9), "D",
+    ),
+    Case(
+        "P1-14", "the same, t_c = 1e-3: their height",
+        (contact_times(1e-3),), lambda run: run.velocity[-1][0, 1] ** 2 / (2 * 9.81),
+        9.5367431640625e-7, relative(1e-9), "D",
+    ),
+]  # fmt: skip
+
+# --- two disks ---
+
+HALF = {"restitution": 0.7}
+
+
+def pair(first: dict, second: dict, restitution: float = 1.0, **stop) -> Member:
+    """Two disks until their first collision."""
+    return few(first, second, contact={"restitution": restitution}, **(stop or {"collisions": 1}))
+
+
+def at_impact_parameter(b: float, restitution: float = 1.0) -> Member:
+    """Equal disks of radius .125 towards each other, `b` over their contact distance."""
+    offset = 0.25 * b / 2
+    return pair(
+        disk((0.25, 0.5 - offset), (1, 0), 0.125), disk((0.75, 0.5 + offset), (-1, 0), 0.125),
+        restitution,
+    )  # fmt: skip
+
+
+def random_pairs(count: int = 40) -> tuple[Member, ...]:
+    """P2-08: masses, radii, velocities, restitution at random; all of them meet."""
+    rng = np.random.default_rng(208)
+    members = []
+    for _ in range(count):
+        radii, angle = rng.uniform(0.02, 0.1, 2), rng.uniform(0, 2 * pi)
+        away = np.array([np.cos(angle), np.sin(angle)])
+        centres = np.array([0.5 - 0.2 * away, 0.5 + 0.2 * away])
+        velocities = np.array([away, -away]) * rng.uniform(0.5, 2, (2, 1))
+        velocities += rng.uniform(-0.05, 0.05, (2, 2))
+        disks = (
+            disk(tuple(x), tuple(v), r, m)
+            for x, v, r, m in zip(centres, velocities, radii, rng.uniform(0.1, 10, 2), strict=True)
+        )
+        members.append(pair(*disks, restitution=rng.uniform(0, 1)))
+    return tuple(members)
+
+
+def balance(run: Run) -> list[float]:
+    """Change of momentum, and of energy beyond mu (1 - xi^2) g_n^2 / 2; relative."""
+    before, after = run.velocity[0], run.velocity[-1]
+    mass, xi = run.mass[:, None], run.restitution
+    momentum = np.sum(mass * (after - before), axis=0)
+    apart = np.subtract(*run.position[-1])
+    normal = np.dot(np.subtract(*before), apart) / np.linalg.norm(apart)
+    lost = np.prod(run.mass) / np.sum(run.mass) * (1 - xi**2) * normal**2 / 2
+    energies = np.sum(mass * before**2) / 2, np.sum(mass * after**2) / 2
+    scale = np.sum(mass * np.abs(before))
+    return [*momentum / scale, (energies[1] + lost) / energies[0] - 1]
+
+
+ASYMMETRIC = (
+    disk((0.3, 0.4), (1, 0), 0.05, 1), disk((0.7, 0.45), (-0.5, 0.2), 0.07, 3),
+)  # fmt: skip
+MONKEY = few(
+    disk((1, 8), (6, 8), SMALL), disk((4, 12), (0, 0), SMALL), box=G, collisions=1
+)  # fmt: skip
+LAB = few(
+    disk((0, 0), (1, 0), 0.1), disk((0.5, 0), (-1, 0), 0.1),
+    box={"lower": (-1, -1), "upper": (1, 1)}, events=3,
+)  # fmt: skip
+NO_MEETING = (
+    pair(disk((0.25, 0.25), (1, 0), 0.125), disk((0.75, 0.5), (0, 0), 0.125), time=0.5),
+    pair(disk((0.375, 0.5), (-1, 0), 0.125), disk((0.625, 0.5), (1, 0), 0.125), time=0.125),
+    pair(disk((0.25, 0.5), (0.5, 0), 0.125), disk((0.5, 0.5), (0.5, 0), 0.125), time=0.5),
+)
+
+TWO = [
+    Case(
+        "P2-01", "head-on, elastic: velocities exchanged",
+        (at_impact_parameter(0),), final, [-1, 0, 1, 0], within(1e-15), "EX B.2",
+    ),
+    Case(
+        "P2-02", "b = sigma / sqrt 2: at right angles, speed kept",
+        (at_impact_parameter(sqrt(0.5)),), final, [0, -1, 0, 1], within(1e-14), "EX B.2",
+    ),
+    Case(
+        "P2-03", "head-on, no rebound: both at rest",
+        (at_impact_parameter(0, 0),), final, 0, within(1e-15), "EX B.2",
+    ),
+    Case(
+        "P2-04", "unequal disks, .7: time, velocities, energy lost",
+        (pair(*ASYMMETRIC, restitution=0.7),),
+        lambda run: [
+            run.events.time[0], *final(run), run.observable("dissipated_energy").value[-1]
+        ],
+        [
+            0.216327631153395, 0.367472195926245, -0.781276238886498, -0.289157398642082,
+            0.460425412962166, 0.11888046875,
+        ],
+        within(1e-13), "EX eq. 7, 11; D",
+    ),
+    Case(
+        "P2-05", "the same, elastic: velocities",
+        (pair(*ASYMMETRIC),), final,
+        [0.255849642266170, -0.919148516337057, -0.251949880755390, 0.506382838779019],
+        within(1e-13), "D",
+    ),
+    Case(
+        "P2-05", "the same: energy",
+        (pair(*ASYMMETRIC),), lambda run: np.sum(run.kinetic_energy(-1)), 0.935,
+        within(1e-15), "D",
+    ),
+    Case(
+        "P2-06", "grazing, receding, at relative rest: collisions",
+        NO_MEETING, lambda *runs: [np.sum(run.events.j > 0) for run in runs],
+        [0, 0, 0], EXACT, "EX eq. 7",
+    ),
+    Case(
+        "P2-07", "both falling: time, places, velocities",
+        (MONKEY,),
+        lambda run: [run.events.time[0], *run.position[-1].ravel(), *final(run)],
+        [0.492, 3.952, 10.74867608, 4, 10.81267608, 0, -4.82652, 6, 3.17348],
+        within(1e-12), "D",
+    ),
+    Case(
+        "P2-08", "40 random pairs: momentum, energy lost, over their scale",
+        random_pairs(), lambda *runs: np.ravel([balance(run) for run in runs]),
+        0, within(1e-15), "D",
+    ),
+    Case(
+        "P2-09", "two disks in a box: first three events",
+        (LAB,),
+        lambda run: [
+            *run.events.time, *run.position[1][:, 0], *run.velocity[1][:, 0],
+            run.position[2][1, 0], run.position[3][0, 0],
+        ],
+        [0.15, 0.7, 1.2, 0.15, 0.35, -1, 1, 0.9, -0.9], within(1e-14), "LAB; D",
+    ),
+]  # fmt: skip
+
+# --- scattering ---
+
+B = np.arange(11) / 10
+ANGLES = [
+    180, 168.52164764374, 156.92605947908, 145.08476095851, 132.84360103361, 119.99995038037,
+    106.26014970435, 91.145934714068, 73.739740287755, 51.683820571990, 0,
+]  # fmt: skip
+SLOWING = [
+    -1.999998e-6, -1.979998e-6, -1.919998e-6, -1.819998e-6, -1.679998e-6, -1.499998e-6,
+    -1.279998e-6, -1.019999e-6, -7.19999e-7, -3.79999e-7, 0,
+]  # fmt: skip
+
+
+def scattered(b: float) -> Member:
+    """P3: the heavy disk at y = 0, so that `b` is not rounded."""
+    heavy, light = disk((0.5, 0), (0, 0), 0.1, 1e6), disk((0.2, b), (1, 0), 0.001)
+    return few(heavy, light, box={"lower": (0, -0.5), "upper": (1, 0.5)}, collisions=1, time=0.7)
+
+
+SCATTERED = tuple(scattered(0.101 * b) for b in B)
+
+
+def deflection(run: Run) -> float:
+    """Angle of the light disk at the end [deg]."""
+    return float(np.degrees(np.arctan2(abs(run.velocity[-1][1, 1]), run.velocity[-1][1, 0])))
+
+
+SCATTERING = [
+    Case(
+        "P3-01", "angle against impact parameter, finite mass [deg]",
+        SCATTERED, lambda *runs: [deflection(run) for run in runs],
+        ANGLES, within(1e-9), "EX 1; D",
+    ),
+    Case(
+        "P3-01", "the same against the formula, all digits [deg]",
+        SCATTERED, lambda *runs: [deflection(run) for run in runs],
+        np.degrees(scattering_angle(B, 1e6)), within(1e-11), "D",
+    ),
+    Case(
+        "P3-01", "speed after over speed before, less 1",
+        SCATTERED, lambda *runs: [run.speed(-1)[1] - 1 for run in runs],
+        SLOWING, within(1e-12), "D",
+    ),
+    Case(
+        "P3-01", "deviation from the infinite mass, b = .5 [deg]",
+        (SCATTERED[5],), lambda run: deflection(run) - np.degrees(2 * acos(0.5)),
+        -4.961963e-5, within(1e-9), "D",
+    ),
+]  # fmt: skip
+
+# --- rods ---
+
+ROD_X = (0.0523, 0.1517, 0.2231, 0.3529, 0.4119, 0.5037, 0.6311, 0.7079, 0.8237, 0.9311)
+ROD_V = (0.9013, -0.3527, 0.6091, -1.1083, 0.2539, 0.8117, -0.7019, 0.4507, -0.2063, -0.5531)
+RODS = Member(
+    namelist(
+        species={
+            "count": 10, "radius": 0.02,
+            "position": [c for x in ROD_X for c in (x, 0.5)],
+            "velocity": [c for v in ROD_V for c in (v, 0.0)],
+        },
+        stop={"time": 97}, output={"frames_every_time": 0.97, "observables_every_time": 0.97},
+    )
+)  # fmt: skip
+ROD_PLACES = {
+    1: [.034593, .188951, .350419, .423589, .473439, .529743, .597849, .654921, .818183, .866073],
+    10: [.03397, .08031, .13137, .38281, .44239, .49051, .55473, .61741, .71491, .81733],
+    100: [.1616, .2414, .3742, .4396, .5074, .5598, .6658, .7922, .8532, .9002],
+}  # fmt: skip
+ROD_COUNTS = {1: [54, 8], 10: [566, 95], 100: [5606, 959]}
+
+
+def rod_counts(run: Run, frame: int) -> list[int]:
+    """Pair and wall collisions so far."""
+    walls = run.observable("wall_collisions").value[frame]
+    return [run.observable("collisions").value[frame], walls.sum()]
+
+
+TONKS = [
+    case
+    for number, (frame, tolerance) in enumerate(((1, 1e-12), (10, 1e-11), (100, 1e-9)), start=1)
+    for case in (
+        Case(
+            f"P4-0{number}", f"ten disks on a line, t = {0.97 * frame:g}: places",
+            (RODS,), lambda run, k=frame: run.position[k][:, 0],
+            ROD_PLACES[frame], within(tolerance), "Tonks gas; D",
+        ),
+        Case(
+            f"P4-0{number}", "the same: pair and wall collisions",
+            (RODS,), lambda run, k=frame: rod_counts(run, k), ROD_COUNTS[frame], EXACT, "D, R",
+        ),
+    )
+]  # fmt: skip
+TONKS.append(
+    Case(
+        "P4-03", "the same: the set of speeds never changes",
+        (RODS,), lambda run: np.sort(np.abs(run.velocity[-1][:, 0])),
+        np.sort(np.abs(ROD_V)), within(1e-12), "D",
+    )
+)  # fmt: skip
+
+CASES = ONE + TWO + SCATTERING + TONKS

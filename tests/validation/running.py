@@ -1,0 +1,74 @@
+"""Runs the members of the cases side by side and measures each case when its members are there."""
+
+import hashlib
+import re
+import subprocess
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+from read_run import Run, RunError, read_run
+
+from .case import Case, Member, Verdict, failed, judge
+
+MOST_SECONDS = 1200
+
+
+class Workshop:
+    """Runs each member once, several at a time, in a folder of its own."""
+
+    def __init__(self, program: Path, folder: Path, jobs: int, seed_shift: int = 0):
+        """`seed_shift` is added to all seeds: other runs of the same cases."""
+        self.program, self.folder, self.seed_shift = program, folder, seed_shift
+        self.pool = ThreadPoolExecutor(jobs)
+        self.futures: dict[Member, Future] = {}
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def order(self, member: Member) -> Future:
+        """The future result of a member. What it needs is ordered first: nobody waits in vain."""
+        for earlier in member.after:
+            self.order(earlier)
+        if member not in self.futures:
+            self.futures[member] = self.pool.submit(self.make, member)
+        return self.futures[member]
+
+    def make(self, member: Member) -> Run | None:
+        """Run a member. Raises RunError if it does not end as it should."""
+        text = member.text
+        if callable(text):
+            text = text(*(self.futures[earlier].result() for earlier in member.after))
+        name = hashlib.sha256(text.encode()).hexdigest()[:12]
+        path = self.folder / f"{name}.nml"
+        path.write_text(text)
+        output = path.with_suffix(".h5")
+        command = [self.program, path, "-o", output, "--force", "--quiet"]
+        seed = re.search(r"\bseed = (\d+)", text)
+        if self.seed_shift and seed:
+            command += ["--set", f"run.seed={int(seed[1]) + self.seed_shift}"]
+        ended = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=MOST_SECONDS
+        )
+        if ended.returncode != member.exit_code:
+            reason = ended.stderr.strip().splitlines() or ["no reason given"]
+            raise RunError(f"{path.name} ended with {ended.returncode}: {reason[-1]}")
+        part = output.with_name(f"{output.name}.part")
+        found = output if ended.returncode == 0 else part
+        return read_run(found) if found.exists() else None
+
+
+def validate(
+    cases: list[Case], program: Path, folder: Path, jobs: int, seed_shift: int = 0
+) -> Iterator[Verdict]:
+    """Verdicts in the order of the cases, as soon as they are known."""
+    workshop = Workshop(program, folder, jobs, seed_shift)
+    try:
+        ordered = [[workshop.order(member) for member in case.members] for case in cases]
+        for case, futures in zip(cases, ordered, strict=True):
+            try:
+                runs = [future.result() for future in futures]
+            except (RunError, subprocess.TimeoutExpired) as problem:
+                yield failed(case, str(problem))
+            else:
+                yield judge(case, runs)
+    finally:
+        workshop.pool.shutdown(cancel_futures=True)

@@ -1,0 +1,361 @@
+"""Sections 5 and 6: how speeds are distributed, and how a gas and a mixture come to equilibrium."""
+
+from math import gamma, pi, sqrt
+
+import numpy as np
+from scipy import stats
+
+from read_run import Run
+from theory import Estimate, estimate, excess_kurtosis, finite_n_cdf, hold_against, maxwell_cdf
+
+from .case import AT_MOST, Case, Member, Tolerance, relative, sigmas, within
+from .estimators import at_collisions, over_runs
+from .inputs import PERIODIC, gas, namelist
+
+LEAST = 1.63  #: times 1/sqrt(n): a larger distance has a probability below 1 %
+
+
+def after(run: Run, tau: float) -> slice:
+    """Frames from so many collisions per disk on."""
+    return slice(int(np.searchsorted(run.collisions_per_disk_at(run.time), tau)), None)
+
+
+def reduced(run: Run, tau: float = 15) -> np.ndarray:
+    """Speeds in equilibrium, frame after frame, over sqrt(2 K / N)."""
+    v = run.speed(after(run, tau))
+    return (v / sqrt(np.mean(v**2))).ravel()
+
+
+def distance(sample: np.ndarray, cdf) -> float:
+    """Kolmogorov-Smirnov distance times sqrt(n)."""
+    return hold_against(sample, cdf).ks * sqrt(len(sample))
+
+
+def uniform(u: np.ndarray) -> np.ndarray:
+    return np.clip(u, 0, 1)
+
+
+# --- one kind of disk ---
+
+
+def sampled(count: int, radius: float, interval: float, frames: int, **more) -> Member:
+    """Frames at equal intervals of time."""
+    time = interval * frames
+    output = {"frames_every_time": interval, "observables_every_time": time / 400}
+    return Member(gas(count, radius=radius, stop={"time": time}, output=output, **more))
+
+
+LARGE = sampled(1000, 0.004, 0.17, 200)  # 5 collisions per disk apart
+FINITE = {  # N: <v>/v_rms; frames 5 collisions per disk apart
+    10: (0.897370, sampled(10, 0.02, 3.2, 20000)),
+    60: (0.888075, sampled(60, 0.01, 1.05, 10000)),
+    100: (0.887335, sampled(100, 0.01, 0.62, 6000)),
+}
+LAB = Member(
+    namelist(
+        species={"grid": (10, 10), "radius": 0.01, "speed": 1.0},
+        stop={"events": 55000}, output={"frames_every_events": 100},
+    )
+)  # fmt: skip
+
+
+def moments(run: Run) -> Estimate:
+    """<v>, median, <v^3>, <v^4>, variance at v_rms = 1, with errors from groups of frames."""
+    u = reduced(run).reshape(-1, run.count)
+    groups = np.array_split(u, 20)
+    parts = [[np.mean(g), np.median(g), np.mean(g**3), np.mean(g**4), np.var(g)] for g in groups]
+    return estimate(parts)
+
+
+def mean_speed(run: Run) -> Estimate:
+    """<v> / v_rms, with the error from groups of frames."""
+    u = reduced(run).reshape(-1, run.count)
+    return estimate([g.mean() for g in np.array_split(u, 20)])
+
+
+def fourth(run: Run) -> Estimate:
+    """<v^4> / v_rms^4."""
+    u = reduced(run).reshape(-1, run.count)
+    return estimate([np.mean(g**4) for g in np.array_split(u, 20)])
+
+
+def component_distance(run: Run) -> float:
+    """Of m vx^2 / 2E from Beta(1/2, N - 1/2)."""
+    share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.count)
+    return distance(share, stats.beta(0.5, run.count - 0.5).cdf)
+
+
+def lab_speeds(run: Run) -> np.ndarray:
+    """P5-04: 50 000 speeds."""
+    return run.speed(slice(51, None)).ravel()
+
+
+LAWS = [
+    Case(
+        "P5-01", "speeds against the Maxwell law: KS distance sqrt(n)",
+        (LARGE,), lambda run: distance(reduced(run), maxwell_cdf), LEAST, AT_MOST, "EX, LAB",
+    ),
+    Case(
+        "P5-01", "the same: chi^2 in 30 bins, probability of less",
+        (LARGE,), lambda run: 1 - hold_against(reduced(run), maxwell_cdf).chi2_p,
+        0.99, AT_MOST, "EX, LAB",
+    ),
+    Case(
+        "P5-02", "<v>, median, <v^3>, <v^4>, variance at v_rms = 1",
+        (LARGE,), lambda run: moments(run).mean,
+        [0.886227, 0.832555, 1.329340, 2, 0.214602], relative(0.01), "D",
+    ),
+    *[
+        case
+        for count, (mean, member) in FINITE.items()
+        for case in (
+            Case(
+                "P5-03", f"N = {count}: <v> / v_rms", (member,), mean_speed, mean,
+                sigmas(3, 0.0015), "D",
+            ),
+            Case(
+                "P5-03", f"N = {count}: <v^4> / v_rms^4", (member,), fourth,
+                2 * count / (count + 1), sigmas(3, 0.01), "D",
+            ),
+            Case(
+                "P5-03", f"N = {count}: speeds against the exact law: KS distance sqrt(n)",
+                (member,), lambda run: distance(reduced(run), finite_n_cdf(run.count)),
+                LEAST, AT_MOST, "D",
+            ),
+            Case(
+                "P5-03", f"N = {count}: vx against the exact law: KS distance sqrt(n)",
+                (member,), component_distance, LEAST, AT_MOST, "D",
+            ),
+        )
+    ],
+    Case(
+        "P5-04", "10 x 10 disks, 50 000 speeds: <v> / v_rms",
+        (LAB,), lambda run: lab_speeds(run).mean(), 0.88734, within(0.003), "LAB; D",
+    ),
+    Case(
+        "P5-04", "the same: <v^4> / <v^2>^2",
+        (LAB,), lambda run: 2 + 2 * excess_kurtosis(lab_speeds(run)), 1.980, within(0.05), "D",
+    ),
+    Case(
+        "P5-04", "the same against the exact law: KS distance",
+        (LAB,), lambda run: hold_against(lab_speeds(run), finite_n_cdf(100)).ks,
+        0.015, AT_MOST, "D",
+    ),
+]  # fmt: skip
+
+# --- collisions in equilibrium ---
+
+
+def hits_on_record(periodic: bool) -> Member:
+    """Every event of a gas that has been in equilibrium from the start."""
+    member = {"periodic": True} if periodic else {}
+    output = {"frames_every_events": 1, "event_log": True, "observables_every_time": 0.1}
+    return Member(
+        gas(100, radius=0.005, temperature=1.0, stop={"events": 20000}, output=output, **member)
+    )
+
+
+def kt(run: Run) -> float:
+    free = run.count - 1 if np.all(run.periodic) else run.count
+    return float(np.sum(run.kinetic_energy(0))) / free
+
+
+def wall_speeds(run: Run) -> np.ndarray:
+    """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
+    log = run.events
+    hit = log.j <= 0
+    return log.impulse[hit] / (2 * sqrt(2 * kt(run)))
+
+
+def wall_energies(run: Run) -> Estimate:
+    """K of a disk that hits a side, over kT; exact for fixed energy."""
+    log = run.events
+    hit = np.flatnonzero(log.j <= 0)
+    disks = log.i[hit] - 1
+    energy = run.kinetic_energy(slice(1, None))[hit, disks] / kt(run)
+    return estimate([part.mean() for part in np.array_split(energy, 20)])
+
+
+def approach_speeds(run: Run) -> np.ndarray:
+    """g_n of pair collisions over sqrt(4 kT / m)."""
+    log = run.events
+    return log.impulse[log.j > 0] / sqrt(4 * kt(run))
+
+
+def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Direction of contact [turns of the mirror image] and |b| / s of the pair collisions."""
+    log = run.events
+    at = np.flatnonzero(log.j > 0)
+    i, j = log.i[at] - 1, log.j[at] - 1
+    x, v = run.position[1:], run.velocity[1:]
+    apart = x[at, i] - x[at, j]
+    apart -= np.where(run.periodic, run.edges, 0) * np.round(apart / run.edges)
+    speed = v[at, i] - v[at, j]
+    across = apart[:, 0] * speed[:, 1] - apart[:, 1] * speed[:, 0]
+    b = np.abs(across) / np.linalg.norm(speed, axis=1) / np.linalg.norm(apart, axis=1)
+    return np.arctan2(apart[:, 1], apart[:, 0]) / pi % 1, b
+
+
+WALLED, BULK = hits_on_record(False), hits_on_record(True)
+COLLISIONS = [
+    Case(
+        "P5-06", "speeds of hits on sides against the flux law: KS distance sqrt(n)",
+        (WALLED,), lambda run: distance(wall_speeds(run), maxwell_cdf), LEAST, AT_MOST, "D",
+    ),
+    Case(
+        "P5-06", "the same: mean over sqrt(pi kT / 2m)",
+        (WALLED,),
+        lambda run: estimate(
+            [g.mean() * 2 / sqrt(pi) for g in np.array_split(wall_speeds(run), 20)]
+        ),
+        gamma(100.5) / gamma(100) / sqrt(100), sigmas(3, 0.03), "D, for N = 100",
+    ),
+    Case(
+        "P5-06", "energy of a disk that hits a side, over kT",
+        (WALLED,), wall_energies, 1.5 * 200 / 201, sigmas(3, 0.03), "D, for N = 100",
+    ),
+    Case(
+        "P5-07", "approach speeds of pairs against their law: KS distance sqrt(n)",
+        (BULK,), lambda run: distance(approach_speeds(run), maxwell_cdf), LEAST, AT_MOST, "D",
+    ),
+    Case(
+        "P5-07", "the same: <g_n> over sqrt(pi kT / m), <g_n^2> over 4 kT / m",
+        (BULK,),
+        lambda run: [
+            approach_speeds(run).mean() * 2 / sqrt(pi), np.mean(approach_speeds(run) ** 2),
+        ],
+        1, within(0.03), "D",
+    ),
+    Case(
+        "P5-07", "impact parameters are uniform: KS distance sqrt(n)",
+        (BULK,), lambda run: distance(contacts(run)[1], uniform), LEAST, AT_MOST, "D",
+    ),
+    Case(
+        "P5-07", "directions of contact are uniform: KS distance sqrt(n)",
+        (BULK,), lambda run: distance(contacts(run)[0], uniform), LEAST, AT_MOST, "D",
+    ),
+    Case(
+        "P5-08", "momentum between walls: <Px^2>, <Py^2> over sum m kT",
+        (FINITE[60][1],),
+        lambda run: np.mean(run.observable("momentum").value ** 2, axis=0) / run.count,
+        1, Tolerance("factor 2", lambda ref, _: np.full_like(ref, 0.5)), "D",
+    ),
+]  # fmt: skip
+
+# --- relaxation ---
+
+TAU = (0, 1, 2, 3, 4, 5, 6, 8)
+EQUAL_SPEEDS = tuple(
+    Member(
+        gas(
+            2000, seed=seed, packing_fraction=0.01, periodic=True,
+            stop={"collisions_per_disk": 8.001}, output={"frames_every_collisions": 1000},
+        )
+    )
+    for seed in range(1, 17)
+)  # fmt: skip
+
+
+def kurtosis(*runs: Run) -> list[float]:
+    """a2 at `TAU`, over the disks of all runs."""
+    return [excess_kurtosis(np.concatenate([run.speed(tau) for run in runs])) for tau in TAU]
+
+
+A2_TOLERANCE = 0.01 + 4.5 / sqrt(16 * 2000)
+
+
+def light_heavy(radius: float, stop: dict, output: dict, seed: int, **more) -> Member:
+    """Half m, half 4 m, all with speed 1."""
+    disks = {"count": 500, "radius": radius, "speed": 1.0}
+    return Member(
+        namelist(
+            run={"seed": seed},
+            species=[{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}],
+            stop=stop, output=output, **more,
+        )
+    )  # fmt: skip
+
+
+MIXED = tuple(
+    light_heavy(
+        0.004, {"collisions_per_disk": 4000},
+        {"observables_every_collisions": 2500, "frames_every_collisions": 250_000}, seed,
+    )
+    for seed in (1, 2, 3, 4)
+)  # fmt: skip
+MIXING = tuple(
+    light_heavy(
+        0.001, {"collisions_per_disk": 8}, {"observables_every_collisions": 50}, seed, box=PERIODIC
+    )
+    for seed in range(1, 33)
+)  # fmt: skip
+
+
+def settled(run: Run, name: str) -> np.ndarray:
+    """An observable after 20 collisions per disk."""
+    series = run.observable(name)
+    return series.value[run.collisions_per_disk.value > 20]
+
+
+def energies(run: Run) -> list[float]:
+    """Mean kinetic energies and speeds, light then heavy."""
+    names = ("light/kinetic_energy", "heavy/kinetic_energy", "light/mean_speed", "heavy/mean_speed")
+    return [settled(run, name).mean() for name in names]
+
+
+def ratios(*runs: Run) -> np.ndarray:
+    """Mean K_heavy over mean K_light at `TAU`."""
+    heavy, light = (
+        np.mean([at_collisions(r, f"{name}/kinetic_energy", TAU) for r in runs], axis=0)
+        for name in ("heavy", "light")
+    )
+    return heavy / light
+
+
+def fluctuations(run: Run) -> list[float]:
+    """Relative scatter of K_light and of K_heavy / K_light from snapshot to snapshot."""
+    light, heavy = settled(run, "light/kinetic_energy"), settled(run, "heavy/kinetic_energy")
+    part = heavy / light
+    return [light.std() / light.mean(), part.std() / part.mean()]
+
+
+MIXTURE = [
+    Case(
+        "P5-05", "from equal speeds: a2 at 0, 1, 2, 3, 4, 5, 6, 8 collisions per disk",
+        EQUAL_SPEEDS, kurtosis, [-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025],
+        within(A2_TOLERANCE), "DSMC",
+    ),
+    Case(
+        "P6-01", "mixture at t = 0: <K> of light, heavy, all",
+        (MIXED[0],),
+        lambda run: [
+            run.observable(f"{name}/kinetic_energy").value[0] for name in ("light", "heavy", "all")
+        ],
+        [0.5, 2, 1.25], relative(1e-15), "D",
+    ),
+    Case(
+        "P6-02", "in equilibrium: <K> and <v> of light and heavy",
+        MIXED, lambda *runs: over_runs(energies, runs),
+        [1.25, 1.25, 1.401248, 0.700624], relative(0.005), "D; a student's report",
+    ),
+    Case(
+        "P6-03", "K_heavy / K_light at 0, 1, 2, 3, 4, 5, 6, 8 collisions per disk",
+        MIXING, ratios, [4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005],
+        within(0.02 + 0.063 / sqrt(32)), "DSMC",
+    ),
+    Case(
+        "P6-04", "scatter of K_light and of the ratio between snapshots",
+        MIXED, lambda *runs: over_runs(fluctuations, runs), [sqrt(1 / 1001), 2 * sqrt(1 / 1001)],
+        Tolerance("factor 1.3", lambda ref, _: (1 - 1 / 1.3) * ref), "D",
+    ),
+    Case(
+        "P6-05", "total energy over 2e6 collisions, relative change",
+        MIXED,
+        lambda *runs: max(
+            np.max(np.abs(run.observable("total_energy").value / 1250 - 1)) for run in runs
+        ),
+        1e-12, AT_MOST, "EX B.3",
+    ),
+]  # fmt: skip
+
+CASES = LAWS + COLLISIONS + MIXTURE

@@ -1,0 +1,236 @@
+"""Section 13: conservation laws, symmetries, reversal; all of them for every trajectory."""
+
+from math import sqrt
+
+import numpy as np
+
+from read_run import Run
+
+from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, within
+from .estimators import closest_gap, differences
+from .inputs import PERIODIC, ROOT_2, gas, namelist
+
+# --- conservation ---
+
+
+def momentum_drift(run: Run) -> float:
+    """Largest change of a component of momentum, over sum m |v| at the start."""
+    momentum = run.observable("momentum").value
+    scale = np.sum(run.mass * run.speed(0))
+    return float(np.max(np.abs(momentum - momentum[0])) / scale)
+
+
+DRIFTS = tuple(
+    Member(
+        gas(
+            1000, packing_fraction=0.1, periodic=True, contact={"restitution": xi},
+            stop={"collisions": 1_000_000}, output={"observables_every_collisions": 1000},
+        )
+    )
+    for xi in (1.0, 0.99)
+)  # fmt: skip
+ROUND = Member(
+    namelist(
+        box={"lower": (-1, -1), "upper": (1, 1)},
+        obstacle={"centre": (0, 0), "radius": 1.0, "side": "inside"},
+        species=[
+            {"count": 60, "radius": 0.03, "speed": 1.0},
+            {"count": 6, "radius": 0.06, "mass": 10.0, "speed": 1.0},
+        ],
+        contact={"wall_rule": "normal"}, stop={"events": 500_000},
+        output={"frames_every_events": 5000, "observables_every_events": 5000},
+    )
+)  # fmt: skip
+
+
+def spin_drift(run: Run) -> float:
+    """Largest change of the angular momentum about the centre, over sum m |x| |v|."""
+    x, v = run.position[:], run.velocity[:]
+    spin = np.sum(run.mass * (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]), axis=1)
+    scale = np.sum(run.mass * np.linalg.norm(x[0], axis=1) * np.linalg.norm(v[0], axis=1))
+    return float(np.max(np.abs(spin - spin[0])) / scale)
+
+
+def energy_drift(run: Run) -> float:
+    """Largest relative change of the energy."""
+    energy = run.observable("total_energy").value
+    return float(np.max(np.abs(energy / energy[0] - 1)))
+
+
+# --- symmetries: the same disks, listed in the input file ---
+
+
+def start(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places on a shaken square grid and velocities with kT = 1, at rest as a whole."""
+    rng = np.random.default_rng(13)
+    columns = int(sqrt(count))
+    x, y = np.meshgrid(*2 * [(np.arange(columns) + 0.5) / columns])
+    shake = 0.5 / columns - radius
+    places = np.stack([x.ravel(), y.ravel()], axis=1) + rng.uniform(-shake, shake, (count, 2))
+    velocities = rng.normal(0, 1, (count, 2))
+    return places, velocities - velocities.mean(axis=0)
+
+
+def explicit(
+    places: np.ndarray, velocities: np.ndarray, radius: float, time: float, periodic: bool, **output
+) -> str:
+    return namelist(
+        box=PERIODIC if periodic else {},
+        species={
+            "count": len(places), "radius": radius, "position": places.ravel(),
+            "velocity": velocities.ravel(),
+        },
+        stop={"time": time}, output={"event_log": True, **output},
+    )  # fmt: skip
+
+
+PLACES, VELOCITIES = start(100, 0.025)
+SHORT = 0.085  #: about 2 collisions per disk at packing 0.2
+BOOST = np.array([0.75, -0.5])
+ORDER = np.random.default_rng(5).permutation(100)
+PLAIN, BOOSTED = (
+    Member(explicit(PLACES, VELOCITIES + u, 0.025, SHORT, periodic=True)) for u in (0, BOOST)
+)
+LISTED, RELABELLED = (
+    Member(explicit(PLACES[k], VELOCITIES[k], 0.025, SHORT, periodic=False))
+    for k in (np.arange(100), ORDER)
+)
+
+
+def boost_error(run: Run, boosted: Run) -> float:
+    """Largest difference of places (shifted back) and collision times."""
+    if len(run.events.time) < 90:
+        raise ValueError("too few collisions")
+    apart = boosted.unwrapped(-1) - BOOST * SHORT - run.unwrapped(-1)
+    times = boosted.events.time - run.events.time
+    return float(max(np.max(np.abs(apart)), np.max(np.abs(times))))
+
+
+def label_error(run: Run, relabelled: Run) -> float:
+    """Largest difference of places and event times."""
+    apart = relabelled.position[-1] - run.position[-1][ORDER]
+    times = relabelled.events.time - run.events.time
+    return float(max(np.max(np.abs(apart)), np.max(np.abs(times))))
+
+
+def observed(**output) -> Member:
+    """The same gas looked at more or less often."""
+    return Member(
+        gas(500, radius=0.01, stop={"collisions_per_disk": 20}, output={"event_log": True} | output)
+    )
+
+
+def scaled(speed: float) -> Member:
+    """The same gas at another speed."""
+    return Member(
+        gas(500, radius=0.01, speed=speed, stop={"events": 20000}, output={"event_log": True})
+    )
+
+
+# --- reversal ---
+
+REVERSALS = {  # N, radius: collisions per disk and log10 of the rms error
+    (100, 0.01): {1: -13.6, 2: -11.2, 4: -6.3, 6: -2.2},
+    (100, 0.025): {4: -13.4, 8: -10.6, 12: -7.4, 16: -4.5, 20: -1.7},
+    (64, 0.04): {10: -11.9, 20: -6.9, 30: -2.3},
+}
+SAMPLES = 30
+
+
+def timed(count: int, radius: float, tau: int, seed: int) -> Member:
+    """A run that is a tenth too long."""
+    return Member(
+        gas(
+            count, seed=seed, radius=radius, temperature=1.0,
+            stop={"collisions": round(tau / 0.9 * count / 2)},
+        )
+    )  # fmt: skip
+
+
+def onward(run: Run) -> str:
+    """The same run, but stopped between events, at nine tenths of its time."""
+    return explicit(
+        run.position[0], run.velocity[0], float(run.radius[0]), 0.9 * run.time[-1], periodic=False
+    )
+
+
+def backward(run: Run) -> str:
+    """The run with all velocities reversed at its end, for the same time."""
+    return explicit(
+        run.position[-1], -run.velocity[-1], float(run.radius[0]), run.time[-1], periodic=False
+    )
+
+
+def there_and_back(count: int, radius: float, tau: int, seed: int) -> tuple[Member, Member]:
+    """A run of about `tau` collisions per disk and its reversal."""
+    there = Member(onward, (timed(count, radius, tau, seed),))
+    return there, Member(backward, (there,))
+
+
+def return_errors(*runs: Run) -> np.ndarray:
+    """Log10 of the rms distance from the start, mean over `SAMPLES` pairs of runs."""
+    errors = [
+        np.log10(np.sqrt(np.mean(np.sum((back.position[-1] - there.position[0]) ** 2, axis=1))))
+        for there, back in zip(runs[::2], runs[1::2], strict=True)
+    ]
+    return np.mean(np.reshape(errors, (-1, SAMPLES)), axis=1)
+
+
+CASES = [
+    Case(
+        "P13-01", "periodic, xi = 1 and .99, 1e6 collisions: momentum over sum m |v|",
+        DRIFTS, lambda *runs: [momentum_drift(run) for run in runs], 1e-12, AT_MOST, "D",
+    ),
+    Case(
+        "P13-02", "round container, 5e5 events: energy, angular momentum, relative change",
+        (ROUND,), lambda run: [energy_drift(run), spin_drift(run)], 1e-11, AT_MOST, "D, R",
+    ),
+    Case(
+        "P13-03", "velocities x 4: differences in events, places, velocities, all bits",
+        (scaled(ROOT_2), scaled(4 * ROOT_2)), lambda *runs: differences(*runs, 4.0),
+        0, EXACT, "D",
+    ),
+    Case(
+        "P13-04", "periodic, seen from a moving frame: places and times",
+        (PLAIN, BOOSTED), boost_error, 1e-9, AT_MOST, "D",
+    ),
+    *[
+        Case(
+            "P13-05", f"forth and back, N = {count}, r = {radius}: log10 error at tau = "
+            + ", ".join(map(str, expected)),
+            tuple(
+                member
+                for tau in expected
+                for seed in range(1, SAMPLES + 1)
+                for member in there_and_back(count, radius, tau, seed)
+            ),
+            return_errors, list(expected.values()), within(1), "R",
+        )
+        for (count, radius), expected in REVERSALS.items()
+    ],
+    Case(
+        "P13-06", "the same disks in another order: places and times",
+        (LISTED, RELABELLED), label_error, 1e-9, AT_MOST, "D",
+    ),
+    Case(
+        "P13-07", "frames and observables often or never: differences, all bits",
+        (observed(), observed(frames_every_time=0.001, observables_every_events=7)),
+        differences, 0, EXACT, "D",
+    ),
+    Case(
+        "P13-08", "closest gap in the frames of four gases, in diameters",
+        (
+            Member(
+                gas(1000, packing_fraction=0.5, periodic=True, stop={"collisions_per_disk": 100},
+                    output={"frames_every_collisions": 1000})
+            ),
+            Member(
+                gas(1000, packing_fraction=0.5, contact={"restitution": 0.95},
+                    stop={"collisions_per_disk": 100}, output={"frames_every_collisions": 1000})
+            ),
+            ROUND,
+            observed(frames_every_time=0.001, observables_every_events=7),
+        ),
+        lambda *runs: min(closest_gap(run) for run in runs), -1e-12, AT_LEAST, "D",
+    ),
+]  # fmt: skip
