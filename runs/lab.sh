@@ -16,7 +16,13 @@ runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 
   -o "$figures/lab_frames.png"
 "$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab_film"
 
-runs/ensemble.sh input/lab_masses.nml -d "$data/masses" --seeds 1 "$@"
-"$python" post/snapshot.py "$data/masses/seed_1.h5" --frames 0,10,600 --quiver \
+# Large heavy disks in the left half, small light ones in the right, all with speed 1.
+runs/ensemble.sh input/mixture.nml -d "$data/masses" --seeds 1 \
+  --set species.light.count=100 --set species.light.grid=10,10 \
+  --set species.light.radius=0.01 --set species.light.region=0.5,1,0,1 \
+  --set species.heavy.count=16 --set species.heavy.grid=4,4 --set species.heavy.mass=16 \
+  --set species.heavy.radius=4 --set species.heavy.region=0,0.5,0,1 \
+  --set output.frames_every_collisions=100 "$@"
+"$python" post/snapshot.py "$data/masses/seed_1.h5" --frames 0,5,-1 --quiver \
   -o "$figures/lab_masses.png"
 "$python" post/mixture.py "$data/masses/seed_1.h5" -o "$figures/lab_masses_speeds.png"
