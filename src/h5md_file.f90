@@ -51,11 +51,11 @@ contains
     reals = merge(single_precision, double_precision, single)
     self%frames%counter = disks//"committed"
     self%frames%series = [moments(disks//"position"), &
-      series_t(disks//"position/value", reals, [2, n]), &
-      series_t(disks//"velocity/value", reals, [2, n]), &
-      series_t(disks//"collisions/value", short_integer, [n])]
+      series_t(disks//"position/value", reals, 2, [2, n]), &
+      series_t(disks//"velocity/value", reals, 2, [2, n]), &
+      series_t(disks//"collisions/value", short_integer, 1, [n, 1])]
     if (wrapped) self%frames%series = [self%frames%series, &
-      series_t(disks//"image/value", short_integer, [2, n])]
+      series_t(disks//"image/value", short_integer, 2, [2, n])]
   end subroutine plan_frames
 
   !> The observables, by name below /observables.
@@ -64,15 +64,13 @@ contains
     character(len=*), intent(in) :: names(:)
     integer, intent(in) :: widths(:)                    !! number of components; 1: a scalar
     logical, intent(in) :: are_counts(:)
-    integer, allocatable :: item(:)
     integer :: k
     self%observables%counter = "observables/committed"
     self%observables%series = moments("observables/"//trim(names(1)))
     do k = 1, size(names)
-      item = [integer ::]
-      if (widths(k) > 1) item = [widths(k)]
       self%observables%series = [self%observables%series, series_t("observables/"//trim(names(k)) &
-        //"/value", merge(long_integer, double_precision, are_counts(k)), item)]
+        //"/value", merge(long_integer, double_precision, are_counts(k)), min(widths(k) - 1, 1), &
+        [widths(k), 1])]
     end do
   end subroutine plan_observables
 
@@ -80,18 +78,18 @@ contains
   subroutine plan_events(self)
     class(h5md_file_t), intent(inout) :: self
     self%events%counter = "events/committed"
-    self%events%series = [series_t("events/time", double_precision, [integer ::]), &
-      series_t("events/i", short_integer, [integer ::]), &
-      series_t("events/j", short_integer, [integer ::]), &
-      series_t("events/impulse", double_precision, [integer ::])]
+    self%events%series = [series_t("events/time", double_precision), &
+      series_t("events/i", short_integer), &
+      series_t("events/j", short_integer), &
+      series_t("events/impulse", double_precision)]
   end subroutine plan_events
 
   !> Step and time of an H5MD element.
   pure function moments(element) result(series)
     character(len=*), intent(in) :: element
     type(series_t) :: series(2)
-    series = [series_t(element//"/step", long_integer, [integer ::]), &
-      series_t(element//"/time", double_precision, [integer ::])]
+    series = [series_t(element//"/step", long_integer), &
+      series_t(element//"/time", double_precision)]
   end function moments
 
   !> Makes room in a new file for what is planned.
@@ -114,7 +112,7 @@ contains
       call track%put_moment(self%file, time)
       first = 1
       do k = 3, size(track%series)
-        associate (series => track%series(k), part => values(first:first + product(track%series(k)%item) - 1))
+        associate (series => track%series(k), part => values(first:first + product(track%series(k)%shape) - 1))
           if (series%storage == long_integer) then
             call series%put(self%file, track%put + 1, 1_int64, nint(part, int64))
           else

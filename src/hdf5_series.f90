@@ -25,7 +25,8 @@ module hdf5_series
   type :: series_t
     character(len=:), allocatable :: name
     integer :: storage = double_precision
-    integer, allocatable :: item(:)               !! shape of one item; empty: a number
+    integer :: rank = 0                           !! of one item; 0: a number
+    integer :: shape(2) = 1                       !! of one item, as far as it has dimensions
     integer(int64) :: batch = 1                   !! items that are written together
     integer(int64) :: capacity = 0                !! items there is room for
     integer(int64), private :: waiting = 0        !! items put but not written
@@ -52,7 +53,7 @@ contains
   pure function room(self) result(bytes)
     class(series_t), intent(in) :: self
     integer(int64) :: bytes
-    bytes = bytes_of(self%storage)*product(int(self%item, int64))
+    bytes = bytes_of(self%storage)*product(int(self%shape, int64))
   end function room
 
   !> Its HDF5 type in the file.
@@ -74,8 +75,8 @@ contains
     self%capacity = capacity
     call prepare_dataset(properties, status)
     if (status >= 0) call prepare_links(links, status)
-    if (status >= 0) call h5screate_simple_f(size(self%item) + 1, &
-      int([int(self%item, int64), capacity], hsize_t), space, status)
+    if (status >= 0) call h5screate_simple_f(self%rank + 1, &
+      int([int(self%shape(:self%rank), int64), capacity], hsize_t), space, status)
     if (status >= 0) call h5dcreate_f(file%id, self%name, self%storage_type(), space, self%id, status, &
       properties, links)
     call file%check(status, "write "//self%name)
@@ -90,7 +91,7 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer :: status
     if (allocated(file%trouble)) return
-    self%capacity = file%length(self%name)/product(int(self%item, int64))
+    self%capacity = file%length(self%name)/product(int(self%shape, int64))
     call h5dopen_f(file%id, self%name, self%id, status)
     call file%check(status, "be read: "//self%name)
   end subroutine open_series
@@ -129,7 +130,7 @@ contains
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5t_native_double, c_loc(values))
     else
-      n = product(int(self%item, int64))
+      n = product(int(self%shape, int64))
       if (.not. allocated(self%reals)) allocate (self%reals(n*self%batch))
       call self%place_in_batch(file, first, count, at)
       self%reals(n*at + 1:n*(at + count)) = values(:n*count)
@@ -145,7 +146,7 @@ contains
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
     else
-      n = product(int(self%item, int64))
+      n = product(int(self%shape, int64))
       if (.not. allocated(self%integers)) allocate (self%integers(n*self%batch))
       call self%place_in_batch(file, first, count, at)
       self%integers(n*at + 1:n*(at + count)) = values(:n*count)
@@ -161,7 +162,7 @@ contains
     if (count >= self%batch) then
       call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
     else
-      n = product(int(self%item, int64))
+      n = product(int(self%shape, int64))
       if (.not. allocated(self%longs)) allocate (self%longs(n*self%batch))
       call self%place_in_batch(file, first, count, at)
       self%longs(n*at + 1:n*(at + count)) = values(:n*count)
@@ -240,8 +241,8 @@ contains
     integer(int64), intent(in) :: first, count
     integer(hid_t), intent(out) :: there, here
     integer, intent(out) :: status
-    integer(hsize_t) :: start(size(self%item) + 1), counts(size(self%item) + 1)
-    counts = [int(self%item, hsize_t), int(count, hsize_t)]
+    integer(hsize_t) :: start(self%rank + 1), counts(self%rank + 1)
+    counts = [int(self%shape(:self%rank), hsize_t), int(count, hsize_t)]
     start = 0
     start(size(start)) = first - 1
     call h5screate_simple_f(size(counts), counts, here, status)

@@ -68,7 +68,7 @@ contains
       status="old", iostat=status)
     if (status /= 0) return
     read (unit, iostat=status) first
-    if (status == 0) yes = first == achar(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+    if (status == 0) yes = first == char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
     close (unit)
   end function is_hdf5_file
 
