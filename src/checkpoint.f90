@@ -142,7 +142,7 @@ contains
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
         if (size(groups(g)%values(k)%reals) <= 100) cycle      ! in the text with all digits
-        text = text//"checksum of "//trim(groups(g)%name)//"."//groups(g)%instance//"." &
+        text = text//"checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = " &
           //hexadecimal(crc_of_bytes(transfer(groups(g)%values(k)%reals, [0_int8])))//eol
       end do

@@ -100,7 +100,7 @@ contains
     do g = 1, size(groups)
       if (groups(g)%name == "obstacle") cycle           ! one table below
       group = "parameters/"//trim(groups(g)%name)
-      if (is_repeated(groups(g)%name)) group = group//"/"//groups(g)%instance
+      if (is_repeated(groups(g)%name)) group = group//"/"//trim(groups(g)%instance)
       call file%make_group(group)
       do k = 1, size(groups(g)%values)
         call describe_value(file, group, groups(g)%values(k))
