@@ -79,8 +79,11 @@ HTML
   section lab_frames '10 x 10 disks on a grid: events 0, 50, 100, 300' lab
   section lab_speeds '10 x 10 disks: speeds' lab
   section lab_film '10 x 10 disks: event by event' lab
+  section lab_masses 'The lab with different masses' lab
+  section lab_masses_speeds 'The lab with different masses: speeds' lab
   section cost 'Cost of a collision' cost
   section billiards 'Billiards: Sinai, Lorentz' billiards
+  section lyapunov 'Sinai billiard: how fast neighbours part' billiards
   section container 'A round container' billiards
   section container_film 'A round container, film' billiards
   section brownian 'Brownian motion' billiards
