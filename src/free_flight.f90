@@ -130,11 +130,31 @@ contains
     s = never
     do k = 1, n
       if (value(quartic, edge(k)) > 0 .or. value(quartic, edge(k)) >= value(quartic, edge(k - 1))) cycle
-      s = edge(k - 1)
-      if (value(quartic, s) > 0) s = root_between(quartic, edge(k - 1), edge(k))
+      s = last_apart(d, v, g, rho, inside, edge(k - 1), edge(k))
       return
     end do
   end function time_to_circle_falling
+
+  !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
+  !> to the last bit of the distance itself, which is sharper than the polynomial.
+  pure function last_apart(d, v, g, rho, inside, lo, hi) result(s)
+    real(real64), intent(in) :: d(2), v(2), g(2), rho, lo, hi
+    logical, intent(in) :: inside
+    real(real64) :: s, left, right, x(2)
+    left = lo
+    right = hi
+    do
+      s = 0.5_real64*(left + right)
+      if (s <= left .or. s >= right) exit
+      x = flight(d, v, g, s)
+      if (x(1)*x(1) + x(2)*x(2) > rho*rho .neqv. inside) then
+        left = s
+      else
+        right = s
+      end if
+    end do
+    s = left
+  end function last_apart
 
   !> Appends the root of `poly` in (lo, hi), if it changes sign there.
   pure subroutine add_root(poly, lo, hi, edge, n)
