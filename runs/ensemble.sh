@@ -17,6 +17,12 @@ Members:
 Running:
   -j N                   members at a time [all cores]
   --dry-run              print the members and stop
+  --engine pool          who runs them: this script, on this machine [default],
+           slurm         a Slurm job array, -j N members at a time in all; sbatch takes its options
+                         from the environment: SBATCH_TIMELIMIT, SBATCH_PARTITION, ...
+           parallel      GNU parallel, -j N members at a time on each host
+  --sshloginfile FILE    hosts for GNU parallel, as in its manual [this machine]
+  --share K/M            of M parts of the work the K-th: what the engines start on each machine
   -h, --help
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
@@ -24,7 +30,7 @@ with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that fa
 again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is build/ricochet, or what the variable RICOCHET names.
 
-Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 75 stopped, the same command goes on.
+All machines need the same folders.  Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 75 stopped, the same command goes on.
 TEXT
 }
 
@@ -221,7 +227,7 @@ run_all() {
   trap 'rm -rf -- "$claims"' EXIT
   mkfifo "$claims/pipe"
   exec {events}<>"$claims/pipe"
-  trap forward TERM INT
+  trap forward TERM INT HUP
   set -m # own process groups: Ctrl-C reaches this script alone, which sends each member one TERM
   for ((slot = 0; slot < jobs && slot < total; slot++)); do
     [[ -z $stopped ]] || break
@@ -270,16 +276,95 @@ summarise() {
   fi
 }
 
+# --- engines: the same script, with one share of the members, started elsewhere ---
+
+# Fills `share_command`, which lacks only K/M, and `shares`, M.
+prepare_shares() {
+  local most=$1 k here left=0
+  here=$(cd -- "$folder" && pwd)
+  for k in "${!names[@]}"; do
+    [[ -e $folder/${names[k]}.h5 ]] || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
+  done >"$folder/left.txt"
+  left=$((total - finished))
+  shares=$((left < most ? left : most))
+  share_command=(env "RICOCHET=$(realpath -- "$program")" bash "$script" "$here/input.nml" -d "$here"
+    --manifest "$here/left.txt" -j 1 --share)
+}
+
+# What became of the members shows in their files.
+judge_by_files() {
+  local name
+  for name in "${names[@]}"; do
+    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]]; then
+      failed=$((failed + 1))
+      failures+=("$name: $(tail -n 1 -- "$folder/$name.log")")
+    fi
+  done
+}
+
+run_parallel() {
+  local options=(--will-cite -j "$jobs" --termseq 'TERM,600000,KILL,1000') child
+  command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
+  prepare_shares 1000000
+  [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
+  [[ ! -t 2 ]] || options+=(--bar)
+  parallel "${options[@]}" "${share_command[@]}" "{}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
+  child=$!
+  trap 'stopped=1; kill -TERM "$child" 2>/dev/null' TERM INT HUP
+  while kill -0 "$child" 2>/dev/null; do wait "$child" || true; done
+  [[ -z $stopped ]] || wait_for_locks
+  judge_by_files
+}
+
+# Members on other machines end a moment after the connection to them has.
+wait_for_locks() {
+  local name
+  for name in "${names[@]}"; do
+    [[ ! -e $folder/$name.h5.part ]] || flock --timeout 60 "$folder/$name.log" true || true
+  done
+}
+
+# The array's tasks send TERM on to the members; a task whose time is over, and that nobody has
+# cancelled, goes back into the queue.
+submit_to_slurm() {
+  local id='' here task
+  command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
+  here=$(cd -- "$folder" && pwd)
+  [[ ! -s $folder/slurm.job ]] || id=$(<"$folder/slurm.job")
+  if [[ -n $id && -n $(squeue --noheader --array --jobs "$id" 2>/dev/null || true) ]]; then
+    printf '%s: Slurm job %s goes on: %d of %d members finished\n' "$folder" "$id" "$finished" "$total" >&2
+    exit 75
+  fi
+  prepare_shares 1000
+  task="#!/usr/bin/env bash
+trap 'kill -TERM \$child' TERM
+$(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!
+status=143
+while kill -0 \$child 2>/dev/null; do status=0; wait \$child || status=\$?; done
+if ((status == 75)) && [[ \$(squeue --noheader --format=%T --jobs=\$SLURM_JOB_ID) == RUNNING ]]; then
+  scontrol requeue \$SLURM_JOB_ID
+fi
+exit \$status"
+  id=$(sbatch --parsable --array="1-$shares%$jobs" --requeue --signal=B:TERM@60 --open-mode=append \
+    --job-name="${here##*/}" --output="$here/slurm.log" <<<"$task") || die "sbatch refused the job"
+  printf '%s\n' "${id%%;*}" >"$folder/slurm.job"
+  printf '%s: Slurm job %s submitted, %d of %d members finished before\n' \
+    "$folder" "${id%%;*}" "$finished" "$total" >&2
+  printf '  the same command says how far it is\n' >&2
+  exit 75
+}
+
 # --- command line ---
 
 trap 'exit 75' TERM INT # until members run there is nothing to end
-input='' folder='' seeds='' manifest='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
+script=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)/${BASH_SOURCE[0]##*/}
+input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
 common='' scans=()
 while (($#)); do
   case $1 in
   -h | --help) usage && exit 0 ;;
   --dry-run) dry=1 && shift && continue ;;
-  -d | -j | --seeds | --scan | --set | --manifest) (($# > 1)) || die "$1 needs a value" ;;
+  -d | -j | --seeds | --scan | --set | --manifest | --engine | --sshloginfile | --share) (($# > 1)) || die "$1 needs a value" ;;
   -*) die "unknown option $1, see --help" ;;
   *)
     [[ -z $input ]] || die "one input file, not '$input' and '$1'"
@@ -293,6 +378,9 @@ while (($#)); do
   --scan) scans+=("$2") ;;
   --set) common+="${common:+ }--set $2" ;;
   --manifest) manifest=$2 ;;
+  --engine) engine=$2 ;;
+  --sshloginfile) hosts=$2 ;;
+  --share) share=$2 ;;
   esac
   shift 2
 done
@@ -301,6 +389,10 @@ done
 [[ -r $input && -f $input ]] || die "cannot read $input"
 [[ -n $folder ]] || die "no folder for the members: -d FOLDER"
 [[ $jobs =~ ^[1-9][0-9]*$ ]] || die "-j $jobs: not a number of members"
+[[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: pool, slurm or parallel"
+[[ -z $hosts || $engine == parallel ]] || die "--sshloginfile goes with --engine parallel"
+[[ -z $hosts || -r $hosts ]] || die "cannot read $hosts"
+[[ $share =~ ^(|[1-9][0-9]*/[1-9][0-9]*)$ ]] || die "--share $share: write K/M, such as 2/10"
 if [[ -n $manifest ]]; then
   [[ -z $seeds && ${#scans[@]} == 0 ]] || die "either --manifest or --seeds and --scan"
   [[ -r $manifest ]] || die "cannot read $manifest"
@@ -319,6 +411,15 @@ for k in "${!overrides[@]}"; do
   overrides[k]=${common:+$common${overrides[k]:+ }}${overrides[k]}
 done
 
+# Of M shares the K-th: members K, K + M, K + 2M, ...
+if [[ -n $share ]]; then
+  for k in "${!names[@]}"; do
+    (((k + 1 - ${share%/*}) % ${share#*/} == 0)) || unset "names[k]" "overrides[k]"
+  done
+  names=("${names[@]}") overrides=("${overrides[@]}")
+  ((${#names[@]} > 0)) || exit 0
+fi
+
 if [[ -n $dry ]]; then
   for k in "${!names[@]}"; do printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"; done
   exit 0
@@ -328,11 +429,17 @@ program=${RICOCHET:-$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)/build
 [[ -x $program ]] || die "no program $program: run make, or set RICOCHET"
 command -v flock >/dev/null || die "needs flock (package util-linux)"
 mkdir -p -- "$folder" || die "cannot make $folder"
-remember
+[[ -n $share ]] || remember
 
 total=${#names[@]} finished=0 failed=0 busy=0 ended=0 next_line=30 stopped='' claims=''
 workers=() failures=()
 for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
 skipped=$finished
-if ((finished < total)); then run_all; fi
+if ((finished < total)); then
+  case $engine in
+  pool) run_all ;;
+  parallel) run_parallel ;;
+  slurm) submit_to_slurm ;;
+  esac
+fi
 summarise

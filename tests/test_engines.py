@@ -1,0 +1,350 @@
+"""Ensembles through Slurm and through GNU parallel over ssh, really run on this machine.
+
+Daemons listen on the loopback interface only; they are started here and ended by their process ids.
+"""
+
+import contextlib
+import getpass
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+from synthetic_run import ROOT
+
+SCRIPT = ROOT / "runs" / "ensemble.sh"
+INPUT = ROOT / "input" / "gas.nml"
+SMALL = ("--set", "species.gas.count=50", "--set", "stop.collisions_per_disk=2")
+LONG = ("--set", "stop.collisions_per_disk=6000", "--set", "output.frames_every_collisions=100000")
+
+
+def need(*programs: str) -> None:
+    """Skip with the names of what is missing."""
+    places = f"{os.environ['PATH']}:/usr/sbin:/sbin"
+    missing = [name for name in programs if not shutil.which(name, path=places)]
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def daemon(folder: Path, *command, ready, **options):
+    """A process in the foreground until `ready()` and then until the end of the block."""
+    name = Path(command[0]).name
+    command = [shutil.which(command[0], path=f"{os.environ['PATH']}:/usr/sbin"), *command[1:]]
+    log = (folder / f"{name}.out").open("w")
+    process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, **options)
+    try:
+        wait_for(ready, 30, f"{name} is up", lambda: process.poll() is None)
+        yield process
+    finally:
+        process.terminate()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(10)
+        process.kill()
+        process.wait()
+        log.close()
+
+
+def wait_for(condition, seconds: float, what: str, alive=lambda: True):
+    """Poll until `condition()`; its value."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if value := condition():
+            return value
+        assert alive(), f"ended before: {what}"
+        time.sleep(0.1)
+    pytest.fail(f"not within {seconds} s: {what}")
+    return None
+
+
+def answers(port: int) -> bool:
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
+        return True
+    return False
+
+
+@pytest.fixture
+def ensemble(program, tmp_path):
+    """`ensemble(*arguments)` runs the script in a folder of its own; `start=True` does not wait."""
+
+    def run(*arguments, start=False, **environment):
+        command = ["bash", SCRIPT, INPUT, "-d", "members", *map(str, arguments)]
+        settings = {**os.environ, "RICOCHET": str(program), **environment}
+        options = {"cwd": tmp_path, "env": settings, "text": True}
+        if start:
+            return subprocess.Popen(command, stderr=subprocess.PIPE, **options)
+        return subprocess.run(command, capture_output=True, timeout=120, check=False, **options)
+
+    return run
+
+
+def data_of(path: Path) -> bytes:
+    """Positions and velocities of the last frame."""
+    with h5py.File(path) as file:
+        disks = file["particles/disks"]
+        return disks["position/value"][-1].tobytes() + disks["velocity/value"][-1].tobytes()
+
+
+# --- shares ---
+
+
+def test_shares_are_the_whole_without_overlap(ensemble):
+    every = ensemble("--seeds", "1-7", "--dry-run").stdout.splitlines()
+    parts = [
+        ensemble("--seeds", "1-7", "--dry-run", "--share", f"{k}/3").stdout.splitlines()
+        for k in (1, 2, 3)
+    ]
+    assert sorted(line for part in parts for line in part) == sorted(every) and len(every) == 7
+    assert [len(part) for part in parts] == [3, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--engine", "cloud"], "--engine cloud: pool, slurm or parallel"),
+        (["--sshloginfile", "hosts"], "goes with --engine parallel"),
+        (["--engine", "parallel", "--sshloginfile", "nowhere"], "cannot read nowhere"),
+        (["--share", "0/3"], "--share 0/3: write K/M"),
+    ],
+)
+def test_wrong_options_are_refused(ensemble, options, words):
+    result = ensemble("--seeds", 1, *options)
+    assert result.returncode == 2 and words in result.stderr
+
+
+@pytest.mark.parametrize(("engine", "tool"), [("slurm", "sbatch"), ("parallel", "parallel")])
+def test_a_missing_engine_is_said(ensemble, tmp_path, engine, tool):
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for path in ("/bin", "/usr/bin"):
+        for one in Path(path).iterdir():
+            link = tools / one.name
+            if one.name != tool and not link.exists() and not link.is_symlink():
+                link.symlink_to(one)
+    result = ensemble("--seeds", 1, "--engine", engine, PATH=str(tools))
+    assert result.returncode == 2 and f"--engine {engine} needs" in result.stderr
+
+
+# --- GNU parallel ---
+
+
+@pytest.fixture
+def hosts(tmp_path):
+    """A file of two hosts for GNU parallel: two names of an sshd of this test on loopback."""
+    need("parallel", "sshd", "ssh", "ssh-keygen")
+    folder, port = tmp_path / "ssh", free_port()
+    folder.mkdir(mode=0o700)
+    for key in ("host", "user"):
+        subprocess.run(["ssh-keygen", "-qt", "ed25519", "-N", "", "-f", folder / key], check=True)
+    (folder / "authorized").write_text((folder / "user.pub").read_text())
+    (folder / "sshd.conf").write_text(
+        f"ListenAddress 127.0.0.1:{port}\nHostKey {folder}/host\nPidFile {folder}/pid\n"
+        f"AuthorizedKeysFile {folder}/authorized\nStrictModes no\nUsePAM no\n"
+        "PasswordAuthentication no\nPermitRootLogin prohibit-password\nMaxStartups 50\n"
+    )
+    (folder / "ssh.conf").write_text(
+        f"Host nodea nodeb\n HostName 127.0.0.1\n Port {port}\n User {getpass.getuser()}\n"
+        f" IdentityFile {folder}/user\n IdentitiesOnly yes\n StrictHostKeyChecking no\n"
+        f" UserKnownHostsFile {folder}/known\n LogLevel ERROR\n"
+    )
+    if os.getuid() == 0:
+        Path("/run/sshd").mkdir(exist_ok=True)
+    file = folder / "hosts"
+    file.write_text("".join(f"ssh -F {folder}/ssh.conf node{k}\n" for k in "ab"))
+    with daemon(
+        folder, "sshd", "-D", "-e", "-f", folder / "sshd.conf", ready=lambda: answers(port)
+    ):
+        yield file
+
+
+def test_parallel_runs_all_members_on_this_machine(ensemble, tmp_path):
+    need("parallel")
+    arguments = ("--engine", "parallel", "-j", 2, "--seeds", "1-4", *SMALL)
+    result = ensemble(*arguments)
+    assert result.returncode == 0, result.stderr
+    assert "4 of 4 members finished" in result.stderr
+    again = ensemble(*arguments)
+    assert again.returncode == 0 and "4 of them before" in again.stderr
+    plain = ensemble("-d", "plain", "--seeds", "1-4", *SMALL)
+    assert plain.returncode == 0
+    for k in range(1, 5):
+        name = f"seed_{k}.h5"
+        assert data_of(tmp_path / "members" / name) == data_of(tmp_path / "plain" / name)
+
+
+def test_parallel_runs_members_on_two_hosts(ensemble, hosts, tmp_path):
+    arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-6", *SMALL)
+    result = ensemble(*arguments)
+    log = (tmp_path / "ssh" / "sshd.out").read_text()
+    assert result.returncode == 0, result.stderr + (tmp_path / "members/parallel.log").read_text()
+    assert len(list((tmp_path / "members").glob("seed_*.h5"))) == 6
+    assert log.count("Accepted publickey") >= 6
+
+
+def test_parallel_reports_a_member_that_fails(ensemble):
+    need("parallel")
+    result = ensemble(
+        *("--engine", "parallel", "-j", 2, *SMALL, "--scan", "species.gas.radius=0.004,0.2")
+    )
+    assert result.returncode == 1
+    assert "1 of 2 members finished, 1 failed" in result.stderr
+    assert "failed: gas.radius_0.2" in result.stderr
+
+
+def stops_and_goes_on(ensemble, folder, *arguments):
+    """TERM while members run; then the same command ends well."""
+    running = ensemble(*arguments, *LONG, start=True)
+    wait_for(lambda: len(list(folder.glob("*.part"))) == 2, 60, "two members run")
+    time.sleep(0.5)
+    running.send_signal(signal.SIGTERM)
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 75, errors
+    assert len(list(folder.glob("*.chk.h5"))) == 2
+    assert not list(folder.glob("seed_?.h5"))
+    again = ensemble(*arguments, *LONG)
+    assert again.returncode == 0, again.stderr
+    assert len(list(folder.glob("seed_?.h5"))) == 2
+
+
+def test_parallel_passes_term_on_and_goes_on(ensemble, tmp_path):
+    need("parallel")
+    arguments = ("--engine", "parallel", "-j", 2, "--seeds", "1-2")
+    stops_and_goes_on(ensemble, tmp_path / "members", *arguments)
+
+
+def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
+    arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-2")
+    stops_and_goes_on(ensemble, tmp_path / "members", *arguments)
+
+
+# --- Slurm ---
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A Slurm cluster of this machine alone, on loopback; the environment that leads to it."""
+    need("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scontrol")
+    if os.getuid() != 0:
+        pytest.skip("Slurm's daemons need root")
+    folder = tmp_path / "slurm"
+    for name in ("", "state", "spool"):
+        (folder / name).mkdir(mode=0o755)
+    (folder / "key").write_bytes(os.urandom(128))
+    (folder / "key").chmod(0o400)
+    host, ports, munge = (
+        socket.gethostname().split(".")[0],
+        (free_port(), free_port()),
+        folder / "m",
+    )
+    (folder / "slurm.conf").write_text(
+        f"""ClusterName=test
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
+SlurmUser=root
+AuthType=auth/munge
+AuthInfo=socket={munge}
+CommunicationParameters=NoInAddrAny,NoCtldInAddrAny
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+ReturnToService=2
+KillWait=30
+SchedulerParameters=batch_sched_delay=0,sched_interval=1
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+NodeName={host} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
+PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
+"""
+    )
+    environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf")}
+    files = {name: f"{folder}/munged.{name}" for name in ("log", "pid", "seed")}
+
+    def slurm(*command) -> str:
+        options = {"capture_output": True, "text": True, "check": False, "env": environment}
+        return subprocess.run(command, **options).stdout
+
+    with contextlib.ExitStack() as stack:
+        munged = ["munged", "-F", "-f", f"--key-file={folder}/key", f"--socket={munge}"]
+        munged += [f"--{name}-file={path}" for name, path in files.items()]
+        stack.enter_context(daemon(folder, *munged, ready=munge.exists))
+        stack.enter_context(
+            daemon(folder, "slurmctld", "-D", ready=lambda: answers(ports[0]), env=environment)
+        )
+        stack.enter_context(
+            daemon(
+                folder,
+                *("slurmd", "-D"),
+                ready=lambda: "idle" in slurm("sinfo", "--noheader"),
+                env=environment,
+            )
+        )
+        yield slurm
+        slurm("scancel", "--quiet", "--user", getpass.getuser())
+        wait_for(lambda: not slurm("squeue", "--noheader").strip(), 60, "the queue is empty")
+
+
+def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
+    arguments = ("--engine", "slurm", "-j", 2, "--seeds", "1-4", *SMALL)
+    settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
+    first = ensemble(*arguments, **settings)
+    assert first.returncode == 75 and "submitted" in first.stderr, first.stderr
+    folder = tmp_path / "members"
+    wait_for(lambda: len(list(folder.glob("seed_*.h5"))) == 4, 120, "four members finish")
+    wait_for(lambda: not cluster("squeue", "--noheader").strip(), 60, "the queue is empty")
+    last = ensemble(*arguments, **settings)
+    assert last.returncode == 0 and "4 of 4 members finished" in last.stderr
+
+
+def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cluster, tmp_path):
+    arguments = ("--engine", "slurm", "-j", 1, "--seeds", "1-2", *LONG)
+    settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
+    ensemble(*arguments, **settings)
+    folder = tmp_path / "members"
+    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    again = ensemble(*arguments, **settings)
+    assert again.returncode == 75 and "goes on: 0 of 2 members finished" in again.stderr
+    assert len(list(folder.glob("*.part"))) == 1  # %1, though there are two processors
+    assert len(cluster("squeue", "--noheader", "--array").splitlines()) == 2
+
+
+@pytest.mark.check
+def test_a_member_that_slurm_puts_back_goes_on(ensemble, cluster, tmp_path):
+    """Slurm waits two minutes before it starts such a job again."""
+    arguments = ("--engine", "slurm", "-j", 1, "--seeds", "1-1", *LONG)
+    settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
+    ensemble(*arguments, **settings)
+    folder = tmp_path / "members"
+    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    job = (folder / "slurm.job").read_text().strip()
+    cluster("scontrol", "requeue", f"{job}_1")
+    wait_for(lambda: list(folder.glob("*.chk.h5")), 60, "a checkpoint")
+    assert not list(folder.glob("seed_?.h5"))
+    wait_for(lambda: list(folder.glob("seed_1.h5")), 240, "the member goes on and ends")
+
+
+def test_a_member_whose_time_in_slurm_is_over_is_put_back(ensemble, cluster, tmp_path):
+    arguments = ("--engine", "slurm", "-j", 1, "--seeds", "1-1", *LONG)
+    settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
+    ensemble(*arguments, **settings)
+    folder = tmp_path / "members"
+    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    job = (folder / "slurm.job").read_text().strip()
+    cluster("scancel", "--batch", "--signal=TERM", f"{job}_1")  # as --signal=B:TERM@60 does
+    wait_for(lambda: list(folder.glob("*.chk.h5")), 60, "a checkpoint")
+    state = ("squeue", "--noheader", "--format=%T")
+    wait_for(lambda: cluster(*state).strip() == "PENDING", 60, "the job waits again")
