@@ -1,4 +1,4 @@
-"""The pages say what is there: current reference, no dead links, commands that exist; completion."""
+"""The pages in docs: current, and true to the program that they describe."""
 
 import importlib.util
 import re
