@@ -187,7 +187,7 @@ lint-compiler:
 	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
-	@! $(venv) -m fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
+	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests
 lint-shell:
