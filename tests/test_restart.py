@@ -30,7 +30,7 @@ SYSTEMS = {
     "inelastic": GAS + INELASTIC + OUTPUT + STOP,
     "periodic": GAS + "&box boundary = 'periodic', 'periodic' /\n" + OUTPUT + STOP,
     "channel": GAS + "&box boundary = 'periodic', 'wall' gravity = 0, -1 /\n" + OUTPUT + STOP,
-    "gravity": GAS + FALLING + INELASTIC + OUTPUT + STOP,
+    "gravity": GAS + FALLING + OUTPUT + STOP,
     "obstacles": GAS
     + "&obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 /\n"
     + "&obstacle name = 'pot' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n"
