@@ -22,7 +22,7 @@ Running:
                          from the environment: SBATCH_TIMELIMIT, SBATCH_PARTITION, ...
            parallel      GNU parallel, -j N members at a time on each host
   --sshloginfile FILE    hosts for GNU parallel, as in its manual [this machine]
-  --share K/M            of M parts of the work the K-th: what the engines start on each machine
+  --share K/M            of M parts of the list the K-th (what the engines start elsewhere)
   -h, --help
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member

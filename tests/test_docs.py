@@ -1,4 +1,4 @@
-"""The pages in docs: current, and true to the program that they describe."""
+"""The pages say what is there: current reference, no dead links, commands that exist."""
 
 import importlib.util
 import re

@@ -202,12 +202,12 @@ def test_parallel_reports_a_member_that_fails(ensemble):
     assert "failed: gas.radius_0.2" in result.stderr
 
 
-def stops_and_goes_on(ensemble, folder, *arguments):
-    """TERM while members run; then the same command ends well."""
+def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
+    """A signal while members run; then the same command ends well."""
     running = ensemble(*arguments, *LONG, start=True)
     wait_for(lambda: len(list(folder.glob("*.part"))) == 2, 60, "two members run")
     time.sleep(0.5)
-    running.send_signal(signal.SIGTERM)
+    running.send_signal(by)
     _, errors = running.communicate(timeout=60)
     assert running.returncode == 75, errors
     assert len(list(folder.glob("*.chk.h5"))) == 2
@@ -215,6 +215,11 @@ def stops_and_goes_on(ensemble, folder, *arguments):
     again = ensemble(*arguments, *LONG)
     assert again.returncode == 0, again.stderr
     assert len(list(folder.glob("seed_?.h5"))) == 2
+
+
+def test_a_closed_terminal_stops_like_term(ensemble, tmp_path):
+    arguments = ("-j", 2, "--seeds", "1-2")
+    stops_and_goes_on(ensemble, tmp_path / "members", *arguments, by=signal.SIGHUP)
 
 
 def test_parallel_passes_term_on_and_goes_on(ensemble, tmp_path):
