@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-# A shell that starts the tests in the background has them ignore these, and what they start as well.
+# A shell that starts the tests in the background has them, and all they start, ignore these.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
