@@ -7,7 +7,7 @@
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 figures=runs/figures
-systems=(scattering gas mixture cooling crater lab cost billiards gravity)
+systems=(scattering gas mixture cooling crater lab cost billiards gravity state)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -93,6 +93,9 @@ HTML
   section gravity_laws 'Gravity: speeds and heights' gravity
   section gravity_frames 'Gravity: frames' gravity
   section gravity_film 'Gravity, film' gravity
+  section equation_of_state 'Bulk: equation of state' state
+  section correlations 'Bulk: memory, diffusion, order' state
+  section haff 'Bulk: cooling by the law of Haff' state
   printf '</main>\n</html>\n'
 } >"$figures/index.html"
 printf 'figures = %s/index.html\n' "$figures"

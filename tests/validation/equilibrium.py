@@ -7,23 +7,21 @@ import numpy as np
 import hard_disks as hd
 from read_run import Run
 from theory import Estimate
-
-from .case import AT_LEAST, Case, Member, relative, sigmas, within
-from .estimators import (
+from thermodynamics import (
     blocks,
-    closest_gap,
     collision_rate,
     combined,
     force,
     hit_rate,
-    over_runs,
     packing,
     ratio,
-    several,
     z_rate,
     z_virial,
     z_wall,
 )
+
+from .case import AT_LEAST, Case, Member, relative, sigmas, within
+from .estimators import closest_gap, over_runs, several
 from .inputs import PERIODIC, ROOT_2, gas, namelist
 
 N = 1000

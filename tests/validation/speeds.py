@@ -7,6 +7,7 @@ from scipy import stats
 
 from read_run import Run
 from theory import Estimate, estimate, excess_kurtosis, finite_n_cdf, hold_against, maxwell_cdf
+from thermodynamics import temperature
 
 from .case import AT_MOST, Case, Member, Tolerance, relative, sigmas, within
 from .estimators import at_collisions, over_runs
@@ -155,16 +156,11 @@ def hits_on_record(periodic: bool) -> Member:
     )
 
 
-def kt(run: Run) -> float:
-    free = run.count - 1 if np.all(run.periodic) else run.count
-    return float(np.sum(run.kinetic_energy(0))) / free
-
-
 def wall_speeds(run: Run) -> np.ndarray:
     """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
     log = run.events
     hit = log.j <= 0
-    return log.impulse[hit] / (2 * sqrt(2 * kt(run)))
+    return log.impulse[hit] / (2 * sqrt(2 * temperature(run)))
 
 
 def wall_energies(run: Run) -> Estimate:
@@ -172,14 +168,14 @@ def wall_energies(run: Run) -> Estimate:
     log = run.events
     hit = np.flatnonzero(log.j <= 0)
     disks = log.i[hit] - 1
-    energy = run.kinetic_energy(slice(1, None))[hit, disks] / kt(run)
+    energy = run.kinetic_energy(slice(1, None))[hit, disks] / temperature(run)
     return estimate([part.mean() for part in np.array_split(energy, 20)])
 
 
 def approach_speeds(run: Run) -> np.ndarray:
     """g_n of pair collisions over sqrt(4 kT / m)."""
     log = run.events
-    return log.impulse[log.j > 0] / sqrt(4 * kt(run))
+    return log.impulse[log.j > 0] / sqrt(4 * temperature(run))
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,115 @@
+"""Cooling of a gas of equal disks: Haff's law, and where the gas leaves it.
+
+    python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
+
+Runs are put together by restitution xi.  Left: K against time in units of the first mean free time,
+K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  Right: K against collisions per disk, an exponential
+(van Noije and Ernst 1998).  Both hold while the gas stays homogeneous; later, streams carry the
+energy and it falls more slowly.  Periodic boxes at rest as a whole.
+"""
+
+import numpy as np
+
+import hard_disks
+from drawing import COLOURS, caption, command_line, grouped, launch, plt, read_all, save, write_csv
+from read_run import Run, RunError
+from theory import Estimate, estimate
+from thermodynamics import packing
+
+POINTS = 200
+
+
+def first_rate(run: Run) -> float:
+    """w0: collisions per disk and time at the start, by the equation of state."""
+    if not run.periodic.all() or np.ptp(run.radius) > 0 or np.ptp(run.mass) > 0:
+        raise RunError(f"{run.path}: Haff's law is for equal disks in a periodic box")
+    free = run.count - 1
+    kt = float(np.sum(run.kinetic_energy(0))) / free
+    z = float(hard_disks.simulated(packing(run)))
+    return hard_disks.collision_rate(z, 2 * run.radius[0], free, kt, run.mass[0])
+
+
+def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """w0 t, collisions per disk, K / K0 at the observables."""
+    time, energy = run.observable("all/kinetic_energy")
+    return time * first_rate(run), run.collisions_per_disk.value, energy / energy[0]
+
+
+def curves(runs: list[Run]) -> dict[str, np.ndarray | Estimate]:
+    """Means over runs on common grids; time in logarithmic steps."""
+    tracks = [energy_left(run) for run in runs]
+    late = min(t[-1] for t, _, _ in tracks)
+    time = np.geomspace(max(t[1] for t, _, _ in tracks), late, POINTS)
+    tau = np.linspace(0, min(c[-1] for _, c, _ in tracks), POINTS)
+    return {
+        "time": time,
+        "by_time": estimate([np.interp(time, t, k) for t, _, k in tracks]),
+        "tau": tau,
+        "by_collisions": estimate([np.interp(tau, c, k) for _, c, k in tracks]),
+    }
+
+
+def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figure:
+    """K against time, double logarithmic, and against collisions, logarithmic."""
+    figure, (left, right) = plt.subplots(1, 2, sharey=True, figsize=(10, 5))
+    for (xi, _), found, colour in zip(groups, results, COLOURS, strict=False):
+        panels = (
+            (left, found["time"], found["by_time"], hard_disks.haff_by_time),
+            (right, found["tau"], found["by_collisions"], hard_disks.haff_by_collisions),
+        )
+        for axes, x, y, law in panels:
+            axes.plot(x, y.mean, color=colour, label=f"ξ = {xi:g}")
+            axes.fill_between(x, y.mean - y.error, y.mean + y.error, color=colour, alpha=0.25, lw=0)
+            axes.plot(x, law(x, xi), color="black", ls="--", lw=1)
+    left.plot([], [], color="black", ls="--", lw=1, label="Haff 1983")
+    right.plot([], [], color="black", ls="--", lw=1, label="van Noije and Ernst 1998")
+    floor = min(found["by_time"].mean.min() for found in results)
+    left.set(
+        xscale="log", yscale="log", ylim=(floor / 2, 1.5), xlabel="$w_0\\,t$", ylabel="$K / K_0$"
+    )
+    right.set(xlabel="collisions per disk", xlim=(0, None))
+    left.legend()
+    right.legend()
+    runs = [run for _, members in groups for run in members]
+    eta = ", ".join(f"{value:.3g}" for value in sorted({round(packing(run), 6) for run in runs}))
+    figure.suptitle(f"{caption(runs)},  η = {eta}", fontsize=10)
+    return figure
+
+
+def columns(groups: list[tuple[float, list[Run]]], results: list[dict]) -> dict[str, np.ndarray]:
+    """All curves and laws."""
+    table = {}
+    for (xi, _), found in zip(groups, results, strict=True):
+        time, tau = found["time"], found["tau"]
+        table[f"w0_t_xi{xi:g}"] = time
+        table[f"K_by_time_xi{xi:g}"], table[f"K_by_time_error_xi{xi:g}"] = found["by_time"]
+        table[f"haff_xi{xi:g}"] = hard_disks.haff_by_time(time, xi)
+        table[f"collisions_per_disk_xi{xi:g}"] = tau
+        table[f"K_xi{xi:g}"], table[f"K_error_xi{xi:g}"] = found["by_collisions"]
+        table[f"law_xi{xi:g}"] = hard_disks.haff_by_collisions(tau, xi)
+    return table
+
+
+def main() -> None:
+    args = command_line(__doc__, "haff.png", table=True).parse_args()
+    runs = read_all(args.runs)
+    groups = grouped(runs, lambda run: run.restitution)
+    results = [curves(members) for _, members in groups]
+    for (xi, members), found in zip(groups, results, strict=True):
+        for tau in (5, 10, 20):
+            if tau > found["tau"][-1]:
+                break
+            left = Estimate(
+                *(float(np.interp(tau, found["tau"], y)) for y in found["by_collisions"])
+            )
+            print(
+                f"restitution = {xi:g}  runs = {len(members)}  collisions_per_disk = {tau}  "
+                f"energy_left = {left}  expected = {hard_disks.haff_by_collisions(tau, xi):.5g}"
+            )
+    save(draw(groups, results), args.output, runs, "Cooling of a gas of inelastic disks")
+    if args.csv:
+        write_csv(args.csv, columns(groups, results))
+
+
+if __name__ == "__main__":
+    launch(main)

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Bulk hard disks: equation of state, memory and order, Haff's law; four seeds each.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+data=runs/state figures=runs/figures
+mkdir -p "$data" "$figures"
+
+# Pressure: at random up to 0.5, grown to 0.7, a crystal from 0.72 in a box that fits it.
+runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
+  --scan species.disks.packing_fraction=0.05,0.1,0.15,0.2,0.25,0.3,0.35,0.4,0.45,0.5 "$@"
+runs/ensemble.sh input/bulk.nml -d "$data/dense" --seeds 1-4 --set species.disks.placement=dense \
+  --scan species.disks.packing_fraction=0.55,0.6,0.65,0.68 "$@"
+runs/ensemble.sh input/bulk.nml -d "$data/crystal" --seeds 1-4 \
+  --set species.disks.placement=lattice --set species.disks.count=960 \
+  --set box.upper=1,0.9237604307034013 \
+  --scan species.disks.packing_fraction=0.74,0.77,0.8,0.83 "$@"
+"$python" post/equation_of_state.py "$data"/{fluid,dense,crystal}/*.h5 \
+  -o "$figures/equation_of_state.png" --csv "$figures/equation_of_state.csv"
+
+# Memory: a frame every tenth of a mean free time or so, packing by packing, from equal speeds.
+memory=()
+while read -r packing interval placement; do
+  runs/ensemble.sh input/bulk.nml -d "$data/memory_$packing" --seeds 1-4 \
+    --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" \
+    --set "output.frames_every_time=$interval" --set stop.collisions_per_disk=220 \
+    --set species.disks.temperature= --set species.disks.speed=1.4142135623730951 "$@"
+  memory+=("$data/memory_$packing"/*.h5)
+done <<'TABLE'
+0.05 0.003 random
+0.3 0.0008 random
+0.5 0.00035 random
+0.68 0.00015 dense
+TABLE
+"$python" post/correlations.py "${memory[@]}" -o "$figures/correlations.png" \
+  --csv "$figures/correlations.csv"
+
+# Cooling: dilute, until streams set in.
+runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \
+  --set species.disks.packing_fraction=0.02 --set stop.collisions_per_disk=60 \
+  --set output.observables_every_collisions=100 --scan contact.restitution=0.95,0.9,0.8 "$@"
+"$python" post/haff.py "$data"/cooling/*.h5 -o "$figures/haff.png" --csv "$figures/haff.csv"
