@@ -46,7 +46,7 @@ def reference(eta: float, count: int, periodic: bool) -> float:
         return float(
             hard_disks.simulated_finite(eta, count) if periodic else hard_disks.simulated(eta)
         )
-    return float(hard_disks.crystal(eta) if eta >= 0.72 else hard_disks.simulated(eta))
+    return float(hard_disks.crystal(eta, count) if eta >= 0.72 else hard_disks.simulated(eta))
 
 
 def tabulated(groups: list[tuple[float, list[Run]]]) -> dict[str, list]:

@@ -60,10 +60,14 @@ def simulated_finite(eta: np.ndarray, count: int) -> np.ndarray:
     return simulated(eta) + _shift(eta) / count
 
 
-def crystal(eta: np.ndarray) -> np.ndarray:
-    """Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968)."""
+def crystal(eta: np.ndarray, count: float = math.inf) -> np.ndarray:
+    """Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
+
+    `count` disks in a periodic box: their centre of mass is free, as in an ideal gas of one.
+    """
     alpha = CLOSE_PACKING / eta - 1
-    return 2 / alpha + 1.90 + 0.67 * alpha + 1.51 * alpha**2
+    z = 2 / alpha + 1.90 + 0.67 * alpha + 1.51 * alpha**2
+    return z - (z - 1) / count
 
 
 def contact_value(z: float, eta: float) -> float:

@@ -10,7 +10,7 @@ mkdir -p "$data" "$figures"
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \
   --scan species.disks.packing_fraction=0.05,0.1,0.15,0.2,0.25,0.3,0.35,0.4,0.45,0.5 "$@"
 runs/ensemble.sh input/bulk.nml -d "$data/dense" --seeds 1-4 --set species.disks.placement=dense \
-  --scan species.disks.packing_fraction=0.55,0.6,0.65,0.68 "$@"
+  --scan species.disks.packing_fraction=0.55,0.6,0.64,0.68 "$@"
 runs/ensemble.sh input/bulk.nml -d "$data/crystal" --seeds 1-4 \
   --set species.disks.placement=lattice --set species.disks.count=960 \
   --set box.upper=1,0.9237604307034013 \

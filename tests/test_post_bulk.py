@@ -42,6 +42,7 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
         assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.luding(hd.FLUID[:, 0]), rtol=2e-3)
+    assert hd.crystal(0.8) - hd.crystal(0.8, 100) == pytest.approx((hd.crystal(0.8) - 1) / 100)
     assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
 
 

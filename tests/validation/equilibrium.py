@@ -335,7 +335,7 @@ DENSE = [
 ] + [
     Case(
         "P8-05", "lattice start, crystal at packing 0.80: Z",
-        (lattice(30, 32, 0.80, 4000),), z_virial, hd.crystal(0.80), relative(0.005),
+        (lattice(30, 32, 0.80, 4000),), z_virial, hd.crystal(0.80, 960), relative(0.005),
         "Alder, Hoover and Young 1968",
     ),
     Case(
