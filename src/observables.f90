@@ -66,7 +66,7 @@ contains
       real(sim%wall_collisions, real64), sim%wall_impulse, real(sim%obstacle_collisions, real64)]
   end function observed_values
 
-  !> One pass over the disks. Heights count from the origin, and on through periodic sides.
+  !> One pass over the disks. Heights count from the origin.
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     type(sums_t), intent(out) :: sums(0:)
@@ -75,7 +75,6 @@ contains
     integer :: s
     do i = 1, sim%n_disks()
       x = sim%position(i)
-      if (any(sim%box%periodic)) x = x + sim%tag(i)%image*sim%box%edges()
       v = sim%velocity(i)
       mass = sim%species(sim%tag(i)%species)%mass
       speed2 = dot_product(v, v)
