@@ -23,7 +23,7 @@ module hdf5_series
 
   !> One series. Its name, storage and shape are given, then it is made or opened.
   type :: series_t
-    character(len=:), allocatable :: name
+    character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
     integer :: rank = 0                           !! of one item; 0: a number
     integer :: shape(2) = 1                       !! of one item, as far as it has dimensions
@@ -77,9 +77,9 @@ contains
     if (status >= 0) call prepare_links(links, status)
     if (status >= 0) call h5screate_simple_f(self%rank + 1, &
       int([int(self%shape(:self%rank), int64), capacity], hsize_t), space, status)
-    if (status >= 0) call h5dcreate_f(file%id, self%name, self%storage_type(), space, self%id, status, &
+    if (status >= 0) call h5dcreate_f(file%id, trim(self%name), self%storage_type(), space, self%id, status, &
       properties, links)
-    call file%check(status, "write "//self%name)
+    call file%check(status, "write "//trim(self%name))
     call h5sclose_f(space, closed)
     call h5pclose_f(properties, closed)
     call h5pclose_f(links, closed)
@@ -91,9 +91,9 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer :: status
     if (allocated(file%trouble)) return
-    self%capacity = file%length(self%name)/product(int(self%shape, int64))
-    call h5dopen_f(file%id, self%name, self%id, status)
-    call file%check(status, "be read: "//self%name)
+    self%capacity = file%length(trim(self%name))/product(int(self%shape, int64))
+    call h5dopen_f(file%id, trim(self%name), self%id, status)
+    call file%check(status, "be read: "//trim(self%name))
   end subroutine open_series
 
   subroutine close_series(self)
@@ -212,7 +212,7 @@ contains
     file%unsaved = file%unsaved + count*self%room()
     call select_items(self, first, count, there, here, status)
     if (status >= 0) call h5dwrite_f(self%id, in_memory, address, status, here, there)
-    call file%check(status, "write "//self%name)
+    call file%check(status, "write "//trim(self%name))
     call h5sclose_f(there, closed)
     call h5sclose_f(here, closed)
   end subroutine write_items
@@ -230,7 +230,7 @@ contains
     place = address
     call select_items(self, first, count, there, here, status)
     if (status >= 0) call h5dread_f(self%id, in_memory, place, status, here, there)
-    call file%check(status, "be read: "//self%name)
+    call file%check(status, "be read: "//trim(self%name))
     call h5sclose_f(there, closed)
     call h5sclose_f(here, closed)
   end subroutine read_items

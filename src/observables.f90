@@ -11,7 +11,7 @@ module observables
 
   !> One observable, scalar or vector.
   type :: observable_t
-    character(len=:), allocatable :: name         !! below /observables
+    character(len=64) :: name = ""                !! below /observables
     integer :: width = 1                          !! number of components
     logical :: is_count = .false.                 !! a whole number
   end type observable_t

@@ -157,8 +157,6 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(out) :: frames, samples       !! of frames, of observables; 0: unknown
     type(stop_rule_t) :: rule
-    character(len=80), allocatable :: names(:)
-    integer :: k
     associate (o => settings%output)
       self%progress%frames = cadence_t(o%frames_every_time, o%frames_every_collisions, &
         o%frames_every_events)
@@ -168,11 +166,7 @@ contains
       if (o%event_log) call self%h5md%plan_events()
     end associate
     associate (list => observable_list(sim%species))
-      allocate (names(size(list)))
-      do k = 1, size(list)
-        names(k) = list(k)%name
-      end do
-      call self%h5md%plan_observables(names, list%width, list%is_count)
+      call self%h5md%plan_observables(list%name, list%width, list%is_count)
     end associate
     rule = stop_rule_t(settings%stop, sim)
     frames = self%progress%frames%planned(rule%limits)

@@ -100,10 +100,10 @@ contains
     integer :: k
     if (index(self%series(1)%name, "/step") == 0) return
     do k = 4, size(self%series)
-      element = self%series(k)%name
+      element = trim(self%series(k)%name)
       element = element(:len(element) - len("value"))
-      call file%link(self%series(1)%name, element//"step")
-      call file%link(self%series(2)%name, element//"time")
+      call file%link(trim(self%series(1)%name), element//"step")
+      call file%link(trim(self%series(2)%name), element//"time")
     end do
   end subroutine link_moments
 
