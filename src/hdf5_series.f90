@@ -3,7 +3,7 @@
 !> that a kill at any moment, or a reader, meets a file in order. Small items wait in memory until they are
 !> written together: a call of the library costs as much as a hundred kilobytes.
 module hdf5_series
-  use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr, c_sizeof
   use, intrinsic :: iso_fortran_env, only: int8
   use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5kind_to_type, h5dcreate_f, h5dopen_f, &
     h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5pclose_f, h5screate_simple_f, h5sclose_f, &
@@ -31,9 +31,8 @@ module hdf5_series
     integer(int64) :: capacity = 0                !! items there is room for
     integer(int64), private :: waiting = 0        !! items put but not written
     integer(int64), private :: first_waiting = 0  !! number of the first of them
-    real(real64), allocatable, private :: reals(:)          !! the waiting items, by the kind of their values
-    integer(int32), allocatable, private :: integers(:)
-    integer(int64), allocatable, private :: longs(:)
+    integer(int8), allocatable, private :: batch_of_bytes(:)    !! the waiting items, as they came
+    integer(hid_t), private :: in_memory = -1     !! HDF5 type of their values
     integer(hid_t), private :: id = -1
   contains
     procedure :: make
@@ -44,7 +43,7 @@ module hdf5_series
     procedure :: room
     generic :: put => put_reals, put_integers, put_longs
     procedure, private :: put_reals, put_integers, put_longs
-    procedure, private :: place_in_batch, write_items, read_items, storage_type
+    procedure, private :: put_items, write_items, read_items, storage_type
   end type series_t
 
 contains
@@ -126,15 +125,7 @@ contains
     integer(int64), intent(in) :: first           !! number of the first of these items, from 1
     integer(int64), intent(in) :: count           !! of items
     real(real64), intent(in), target :: values(*)
-    integer(int64) :: n, at
-    if (count >= self%batch) then
-      call self%write_items(file, first, count, h5t_native_double, c_loc(values))
-    else
-      n = product(int(self%shape, int64))
-      if (.not. allocated(self%reals)) allocate (self%reals(n*self%batch))
-      call self%place_in_batch(file, first, count, at)
-      self%reals(n*at + 1:n*(at + count)) = values(:n*count)
-    end if
+    call self%put_items(file, first, count, h5t_native_double, c_sizeof(values(1)), c_loc(values))
   end subroutine put_reals
 
   subroutine put_integers(self, file, first, count, values)
@@ -142,15 +133,7 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
     integer(int32), intent(in), target :: values(*)
-    integer(int64) :: n, at
-    if (count >= self%batch) then
-      call self%write_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
-    else
-      n = product(int(self%shape, int64))
-      if (.not. allocated(self%integers)) allocate (self%integers(n*self%batch))
-      call self%place_in_batch(file, first, count, at)
-      self%integers(n*at + 1:n*(at + count)) = values(:n*count)
-    end if
+    call self%put_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_sizeof(values(1)), c_loc(values))
   end subroutine put_integers
 
   subroutine put_longs(self, file, first, count, values)
@@ -158,46 +141,41 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
     integer(int64), intent(in), target :: values(*)
-    integer(int64) :: n, at
-    if (count >= self%batch) then
-      call self%write_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
-    else
-      n = product(int(self%shape, int64))
-      if (.not. allocated(self%longs)) allocate (self%longs(n*self%batch))
-      call self%place_in_batch(file, first, count, at)
-      self%longs(n*at + 1:n*(at + count)) = values(:n*count)
-    end if
+    call self%put_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_sizeof(values(1)), c_loc(values))
   end subroutine put_longs
 
-  !> Where in the batch the next items go, which is written first if they do not fit.
-  subroutine place_in_batch(self, file, first, count, at)
+  !> Lets the items wait, after those before them have been written if there is no place for all; a whole
+  !> batch is written at once.
+  subroutine put_items(self, file, first, count, in_memory, width, address)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
-    integer(int64), intent(out) :: at             !! items that wait before them
+    integer(hid_t), intent(in) :: in_memory       !! HDF5 type of the values
+    integer(int64), intent(in) :: width           !! of a value in memory [bytes]
+    type(c_ptr), intent(in) :: address
+    integer(int8), pointer :: bytes(:)
+    integer(int64) :: n
+    if (count >= self%batch) then
+      call self%write_items(file, first, count, in_memory, address)
+      return
+    end if
     if (self%waiting + count > self%batch) call self%write_waiting(file)
     if (self%waiting == 0) self%first_waiting = first
-    at = self%waiting
+    n = width*product(int(self%shape, int64))
+    if (.not. allocated(self%batch_of_bytes)) allocate (self%batch_of_bytes(n*self%batch))
+    self%in_memory = in_memory
+    call c_f_pointer(address, bytes, [n*count])
+    self%batch_of_bytes(n*self%waiting + 1:n*(self%waiting + count)) = bytes
     self%waiting = self%waiting + count
-  end subroutine place_in_batch
+  end subroutine put_items
 
   !> Writes the items that wait.
   subroutine write_waiting(self, file)
     class(series_t), intent(inout), target :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64) :: n
-    n = self%waiting
+    if (self%waiting > 0) call self%write_items(file, self%first_waiting, self%waiting, self%in_memory, &
+      c_loc(self%batch_of_bytes))
     self%waiting = 0
-    if (n == 0) return
-    if (allocated(self%reals)) then
-      call self%write_items(file, self%first_waiting, n, h5t_native_double, c_loc(self%reals))
-    else if (allocated(self%integers)) then
-      call self%write_items(file, self%first_waiting, n, h5kind_to_type(int32, h5_integer_kind), &
-        c_loc(self%integers))
-    else
-      call self%write_items(file, self%first_waiting, n, h5kind_to_type(int64, h5_integer_kind), &
-        c_loc(self%longs))
-    end if
   end subroutine write_waiting
 
   subroutine write_items(self, file, first, count, in_memory, address)
