@@ -15,7 +15,7 @@ module run
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requested, seconds, stop_requested, watch_signals
+  use system, only: checkpoint_requested, folder_of, is_folder, seconds, stop_requested, watch_signals
   use texts, only: written
   use time_stepped, only: step_warning
   implicit none
@@ -40,6 +40,7 @@ contains
     type(stop_rule_t) :: stop_rule
     real(real64) :: started, cpu(2)                   ! [s]
     integer(int64) :: before
+    logical :: folder_is_new
     started = seconds()
     input_text = ''
     call watch_signals()
@@ -50,13 +51,16 @@ contains
     else
       call new_simulation(settings, sim, error)
       if (allocated(error)) return
-      call warn(settings, sim, command%quiet)
+      if (.not. command%quiet) call warn(settings, sim)
       if (command%check) then
         write (output_unit, '(a)') command%input//": fine; "//written(int(sim%n_disks()))//" disks"
         return
       end if
+      folder_is_new = .not. is_folder(folder_of(command%output))
       call output%open(command%output, settings, groups, input_text, command%overrides, sim, &
         command%force, error)
+      if (folder_is_new .and. .not. (allocated(error) .or. command%quiet)) write (error_unit, '(a)') &
+        "note: "//folder_of(command%output)//" was not there: it is made for the output"
     end if
     if (allocated(error)) return
     call choose_evolution(settings%run, evolution)
@@ -142,14 +146,15 @@ contains
   end function adapted
 
   !> Says what is legal but seldom meant.
-  subroutine warn(settings, sim, quiet)
+  subroutine warn(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: quiet
     character(len=:), allocatable :: text
-    if (quiet .or. settings%run%dynamics /= 'steps') return
-    text = step_warning(sim, settings%run%dt)
+    text = ''
+    if (settings%run%dynamics == 'steps') text = step_warning(sim, settings%run%dt)
     if (text /= '') write (error_unit, '(a)') "warning: "//text
+    if (settings%stop%energy_fraction > 0 .and. .not. sim%start_energy > 0) write (error_unit, '(a)') &
+      "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn
 
   !> What the run came to, as lines `key = value`.

@@ -10,7 +10,7 @@ module system
   public :: watch_signals, stop_requested, checkpoint_requested
   public :: seconds, is_terminal, leave, host_name, process_id
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, free_bytes, last_problem, lock_t
+  public :: is_folder, folder_of, free_bytes, last_problem, lock_t
 
   integer(c_int), parameter :: sig_hup = 1, sig_int = 2, sig_usr1 = 10, sig_term = 15, &
     sig_xcpu = 24, sig_xfsz = 25

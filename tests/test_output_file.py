@@ -266,8 +266,12 @@ def test_other_tools_read_the_file(ran, tmp_path):
 
 
 def test_folders_are_made_and_nothing_is_left_beside_the_result(ricochet, tmp_path):
-    run = ricochet(write_input(tmp_path), "-o", "some/where/gas.h5")
+    input_file = write_input(tmp_path)
+    run = ricochet(input_file, "-o", "some/where/gas.h5")
     assert run.returncode == FINISHED
+    assert one_line(run) == "note: some/where/ was not there: it is made for the output"
+    run = ricochet(input_file, "-o", "some/where/gas.h5", "--force")
+    assert (run.returncode, run.stderr) == (FINISHED, "")
     assert [path.name for path in (tmp_path / "some/where").iterdir()] == ["gas.h5"]
 
 
@@ -281,6 +285,15 @@ def test_a_finished_file_is_replaced_by_force_only(ricochet, tmp_path):
     run = ricochet(input_file, "-o", path, "--set", "run.seed=8", "--force")
     assert run.returncode == FINISHED
     assert contents(path)["/parameters/seed"] == 8
+
+
+def test_a_run_that_is_over_before_it_begins_says_why(ricochet, tmp_path):
+    rest = ["--set", "species.light.velocities='rest'", "--set", "species.heavy.velocities='rest'"]
+    rest += ["--set", "species.light.temperature=", "--set", "species.heavy.temperature="]
+    input_file = write_input(tmp_path)
+    run = ricochet(input_file, "-o", "gas.h5", *rest, "--set", "stop.energy_fraction=0.1")
+    assert run.returncode == FINISHED and "\ntime = 0\n" in run.stdout
+    assert "nothing moves at the start" in one_line(run)
 
 
 def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
