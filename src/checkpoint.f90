@@ -18,7 +18,7 @@ module checkpoint
   use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of, part_of
   use settings, only: settings_t
   use simulation_state, only: simulation_t
-  use system, only: free_bytes, last_problem, link_file, move_file, remove_file, synchronize
+  use system, only: free_bytes, is_folder, last_problem, link_file, move_file, remove_file, synchronize
   use texts, only: written
   use version, only: program_version
   implicit none
@@ -27,6 +27,7 @@ module checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
   integer, parameter :: header_length = 64
+  character(len=*), parameter :: first_words = "ricochet checkpoint"
   character(len=*), parameter :: eol = new_line("a")
 
   !> Variables that say how a run is done, not what: they may differ when it goes on.
@@ -50,10 +51,10 @@ contains
     new = new_checkpoint_of(path)
     current = checkpoint_of(path)
     call output%save(progress, error)
-    if (.not. allocated(error)) call check_room(new, size(sim%disk, kind=int64), error)
+    if (.not. allocated(error)) call check_room(current, size(sim%disk, kind=int64), error)
     if (allocated(error)) return
     call remove_file(new)
-    call file%create(new, reserved)
+    call file%create(new, reserved, name=current)
     call file%put("program", program())
     call file%put("input", identity(groups))
     call put_state(file, sim)
@@ -65,7 +66,7 @@ contains
       if (done) call synchronize(new, done)
       if (done) call link_file(current, earlier_checkpoint_of(path))
       if (done) call move_file(new, current, done)
-      if (.not. done) call fail(error, exit_files, new//": cannot be written: "//last_problem())
+      if (.not. done) call fail(error, exit_files, current//": cannot be written: "//last_problem())
     end if
     if (allocated(error)) call remove_file(new)
   end subroutine write_checkpoint
@@ -89,7 +90,7 @@ contains
     type(simulation_t), intent(out) :: sim
     type(output_t), intent(inout) :: output
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: current
+    character(len=:), allocatable :: current, flaw
     type(hdf5_file_t) :: file
     type(progress_t) :: progress
     logical :: finished
@@ -99,11 +100,12 @@ contains
     if (finished) then
       call fail(error, exit_files, path//": is finished; there is nothing to go on with")
     else if (.not. is_file(current)) then
-      call fail(error, exit_files, current//": there is no checkpoint to go on from; start without " &
-        //"--resume")
-    else if (.not. is_sealed(current)) then
-      call fail(error, exit_usage, current//": is damaged, its checksum is wrong; the one before is " &
-        //earlier_checkpoint_of(path))
+      call fail(error, exit_files, current//": there is no checkpoint to go on from; " &
+        //way_out(earlier_checkpoint_of(path)))
+    else
+      flaw = flaw_of(current)
+      if (flaw /= "") call fail(error, exit_usage, current//": "//flaw//"; " &
+        //way_out(earlier_checkpoint_of(path)))
     end if
     if (allocated(error)) return
     call file%open(current, writable=.false.)
@@ -117,6 +119,14 @@ contains
     if (.not. allocated(error)) call file%failure(error)
     if (.not. allocated(error)) call output%resume(path, settings, sim, progress, error)
   end subroutine read_checkpoint
+
+  !> What to do without a checkpoint, by whether the one before is whole.
+  function way_out(earlier) result(advice)
+    character(len=*), intent(in) :: earlier
+    character(len=:), allocatable :: advice
+    advice = "the one before is whole: give "//earlier//" its name to go on from there"
+    if (flaw_of(earlier) /= "") advice = "--force instead of --resume starts over"
+  end function way_out
 
   !> What makes two builds give different bits: the version, and arithmetic that is not by the book.
   pure function program() result(text)
@@ -328,23 +338,35 @@ contains
     done = status == 0
     close (unit, iostat=status)
     done = done .and. status == 0
-    if (done) done = is_sealed(path)
+    if (done) done = flaw_of(path) == ""
   end subroutine seal
 
-  function is_sealed(path) result(yes)
+  !> Why a file cannot be believed; nothing if its checksum is right.
+  function flaw_of(path) result(flaw)
     character(len=*), intent(in) :: path
-    logical :: yes
+    character(len=:), allocatable :: flaw
     character(len=header_length) :: header
+    integer(int64) :: bytes
     integer :: unit, status
+    flaw = "cannot be read"
+    if (is_folder(path)) flaw = "is a folder"
     open (newunit=unit, file=path, access="stream", form="unformatted", action="read", &
       status="old", iostat=status)
-    yes = status == 0
-    if (.not. yes) return
-    read (unit, iostat=status) header
+    if (status /= 0) return
+    inquire (unit, size=bytes)
+    header = ""
+    read (unit, iostat=status) header(:max(0_int64, min(bytes, len(header, int64))))
     close (unit)
-    yes = status == 0
-    if (yes) yes = header == header_of(path)
-  end function is_sealed
+    if (status /= 0) return
+    flaw = ""
+    if (bytes == 0) then
+      flaw = "is empty"
+    else if (header(:len(first_words)) /= first_words) then
+      flaw = "is no checkpoint, or is damaged: it does not begin like one"
+    else if (header /= header_of(path)) then
+      flaw = "is damaged or cut short: its checksum is wrong"
+    end if
+  end function flaw_of
 
   !> The first bytes of a checkpoint, by what follows them.
   function header_of(path) result(header)
@@ -352,7 +374,7 @@ contains
     character(len=header_length) :: header
     integer(int64) :: crc
     call crc_of_file(path, header_length + 1_int64, crc)
-    header = "ricochet checkpoint, CRC-64 of the rest: "//hexadecimal(crc)
+    header = first_words//", CRC-64 of the rest: "//hexadecimal(crc)
     header(header_length:) = eol
   end function header_of
 

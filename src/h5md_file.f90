@@ -192,7 +192,7 @@ contains
     call self%write_all()
     if (allocated(self%file%trouble)) return
     call remove_file(self%file%path//"_new")
-    call new%file%create(self%file%path//"_new", 0)
+    call new%file%create(self%file%path//"_new", 0, name=self%file%path)
     do k = 1, size(fixed)
       call new%file%copy(self%file, trim(fixed(k)))
     end do
@@ -204,7 +204,7 @@ contains
     call new%observables%copy(new%file, self%observables, self%file, capacity(2))
     call new%events%copy(new%file, self%events, self%file, capacity(3))
     call new%file%flush()
-    call new%file%rename(self%file%path)
+    call new%file%rename()
     if (allocated(new%file%trouble)) then
       self%file%trouble = new%file%trouble
       self%file%unsaved = new%file%unsaved

@@ -29,6 +29,7 @@ module hdf5_objects
 
   type :: hdf5_file_t
     character(len=:), allocatable :: path
+    character(len=:), allocatable :: name         !! that people know it by: its path once it is whole
     character(len=:), allocatable :: trouble      !! what failed first; allocated: nothing is done any more
     integer(hid_t) :: id = -1
     integer(int64) :: unsaved = 0        !! written since the last flush [bytes]
@@ -69,10 +70,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (.not. allocated(self%trouble)) return
     if (self%unsaved > 0) then
-      call fail(error, exit_files, self%path//": cannot "//self%trouble//": "//written(self%unsaved) &
+      call fail(error, exit_files, self%name//": cannot "//self%trouble//": "//written(self%unsaved) &
         //" bytes needed, "//written(free_bytes(self%path))//" bytes free")
     else
-      call fail(error, exit_files, self%path//": cannot "//self%trouble)
+      call fail(error, exit_files, self%name//": cannot "//self%trouble)
     end if
   end subroutine failure
 
@@ -98,13 +99,16 @@ contains
   end subroutine prepare_access
 
   !> A new file; there must be none of this name. The first `reserved` bytes are left to the caller.
-  subroutine create(self, path, reserved)
+  subroutine create(self, path, reserved, name)
     class(hdf5_file_t), intent(out) :: self
     character(len=*), intent(in) :: path
     integer, intent(in) :: reserved               !! 0, 512 or 512 times a power of 2 [bytes]
+    character(len=*), intent(in), optional :: name     !! to be given to it when it is whole; default: path
     integer(hid_t) :: access, creation
     integer :: status, closed
     self%path = path
+    self%name = path
+    if (present(name)) self%name = name
     call prepare_access(access, status)
     if (status >= 0) call h5pcreate_f(h5p_file_create_f, creation, status)
     if (status >= 0 .and. reserved > 0) call h5pset_userblock_f(creation, int(reserved, hsize_t), status)
@@ -121,21 +125,21 @@ contains
     integer(hid_t) :: access
     integer :: status, closed
     self%path = path
+    self%name = path
     call prepare_access(access, status)
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
-    call self%check(status, "be read: it is damaged, or no HDF5 file, or not for you")
+    call self%check(status, "be read: it is damaged, or no HDF5 file, or you lack the rights")
     call h5pclose_f(access, closed)
   end subroutine open_file
 
-  !> Gives the open file another name.
-  subroutine rename_file(self, path)
+  !> Gives the open file its name, in the place of what had it.
+  subroutine rename_file(self)
     class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: path
     logical :: moved
     if (allocated(self%trouble)) return
-    call move_file(self%path, path, moved)
-    if (.not. moved) call self%check(-1, "be renamed to "//path//": "//last_problem())
-    if (moved) self%path = path
+    call move_file(self%path, self%name, moved)
+    if (.not. moved) call self%check(-1, "take its name: "//last_problem())
+    if (moved) self%path = self%name
   end subroutine rename_file
 
   !> All that was written goes to the operating system: it outlives a kill of the program.

@@ -89,13 +89,13 @@ contains
       call remove_file(part_of(path))
       call remove_file(new_part_of(path))
       associate (h5md => self%h5md)
-        call h5md%file%create(new_part_of(path), 0)
+        call h5md%file%create(new_part_of(path), 0, name=part_of(path))
         call describe_run(h5md%file, settings, groups, input_text, overrides, sim)
         call h5md%make_tracks(frames, samples)
         call self%write_frame(sim)
         call self%write_observables(sim)
         call h5md%write_all()
-        call h5md%file%rename(part_of(path))
+        call h5md%file%rename()
         call h5md%file%failure(error)
       end associate
       call remove_file(new_part_of(path))           ! if it failed: nothing of use is in it
@@ -112,6 +112,11 @@ contains
     type(progress_t), intent(in) :: progress
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: frames, samples
+    if (.not. is_file(part_of(path))) then
+      call fail(error, exit_files, part_of(path)//": is missing: without the samples written so far the " &
+        //"checkpoint is of no use; --force instead of --resume starts over")
+      return
+    end if
     call self%claim(path, error)
     if (allocated(error)) return
     call self%plan(settings, sim, frames, samples)

@@ -1,6 +1,7 @@
 """One run is the same run stopped and resumed, bit for bit; what no run can resume is refused."""
 
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -161,10 +162,38 @@ def test_a_damaged_checkpoint_is_refused(ricochet, tmp_path, stopped, trials):
             damaged = damaged[: k * len(whole) // trials]
         path.write_bytes(damaged)
         run = ricochet(*stopped, "--resume")
-        assert run.returncode == USAGE and "damaged" in one_line(run)
+        assert run.returncode == USAGE and re.search("damaged|is empty", one_line(run))
     path.write_bytes(whole)
     run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9")
     assert run.returncode == STOPPED
+
+
+def test_what_is_no_checkpoint_is_called_what_it_is(ricochet, tmp_path, stopped):
+    """And the way out that is named is there."""
+    path, earlier = tmp_path / "gas.chk.h5", tmp_path / "gas.chk_prev.h5"
+    assert ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9").returncode == STOPPED
+    whole = path.read_bytes()
+    for content, flaw in [
+        (b"", "is empty"),
+        (b"ricochet", "is no checkpoint"),
+        (whole[:40], "is damaged or cut short"),
+        (whole[:-1], "is damaged or cut short"),
+        (b"notes\n" * 100, "is no checkpoint"),
+        ((tmp_path / "gas.h5.part").read_bytes(), "is no checkpoint"),
+    ]:
+        path.write_bytes(content)
+        run = ricochet(*stopped, "--resume")
+        assert run.returncode == USAGE
+        assert one_line(run).startswith(f"gas.chk.h5: {flaw}") and "gas.chk_prev.h5" in run.stderr
+    earlier.rename(path)
+    earlier.write_bytes(whole[:-1])
+    assert ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9").returncode == STOPPED
+    path.unlink()
+    path.mkdir()
+    earlier.unlink()
+    run = ricochet(*stopped, "--resume")
+    assert run.returncode == USAGE
+    assert one_line(run) == "gas.chk.h5: is a folder; --force instead of --resume starts over"
 
 
 def test_the_checkpoint_before_is_kept_and_is_as_good(ricochet, tmp_path):
