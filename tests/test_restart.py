@@ -1,11 +1,15 @@
 """One run is the same run stopped and resumed, bit for bit; what no run can resume is refused."""
 
+import itertools
+import os
 import random
 import re
 import shutil
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import h5py
 import pytest
@@ -21,64 +25,100 @@ from whole_runs import (
     write_input,
 )
 
-GAS = "&species name = 'gas' count = 150 radius = 0.02 speed = 1 /\n"
-OUTPUT = "&output frames_every_time = 0.05 observables_every_collisions = 30 event_log = .true. /\n"
-STOP = "&stop time = 30 /\n"
-INELASTIC = "&contact restitution = 0.99 wall_rule = 'normal' contact_time = 1e-3 /\n"
-FALLING = "&box upper = 1, 2 gravity = 0.1, -1 /\n"
-SYSTEMS = {
-    "walls": GAS + OUTPUT + STOP,
-    "inelastic": GAS + INELASTIC + OUTPUT + STOP,
-    "periodic": GAS + "&box boundary = 'periodic', 'periodic' /\n" + OUTPUT + STOP,
-    "channel": GAS + "&box boundary = 'periodic', 'wall' gravity = 0, -1 /\n" + OUTPUT + STOP,
-    "gravity": GAS + FALLING + OUTPUT + STOP,
-    "obstacles": GAS
-    + "&obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 /\n"
-    + "&obstacle name = 'pot' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n"
-    + OUTPUT
-    + STOP,
-    "giant": GAS + "&species name = 'giant' count = 1 mass = 50 radius = 0.2 /\n" + OUTPUT + STOP,
-    "heap": GAS + "&run queue = 'heap' /\n" + OUTPUT + STOP,
-    "pairs": GAS + "&run search = 'pairs' /\n" + OUTPUT + STOP,
-    "steps": GAS + "&run dynamics = 'steps' dt = 1e-3 /\n" + OUTPUT + STOP,
-    "events": GAS
-    + "&output frames_every_events = 77 observables_every_time = 0.1 precision = 'single' /\n"
-    + "&stop collisions_per_disk = 300 /\n",
-    "first and last": GAS + STOP,
+CHECK = pytest.mark.check
+GAS = "&species name = 'gas' count = 40 radius = 0.02 speed = 1 /\n"
+#: Every combination of these is a system of its own.
+CHOICES = {
+    "dynamics": {
+        "cells": "",
+        "heap": "&run queue = 'heap' /",
+        "pairs": "&run search = 'pairs' /",
+        "rescan": "&run search = 'rescan' /",
+        "steps": "&run dynamics = 'steps' dt = 2e-3 /",
+        "steps by pairs": "&run dynamics = 'steps' dt = 2e-3 search = 'pairs' /",
+    },
+    "box": {
+        "walls": "",
+        "falling": "&box gravity = 0.1, -1 /",
+        "channel": "&box boundary = 'periodic', 'wall' /",
+        "falling channel": "&box boundary = 'periodic', 'wall' gravity = 0, -1 /",
+        "periodic": "&box boundary = 'periodic', 'periodic' /",
+    },
+    "obstacles": {
+        "free": "",
+        "peg in a pot": "&obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 /"
+        " &obstacle name = 'pot' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /",
+    },
+    "species": {
+        "equal": "",
+        "giants": "&species name = 'giant' count = 2 mass = 50 radius = 0.1 /",
+    },
+    "contact": {
+        "elastic": "",
+        "inelastic": "&contact restitution = 0.99 wall_rule = 'normal' contact_time = 5e-3 /",
+    },
+    "output": {
+        "growing": "&output frames_every_time = 0.05 observables_every_collisions = 30"
+        " event_log = .true. / &stop time = 20 /",
+        "planned": "&output frames_every_events = 77 observables_every_events = 31"
+        " precision = 'single' / &stop events = 4000 /",
+        "mixed": "&output frames_every_collisions = 50 frames_every_time = 0.3"
+        " observables_every_time = 0.1 / &stop collisions_per_disk = 80 /",
+        "ends": "&stop time = 20 /",
+    },
 }
+SYSTEMS = list(itertools.product(*(choice.values() for choice in CHOICES.values())))
 
 
-def stop_now_and_then(program, command, folder, duration, rng, most=20):
+def stops_until_the_end(program, command, folder, longest, rng, most):
     """Runs to the end with stops at random moments; how often it was stopped."""
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     for stops in range(most + 1):
         resume = ["--resume"] if list(folder.glob("*.chk.h5")) else []
         process = subprocess.Popen(
-            [program, *command, *resume], cwd=folder, stderr=subprocess.PIPE, text=True
+            [program, *command, *resume], cwd=folder, text=True, **pipes
         )
         if stops < most:
-            time.sleep(rng.uniform(0.01, duration))
+            time.sleep(rng.uniform(0, longest))
             process.send_signal(rng.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
         message = process.communicate(timeout=60)[1]
         if process.returncode == FINISHED:
             return stops
         # a signal before the program has set its handler ends it as it would any other
         assert process.returncode in (STOPPED, -15, -2, -1), message
-    return None
+    raise AssertionError("the last part of the run did not come to its end")
 
 
-@pytest.mark.parametrize("longer", [1, pytest.param(30, marks=pytest.mark.check)])
-@pytest.mark.parametrize("system", SYSTEMS)
-def test_one_run_is_the_same_run_stopped_and_resumed(program, ricochet, tmp_path, system, longer):
-    text = SYSTEMS[system].replace("time = 30", f"time = {30 * longer}")
-    write_input(tmp_path, text.replace("disk = 300", f"disk = {300 * longer}"))
+def stopped_and_whole(program, most, folder, system):
+    """Stops of a run in parts, and where its output differs from that of the run in one piece."""
+    folder.mkdir()
+    write_input(folder, GAS + "\n".join(system) + "\n")
     begin = time.monotonic()
-    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    command = [program, "gas.nml", "-o", "whole.h5", "--quiet"]
+    whole = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL)
     duration = time.monotonic() - begin
     command = ["gas.nml", "-o", "parts.h5", "--quiet"]
-    longest = duration / min(10, 2 * longer)
-    stops = stop_now_and_then(program, command, tmp_path, longest, random.Random(system))
-    assert stops is not None
-    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+    rng = random.Random(str(system))
+    stops = stops_until_the_end(program, command, folder, duration / 10, rng, most)
+    other = differences(folder / "whole.h5", folder / "parts.h5")
+    shutil.rmtree(folder)
+    return stops, [whole.returncode, *other]
+
+
+@pytest.mark.parametrize(("stride", "most"), [(41, 8), pytest.param(1, 20, marks=CHECK)])
+def test_one_run_is_the_same_run_stopped_and_resumed(program, tmp_path, stride, most):
+    """For every combination of the choices; fast: for some, in which every choice occurs."""
+    systems = SYSTEMS[::stride]
+    for k, choice in enumerate(CHOICES.values()):
+        assert {system[k] for system in systems} == set(choice.values())
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        folders = (tmp_path / str(k) for k in range(len(systems)))
+        results = list(pool.map(partial(stopped_and_whole, program, most), folders, systems))
+    failed = {
+        system: found for system, (_, found) in zip(systems, results, strict=True) if found != [0]
+    }
+    assert failed == {}
+    assert sum(stops for stops, _ in results) > most / 2 * len(systems)
 
 
 @pytest.fixture
@@ -98,7 +138,7 @@ def stopped(ricochet, tmp_path):
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
     """The wall clock stops a run at once, so that every resume makes one little step."""
-    write_input(tmp_path, SYSTEMS["walls"])
+    write_input(tmp_path, GAS + SYSTEMS[0][-1])
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
     assert ricochet(*short, "whole.h5").returncode == FINISHED
@@ -150,7 +190,7 @@ def test_a_checkpoint_of_another_version_is_refused(ricochet, tmp_path, stopped)
     assert run.returncode == USAGE and "ricochet 0.0.9" in one_line(run)
 
 
-@pytest.mark.parametrize("trials", [60, pytest.param(600, marks=pytest.mark.check)])
+@pytest.mark.parametrize("trials", [60, pytest.param(600, marks=CHECK)])
 def test_a_damaged_checkpoint_is_refused(ricochet, tmp_path, stopped, trials):
     path = tmp_path / "gas.chk.h5"
     whole, rng = path.read_bytes(), random.Random(1)
