@@ -10,14 +10,14 @@ module system
   public :: watch_signals, stop_requested, checkpoint_requested
   public :: seconds, is_terminal, leave, host_name, process_id
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, folder_of, free_bytes, last_problem, lock_t
+  public :: is_folder, folder_of, obstacle_to_opening, free_bytes, last_problem, lock_t
 
   integer(c_int), parameter :: sig_hup = 1, sig_int = 2, sig_usr1 = 10, sig_term = 15, &
     sig_xcpu = 24, sig_xfsz = 25
   integer(c_intptr_t), parameter :: by_default = 0, ignored = 1      !! SIG_DFL, SIG_IGN
   integer(c_int), parameter :: read_only = 0, read_write = 2, create = 64
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4    !! of flock
-  integer(c_int), parameter :: would_block = 11                      !! EAGAIN
+  integer(c_int), parameter :: would_block = 11, already_there = 17  !! EAGAIN, EEXIST
   integer(c_int), parameter :: all_may = 511, owner_writes = 420     !! modes 0777 and 0644
 
   !> Launchers often send a signal twice within moments; only a later one means impatience. [s]
@@ -253,10 +253,13 @@ contains
   subroutine make_folders_of(path, made)
     character(len=*), intent(in) :: path
     logical, intent(out) :: made
-    integer(c_int) :: status
     integer :: k
     do k = 2, len(path)
-      if (path(k:k) == "/") status = c_mkdir(path(:k - 1)//c_null_char, all_may)
+      if (path(k:k) /= "/") cycle
+      if (is_folder(path(:k - 1))) cycle
+      made = c_mkdir(path(:k - 1)//c_null_char, all_may) == 0
+      if (.not. made) made = error_number() == already_there     ! a twin was faster
+      if (.not. made) return
     end do
     made = is_folder(folder_of(path))
   end subroutine make_folders_of
@@ -272,6 +275,18 @@ contains
     done = c_fsync(descriptor) == 0
     status = c_close(descriptor)
   end subroutine synchronize
+
+  !> Why a file cannot be opened, in the system's words; nothing if it can.
+  function obstacle_to_opening(path, writable) result(text)
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: writable
+    character(len=:), allocatable :: text
+    integer(c_int) :: descriptor, status
+    text = ""
+    descriptor = c_open(path//c_null_char, merge(read_write, read_only, writable), 0_c_int)
+    if (descriptor < 0) text = last_problem()
+    if (descriptor >= 0) status = c_close(descriptor)
+  end function obstacle_to_opening
 
   function is_folder(path) result(yes)
     character(len=*), intent(in) :: path

@@ -2,6 +2,7 @@
 
 import random
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -32,7 +33,8 @@ PLANNED = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 &output frames_every_time = 0.01 observables_every_time = 0.004 checkpoint_every = 0.05 /
 """
 LONG = ["--set", "stop.collisions=1000000000", "--set", "output.checkpoint_every="]
-FRAMES = "/particles/disks/position/value"
+#: What a run says on a disk without room: which file, how much is wanted, how much is free.
+NO_ROOM = r"^disk/gas\.(h5|h5\.part|chk\.h5): .*: (\d+ bytes needed, \d+ bytes free|.* are free.*)$"
 
 
 @pytest.fixture
@@ -69,6 +71,14 @@ def frames_in(path) -> int:
         return 0
 
 
+def frames_by_h5dump(path) -> int:
+    """The same, as another version of the library reads it; it must."""
+    parts = ["-d", "/particles/disks/committed", "-d", "/particles/disks/position/step"]
+    run = subprocess.run(["h5dump", *parts, path], capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+    return int(re.search(r"\(0\): (\d+)", run.stdout)[1])
+
+
 @pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])
 @pytest.mark.parametrize("tries", [20, pytest.param(200, marks=pytest.mark.check)])
 def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
@@ -93,6 +103,8 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
             found = committed(part)
             assert len(found["particles/disks/position/time"]) > 0
             assert is_beginning(found, whole) == []
+            if shutil.which("h5dump"):
+                assert frames_by_h5dump(part) == len(found["particles/disks/position/time"])
     assert killed > tries / 4
     resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
     assert ricochet("gas.nml", "-o", "gas.h5", *resume).returncode == FINISHED
@@ -226,13 +238,13 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """`small_disk(kilobytes)` gives a folder on a disk of that size; needs the rights of root."""
+    """`small_disk(kilobytes, mode)` gives a folder on such a disk; needs the rights of root."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = []
 
-    def mount(kilobytes):
-        options = f"size={kilobytes}k" + (",remount" if mounted else "")
+    def mount(kilobytes, mode="rw"):
+        options = f"size={kilobytes}k,{mode}" + (",remount" if mounted else "")
         command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
         if subprocess.run(command, capture_output=True).returncode != 0:
             pytest.skip("cannot mount a small disk here: needs root")
@@ -244,27 +256,31 @@ def small_disk(tmp_path):
         subprocess.run(["umount", folder], check=True)
 
 
-def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk):
-    """Forty sizes, from no room for the layout to nearly all."""
-    write_input(tmp_path, BUSY.replace("20000", "6000"))
+@pytest.mark.parametrize("sizes", [6, pytest.param(40, marks=pytest.mark.check)])
+def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk, sizes):
+    """From 64 kB, no room for the layout, to 4 MB; with more room the run goes on."""
+    write_input(tmp_path, BUSY.replace("every = 0.05", "every = 0.01"))
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
-    needed = (tmp_path / "whole.h5").stat().st_size // 1024
-    stopped = 0
-    for k in range(40):
-        folder = small_disk(64 + (needed - 64) * k // 40)
+    stopped = resumed = 0
+    for k in range(sizes):
+        folder = small_disk(64 + 4032 * k // (sizes - 1))
         run = ricochet("gas.nml", "-o", "disk/gas.h5")
         assert run.returncode == FILES
-        line = one_line(run)
-        assert re.search(r"^disk/.*: (\d+ bytes needed, \d+ bytes free|.* are free.*)$", line)
+        assert re.search(NO_ROOM, one_line(run)), run.stderr
         if (part := folder / "gas.h5.part").exists():
             stopped += 1
             found = committed(part)
             assert len(found["particles/disks/position/time"]) > 0
             assert is_beginning(found, whole) == []
+        if (folder / "gas.chk.h5").exists():
+            resumed += 1
+            small_disk(100_000)
+            assert ricochet("gas.nml", "-o", "disk/gas.h5", "--resume").returncode == FINISHED
+            assert differences(tmp_path / "whole.h5", folder / "gas.h5") == []
         for path in folder.iterdir():
             path.unlink()
-    assert stopped > 30
+    assert resumed >= sizes / 2 and stopped >= resumed
 
 
 def test_a_disk_that_others_fill_costs_no_earlier_sample(ricochet, started, tmp_path, small_disk):
@@ -309,6 +325,23 @@ def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
     )
     assert run.returncode == FILES and "gas.h5.part" in one_line(run)
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+def test_a_disk_for_reading_only_is_left_as_it_is(ricochet, tmp_path, small_disk):
+    """Neither a new run, nor a new folder, nor a stopped run that is to go on."""
+    write_input(tmp_path, MIXTURE)
+    folder = small_disk(4000)
+    stopped = ["gas.nml", "-o", "disk/gas.h5", "--set", "stop.wall_clock=1e-9"]
+    assert ricochet(*stopped).returncode == STOPPED
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    small_disk(4000, "ro")
+    for place, option in [("gas", "--resume"), ("new", "--quiet"), ("some/where/new", "--quiet")]:
+        run = ricochet("gas.nml", "-o", f"disk/{place}.h5", option)
+        assert run.returncode == FILES
+        assert one_line(run).startswith(f"disk/{place}.h5") and "Read-only" in run.stderr
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    small_disk(4000, "rw")
+    assert ricochet("gas.nml", "-o", "disk/gas.h5", "--resume").returncode == FINISHED
 
 
 def test_the_planned_output_is_compared_with_the_room(ricochet, tmp_path, small_disk):

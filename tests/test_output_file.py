@@ -304,6 +304,7 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
         ("folder", "is a folder"),
         ("file/gas.h5", "cannot make its folder"),
         ("/proc/gas.h5", "cannot be created"),
+        ("/proc/some/where/gas.h5", "cannot make its folder"),
         ("/dev/null", "is there already"),
     ]:
         run = ricochet(input_file, "-o", place)
