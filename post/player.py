@@ -26,15 +26,21 @@ from snapshot import LABELS, chosen_frames, default_colour, values_of
 PAGE = Path(__file__).with_suffix(".html")
 ROOM = 29e6  # bytes of base64 for the disks
 MOST_FRAMES = 20000
+MOST_AT_ONCE = 200000  # disks, of all frames that are worked on together
 FEW_DISKS = 1000  # up to here traces through periodic sides are exact
 BINS = 40  # of the speed histogram
 FEWEST = 10  # disks of a species that has a histogram
 
 
 def frames_that_fit(run: Run) -> int:
-    """How many frames the file can hold: two 16-bit positions, an 8-bit colour per quantity."""
-    one = run.count * (4 + len(quantities(run))) * 4 / 3
-    return int(np.clip(ROOM / one, 2, MOST_FRAMES))
+    """How many frames the file can hold.
+
+    Each disk needs two 16-bit positions and an 8-bit colour per quantity; time, energies and
+    histograms are in words.
+    """
+    one = run.count * (4 + len(quantities(run)) + (run.image is not None)) * 4 / 3
+    words = 40 + 200 * len(run.names)
+    return int(np.clip(ROOM / (one + words), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:
@@ -42,9 +48,9 @@ def quantities(run: Run) -> list[str]:
     return [name for name in LABELS if name != "collisions" or run.collisions is not None]
 
 
-def coded_positions(run: Run, frame: int) -> np.ndarray:
-    """(N, 2) positions in the box as 16-bit integers."""
-    inside = (run.position[frame] - run.lower) / run.edges
+def coded_positions(run: Run, frames: list[int]) -> np.ndarray:
+    """(T, N, 2) positions in the box as 16-bit integers."""
+    inside = (run.position[frames] - run.lower) / run.edges
     return np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
 
 
@@ -55,16 +61,16 @@ def coded(values: np.ndarray, top: float, log: bool) -> np.ndarray:
     return np.round(255 * np.clip(values / top, 0, 1)).astype(np.uint8)
 
 
-def coded_shifts(run: Run, frame: int, before: int) -> np.ndarray:
-    """(N,) periods crossed along x and y since the frame `before`, four bits each."""
-    crossed = np.clip(run.image[frame] - run.image[before], -7, 7) + 8
-    return (16 * crossed[:, 0] + crossed[:, 1]).astype(np.uint8)
+def coded_shifts(run: Run, frames: list[int], before: int) -> np.ndarray:
+    """(T, N) periods crossed along x and y since the frame before, four bits each."""
+    crossed = np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8
+    return (16 * crossed[..., 0] + crossed[..., 1]).astype(np.uint8)
 
 
 def scale_top(run: Run, frames: list[int], name: str) -> float:
     """The upper end of a colour scale, from some frames; a few fast disks do not count."""
     some = frames[:: max(1, len(frames) // 40)]
-    values = np.concatenate([values_of(run, frame, name) for frame in {*some, frames[-1]}])
+    values = values_of(run, sorted({*some, frames[-1]}), name)
     moved = values[values > 0]
     return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
 
@@ -89,20 +95,27 @@ def species(run: Run) -> list[dict]:
     ]
 
 
-def mean_energies(run: Run, frame: int) -> tuple[list[float], list[float]]:
-    """Kinetic and potential energy per disk of each species."""
-    kinetic = run.kinetic_energy(frame)
-    potential = -run.mass * (run.unwrapped(frame) @ run.gravity)
-    return tuple([significant(e[own].mean()) for own in masks(run)] for e in (kinetic, potential))
+def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[list[float]]]:
+    """Kinetic and potential energy per disk of each species, frame by frame."""
+    kinetic = run.kinetic_energy(frames)
+    potential = -run.mass * (run.unwrapped(frames) @ run.gravity)
+    means = ([e[:, own].mean(axis=1) for own in masks(run)] for e in (kinetic, potential))
+    return tuple([list(map(significant, row)) for row in np.transpose(m)] for m in means)
 
 
-def speed_counts(run: Run, frame: int, top: float) -> list[list[int]]:
-    """Histogram of the speeds of each species; empty for one of few disks."""
-    speed = run.speed(frame)
-    return [
-        np.histogram(speed[own], BINS, (0, top))[0].tolist() if own.sum() >= FEWEST else []
+def speed_counts(run: Run, frames: list[int], top: float) -> list[list[list[int]]]:
+    """Histograms of the speeds of each species, frame by frame; empty for one of few disks."""
+    bins = np.floor(run.speed(frames) * (BINS / top)).astype(int)
+    bins[bins >= BINS] = BINS  # the fastest, which are not shown
+    bins += (BINS + 1) * np.arange(len(frames))[:, None]
+    size = (BINS + 1) * len(frames)
+    counts = [
+        np.bincount(bins[:, own].ravel(), minlength=size).reshape(-1, BINS + 1)[:, :BINS].tolist()
+        if own.sum() >= FEWEST
+        else [[]] * len(frames)
         for own in masks(run)
     ]
+    return list(map(list, zip(*counts, strict=True)))
 
 
 def significant(value: float) -> float:
@@ -118,16 +131,22 @@ def film(run: Run, frames: list[int], colour: str, disk: int | None) -> tuple[di
     shifted, before = run.image is not None and run.count <= FEW_DISKS, frames[0]
     shifts = blocks.setdefault("shifts", bytearray()) if shifted else None
     kinetic, potential, counts = [], [], []
-    for frame in tqdm(frames, unit="frame", desc="player", disable=None):
-        blocks["positions"] += coded_positions(run, frame).tobytes()
-        for name, top in tops.items():
-            blocks[name] += coded(values_of(run, frame, name), top, name == "collisions").tobytes()
-        if shifted:
-            shifts += coded_shifts(run, frame, before).tobytes()
-            before = frame
-        for series, value in zip((kinetic, potential), mean_energies(run, frame), strict=True):
-            series.append(value)
-        counts.append(speed_counts(run, frame, fastest))
+    with tqdm(total=len(frames), unit="frame", desc="player", disable=None) as progress:
+        at_once = max(1, MOST_AT_ONCE // run.count)
+        for first in range(0, len(frames), at_once):
+            some = frames[first : first + at_once]
+            blocks["positions"] += coded_positions(run, some).tobytes()
+            for name, top in tops.items():
+                values = values_of(run, some, name)
+                blocks[name] += coded(values, top, name == "collisions").tobytes()
+            if shifted:
+                shifts += coded_shifts(run, some, before).tobytes()
+                before = some[-1]
+            means = mean_energies(run, some)
+            kinetic += means[0]
+            potential += means[1]
+            counts += speed_counts(run, some, fastest)
+            progress.update(len(some))
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {

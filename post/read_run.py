@@ -4,7 +4,7 @@
     run = read_run("runs/gas.h5")
     run.time                 # (T,)    times of the frames
     run.position[-1]         # (N, 2)  one frame, read from the file when asked for
-    run.speed(-1)            # (N,)    derived quantities take a frame index or a slice
+    run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
 T frames of N disks.  All quantities are in the units of the input file ("reduced units").
@@ -63,7 +63,8 @@ class Frames:
     def __len__(self) -> int:
         return self.count
 
-    def __getitem__(self, frame: int | slice) -> np.ndarray:
+    def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
+        backwards = False
         if isinstance(frame, slice):
             start, stop, step = frame.indices(self.count)
             backwards = step < 0
@@ -72,9 +73,10 @@ class Frames:
                 start, stop, step = picked.start, picked.stop, picked.step
             chosen = slice(start, max(start, stop), step)
         else:
-            if not -self.count <= frame < self.count:
-                raise RunError(f"{self.path}: no frame {frame}, there are {self.count}")
-            chosen, backwards = int(frame) % self.count, False
+            for one in frame if isinstance(frame, list) else [frame]:
+                if not -self.count <= one < self.count:
+                    raise RunError(f"{self.path}: no frame {one}, there are {self.count}")
+            chosen = np.mod(frame, self.count).tolist()
         values = read_values(self.path, f"{DISKS}/{self.name}/value", chosen)
         values = values.astype(float) if values.dtype.kind == "f" else values
         return values[::-1] if backwards else values
@@ -125,21 +127,21 @@ class Run:
             raise RunError(f"{self.path}: no species '{name}', there are {', '.join(self.names)}")
         return self.species == self.names.index(name) + 1
 
-    def speed(self, frame: int | slice) -> np.ndarray:
+    def speed(self, frame: int | slice | list[int]) -> np.ndarray:
         """(..., N) length of the velocity."""
         return np.linalg.norm(self.velocity[frame], axis=-1)
 
-    def kinetic_energy(self, frame: int | slice) -> np.ndarray:
+    def kinetic_energy(self, frame: int | slice | list[int]) -> np.ndarray:
         """(..., N) m v^2 / 2."""
         return 0.5 * self.mass * np.sum(self.velocity[frame] ** 2, axis=-1)
 
-    def unwrapped(self, frame: int | slice) -> np.ndarray:
+    def unwrapped(self, frame: int | slice | list[int]) -> np.ndarray:
         """(..., N, 2) position with whole periods added: continuous in time."""
         if self.image is None:
             return self.position[frame]
         return self.position[frame] + self.image[frame] * self.edges
 
-    def displacement(self, frame: int | slice, origin: int = 0) -> np.ndarray:
+    def displacement(self, frame: int | slice | list[int], origin: int = 0) -> np.ndarray:
         """(..., N) distance travelled as the crow flies since the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
@@ -230,11 +232,14 @@ def open_file(path: Path) -> h5py.File:
         raise RunError(f"{path}: {state}") from None
 
 
-def read_values(path: Path, name: str, chosen: int | slice) -> np.ndarray:
+def read_values(path: Path, name: str, chosen: int | slice | list[int]) -> np.ndarray:
     """A part of a dataset; damage that shows only on reading is a RunError too."""
     with open_file(path) as file:
         try:
-            return file[name][chosen]
+            values = file[name]
+            if isinstance(chosen, list):  # far faster than a list as index in h5py
+                return np.stack([values[k] for k in chosen])
+            return values[chosen]
         except (OSError, RuntimeError, KeyError):
             raise RunError(f"{path}: cannot read {name}, the file is damaged") from None
 
