@@ -302,13 +302,15 @@ judge_by_files() {
   done
 }
 
+# TERM must meet the script itself: a shell above it would die at once, and GNU parallel would take
+# that for the end of the share, and go on with its sequence.
 run_parallel() {
-  local options=(--will-cite -j "$jobs" --termseq 'TERM,600000,KILL,1000') child
+  local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
   prepare_shares 1000000
   [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
   [[ ! -t 2 ]] || options+=(--bar)
-  parallel "${options[@]}" "${share_command[@]}" "{}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
+  parallel "${options[@]}" "exec $(printf '%q ' "${share_command[@]}"){}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
   child=$!
   trap 'stopped=1; kill -TERM "$child" 2>/dev/null' TERM INT HUP
   while kill -0 "$child" 2>/dev/null; do wait "$child" || true; done
