@@ -189,9 +189,9 @@ lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
-	@$(venv) -m ruff check --quiet --output-format concise post tests
+	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 lint-shell:
-	@shellcheck --format gcc .ci/run .ci/set-up $(wildcard runs/*.sh tests/*.sh tests/support/*.sh)
+	@shellcheck --format gcc .ci/run .ci/set-up $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 lint-design:
 	@$(venv) tests/support/check_style.py
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic_run import ROOT, run_script, write_run
 
-from read_run import Obstacle, RunError, mdanalysis_universe, read_run
+from read_run import Obstacle, RunError, read_run
 
 SCRIPTS = [
     "speeds",
@@ -191,13 +191,3 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "new" / "a.png").exists()
-
-
-def test_mdanalysis_reads_the_bridge(small):
-    pytest.importorskip("MDAnalysis")
-    universe = mdanalysis_universe(read_run(small))
-    assert len(universe.trajectory) == 3 and universe.trajectory.dt == 0.5
-    universe.trajectory[2]
-    np.testing.assert_allclose(universe.atoms.positions, [[0, 0.5, 0], [0.9, 0.5, 0]], atol=1e-7)
-    np.testing.assert_allclose(universe.atoms.velocities[0], [-3, 4, 0])
-    np.testing.assert_allclose(universe.select_atoms("type light").masses, [1])
