@@ -1,8 +1,8 @@
 !> The command line: options, names of any length, and the answers to --help and its like.
 module command_line
-  use, intrinsic :: iso_fortran_env, only: output_unit
   use errors, only: error_t, exit_usage, fail
   use parameters, only: defaults_text, explain
+  use system, only: print_text
   use texts, only: nearest_word, shown, text_t
   use version, only: program_version
   implicit none
@@ -180,7 +180,7 @@ contains
       call explain(command%topic, text, error)
       if (allocated(error)) return
     end select
-    write (output_unit, '(a)') text
+    call print_text(text, error)
   end subroutine answer
 
   !> One screen.

@@ -4,7 +4,7 @@ program main
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
   use run, only: perform_run
-  use system, only: leave
+  use system, only: fill_standard_streams, leave
   implicit none
   call serve()
 
@@ -17,6 +17,7 @@ contains
     type(error_t), allocatable :: error
     integer :: code
     code = exit_finished
+    call fill_standard_streams()
     call read_command_line(command, error)
     if (.not. allocated(error)) then
       if (command%question /= '') then

@@ -10,6 +10,7 @@ module namelist_input
   use parameter_values, only: parameter_group_t, parameter_value_t, text_length
   use parameters, only: group_names, is_repeated, row_of, table, variables_of
   use settings, only: settings_t
+  use similar_files, only: similar_file
   use texts, only: joined, lower_case, shown, suggestion, text_t, written
   implicit none
   private
@@ -76,7 +77,7 @@ contains
     logical :: exists, is_folder
     inquire (file=path, exist=exists, size=bytes)
     inquire (file=path//'/.', exist=is_folder)
-    if (.not. exists) call fail(error, exit_files, path//': there is no such file')
+    if (.not. exists) call fail(error, exit_files, path//': there is no such file'//meant(path))
     if (is_folder) call fail(error, exit_files, path//': is a folder, not an input file')
     if (allocated(error)) return
     if (bytes <= 0) call fail(error, exit_usage, path//': is empty or not a regular file')
@@ -96,6 +97,14 @@ contains
     if (odd > 0) call fail(error, exit_usage, path//': is not a text file: byte '//written(odd)// &
       ' is a control character, code '//written(iachar(text(odd:odd))))
   end subroutine read_text
+
+  !> What to say of a file that is not there.
+  function meant(path) result(advice)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: advice
+    advice = similar_file(path, '.nml')
+    if (advice /= '') advice = '; did you mean '//advice//'?'
+  end function meant
 
   !> Position of the first byte that no text file has; 0 if there is none.
   pure function first_odd_byte(text) result(position)

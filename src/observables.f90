@@ -7,7 +7,7 @@ module observables
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: observable_t, observable_list, observed_values
+  public :: observable_t, observable_list, observed_values, total_energy
 
   !> One observable, scalar or vector.
   type :: observable_t
@@ -65,6 +65,15 @@ contains
       pressure(sim, sums(0)%kinetic), sim%virial, sim%dissipated, real(sim%collisions, real64), &
       real(sim%wall_collisions, real64), sim%wall_impulse, real(sim%obstacle_collisions, real64)]
   end function observed_values
+
+  !> Kinetic and potential energy of all disks.
+  pure function total_energy(sim) result(energy)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: energy
+    type(sums_t) :: sums(0:size(sim%species))
+    call add_up(sim, sums)
+    energy = sums(0)%kinetic + sums(0)%potential
+  end function total_energy
 
   !> One pass over the disks. Heights count from the origin.
   pure subroutine add_up(sim, sums)

@@ -324,17 +324,18 @@ contains
 
   !> Ends the output of a finished run: the last samples, unused room given up, a look at
   !> the file, its final name.
-  subroutine finish(self, sim, wall_seconds, error)
+  subroutine finish(self, sim, wall_seconds, rate, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: wall_seconds      !! since the start or the last resume [s]
+    real(real64), intent(in) :: rate              !! collisions per processor time since then [1/s]
     type(error_t), allocatable, intent(out) :: error
     logical :: moved
     if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
     associate (h5md => self%h5md)
       call h5md%trim()
-      call describe_cost(h5md%file, sim, self%progress%spent + wall_seconds)
+      call describe_cost(h5md%file, self%progress%spent + wall_seconds, rate)
       call h5md%close()
       call h5md%file%failure(error)
     end associate

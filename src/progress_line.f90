@@ -4,19 +4,22 @@ module progress_line
   use kinds, only: int64, never, real64
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: is_terminal, seconds
+  use system, only: seconds, talks_to_terminal
   implicit none
   private
   public :: progress_line_t
 
   real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
   integer, parameter :: window = 20                !! reports over which rates are taken
+  character(len=*), parameter :: erase_rest = achar(27)//'[K', &   !! of the terminal's line
+    no_wrap = achar(27)//'[?7l', wrap = achar(27)//'[?7h'          !! a narrow terminal cuts the line
 
   type :: progress_line_t
     private
     logical :: quiet = .false.
     logical :: terminal = .false.
     real(real64) :: pause = file_pause             !! between reports [s]
+    real(real64) :: started = 0.0_real64           !! where the wall clock began [s]
     real(real64) :: next_report = 0.0_real64       !! [s]
     integer :: n = 0                               !! reports so far
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! of the last reports [s]
@@ -30,13 +33,15 @@ module progress_line
 
 contains
 
-  subroutine start(self, sim, stop_rule, quiet)
+  subroutine start(self, sim, stop_rule, started, quiet)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
+    real(real64), intent(in) :: started            !! when the program did [s]
     logical, intent(in) :: quiet
     self%quiet = quiet
-    self%terminal = is_terminal(error_unit)
+    self%started = started
+    self%terminal = talks_to_terminal()
     self%pause = merge(terminal_pause, file_pause, self%terminal)
     self%next_report = seconds() + self%pause
     self%n = 0
@@ -65,7 +70,7 @@ contains
     write (line, '("t ",g0.6,"  ",f5.1," %  ",i0," collisions  ",a," per s  ETA ",a)') sim%time(), &
       100*self%share(last), sim%collisions, short_number(rate), clock_text(left)
     if (self%terminal) then
-      write (error_unit, '(a,a,a)', advance='no') achar(13), trim(line), achar(27)//'[K'
+      write (error_unit, '(a)', advance='no') achar(13)//no_wrap//trim(line)//erase_rest//wrap
     else
       write (error_unit, '(a)') trim(line)
     end if
@@ -75,7 +80,7 @@ contains
   !> Wipes the line from the terminal, so that what follows stands alone.
   subroutine clear(self)
     class(progress_line_t), intent(in) :: self
-    if (self%terminal .and. self%n > 1) write (error_unit, '(a)', advance='no') achar(13)//achar(27)//'[K'
+    if (self%terminal .and. self%n > 1) write (error_unit, '(a)', advance='no') achar(13)//erase_rest
     flush (error_unit)
   end subroutine clear
 
@@ -87,7 +92,7 @@ contains
     integer :: k
     k = modulo(self%n, window)
     self%clock(k) = seconds()
-    self%share(k) = stop_rule%share(sim)
+    self%share(k) = stop_rule%share(sim, self%clock(k) - self%started)
     self%collisions(k) = sim%collisions
     self%n = self%n + 1
   end subroutine remember

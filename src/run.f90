@@ -1,6 +1,6 @@
 !> One run, from the input file to the finished output.
 module run
-  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use checkpoint, only: read_checkpoint, write_checkpoint
   use command_line, only: command_t
   use errors, only: error_t, exit_stopped, exit_usage, fail
@@ -8,6 +8,7 @@ module run
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
   use namelist_input, only: read_settings
+  use observables, only: total_energy
   use output, only: output_t
   use parameter_values, only: parameter_group_t
   use progress_line, only: progress_line_t
@@ -15,7 +16,8 @@ module run
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requested, folder_of, is_folder, seconds, stop_requested, watch_signals
+  use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, &
+    watch_signals
   use texts, only: written
   use time_stepped, only: step_warning
   implicit none
@@ -38,7 +40,7 @@ contains
     type(output_t) :: output
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: stop_rule
-    real(real64) :: started, cpu(2)                   ! [s]
+    real(real64) :: started, cpu(2), rate             ! [s], [1/s]
     integer(int64) :: before
     logical :: folder_is_new
     started = seconds()
@@ -53,7 +55,7 @@ contains
       if (allocated(error)) return
       if (.not. command%quiet) call warn(settings, sim)
       if (command%check) then
-        write (output_unit, '(a)') command%input//": fine; "//written(int(sim%n_disks()))//" disks"
+        call print_text(command%input//": fine; "//written(int(sim%n_disks()))//" disks", error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
@@ -71,11 +73,13 @@ contains
     call evolution%start(sim)
     call main_loop(command, settings, groups, sim, evolution, stop_rule, output, started, error)
     call cpu_time(cpu(2))
-    if (.not. allocated(error)) call output%finish(sim, seconds() - started, error)
-    if (.not. allocated(error)) call write_summary(command%output, sim, stop_rule, &
-      seconds() - started, (sim%collisions - before)/max(cpu(2) - cpu(1), 1.0e-9_real64))
+    rate = (sim%collisions - before)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    if (.not. allocated(error)) call output%finish(sim, seconds() - started, rate, error)
+    if (.not. allocated(error)) &
+      call print_text(summary(command%output, sim, stop_rule, seconds() - started, rate), error)
     call output%release()
   end subroutine perform_run
+
   !> Lets the simulation move from one thing that is due to the next, until its end.
   subroutine main_loop(command, settings, groups, sim, evolution, stop_rule, output, started, error)
     type(command_t), intent(in) :: command
@@ -94,7 +98,7 @@ contains
     turns = 1
     looked = seconds()
     next_checkpoint = looked + settings%output%checkpoint_every
-    call line%start(sim, stop_rule, command%quiet)
+    call line%start(sim, stop_rule, started, command%quiet)
     do while (.not. is_over(sim, evolution, stop_rule))
       limits = stop_rule%limits
       limits%time = min(limits%time, output%next_time())
@@ -158,22 +162,27 @@ contains
   end subroutine warn
 
   !> What the run came to, as lines `key = value`.
-  subroutine write_summary(path, sim, stop_rule, elapsed, rate)
+  function summary(path, sim, stop_rule, elapsed, rate) result(text)
     character(len=*), intent(in) :: path
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
     real(real64), intent(in) :: elapsed               !! wall time of the whole run [s]
     real(real64), intent(in) :: rate                  !! collisions per processor time of the simulation [1/s]
-    write (output_unit, '(a)') "output = "//path
-    write (output_unit, '(a,i0)') "disks = ", sim%n_disks(), "collisions = ", sim%collisions, &
-      "wall_collisions = ", sum(sim%wall_collisions), "obstacle_collisions = ", sim%obstacle_collisions
-    write (output_unit, '(a)') "time = "//written(sim%time()), &
-      "kinetic_energy = "//written(sim%kinetic_energy()), &
-      "dissipated_energy = "//written(sim%dissipated), &
-      "wall_time = "//written(elapsed), &
-      "collisions_per_second = "//written(rate)
-    if (.not. stop_rule%met(sim)) write (output_unit, '(a)') &
+    character(len=:), allocatable :: text
+    character(len=1), parameter :: eol = new_line("a")
+    text = "output = "//path// &
+      eol//"disks = "//written(int(sim%n_disks()))// &
+      eol//"collisions = "//written(sim%collisions)// &
+      eol//"wall_collisions = "//written(sum(sim%wall_collisions))// &
+      eol//"obstacle_collisions = "//written(sim%obstacle_collisions)// &
+      eol//"time = "//written(sim%time())// &
+      eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
+      eol//"total_energy = "//written(total_energy(sim))// &
+      eol//"dissipated_energy = "//written(sim%dissipated)// &
+      eol//"wall_time = "//written(elapsed)// &
+      eol//"collisions_per_second = "//written(rate)
+    if (.not. stop_rule%met(sim)) text = text//eol// &
       "note = nothing will ever happen any more: the run ended before its stop rule was met"
-  end subroutine write_summary
+  end function summary
 
 end module run

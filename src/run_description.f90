@@ -37,7 +37,7 @@ contains
     if (allocated(sim%box%obstacle)) call describe_obstacles(file, sim%box%obstacle)
     call file%put("parameters/seed", [integer ::], [settings%run%seed])
     call describe_origin(file)
-    call describe_cost(file, sim, 0.0_real64)            ! so that nothing is added at the end
+    call describe_cost(file, 0.0_real64, 0.0_real64)     ! so that nothing is added at the end
   end subroutine describe_run
 
   subroutine describe_format(file)
@@ -202,13 +202,12 @@ contains
   end subroutine describe_origin
 
   !> Writes, or writes anew, what is known at the end only.
-  subroutine describe_cost(file, sim, wall_seconds)
+  subroutine describe_cost(file, wall_seconds, rate)
     type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
+    real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
     call file%put("provenance@wall_time", [integer ::], [wall_seconds])
-    call file%put("provenance@collisions_per_second", [integer ::], &
-      [sim%collisions/max(wall_seconds, tiny(wall_seconds))])
+    call file%put("provenance@collisions_per_second", [integer ::], [rate])
   end subroutine describe_cost
 
 end module run_description

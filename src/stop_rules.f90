@@ -49,12 +49,14 @@ contains
   end function met
 
   !> How much of the run is done, from 0 to 1, by the rule that is nearest to its end.
-  pure function share(self, sim) result(done)
+  pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: elapsed      !! by the wall clock [s]
     real(real64) :: done
     done = max(sim%time()/self%limits%time, real(sim%collisions, real64)/self%limits%collisions, &
-      real(sim%events, real64)/self%limits%events, sim%dissipated/max(self%limits%dissipated, tiny(done)))
+      real(sim%events, real64)/self%limits%events, sim%dissipated/max(self%limits%dissipated, tiny(done)), &
+      elapsed/max(self%wall_clock, tiny(done)))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share
 

@@ -1,16 +1,18 @@
 !> What the language does not offer, by the C library (Linux with glibc, 64 bits): signals, the monotonic
 !> clock, terminals, file locks, atomic renames, room on a disk, and an exit that prints nothing.
 module system
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, &
-    c_intptr_t, c_long, c_null_char, c_ptr, c_size_t
-  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, &
+    c_int64_t, c_intptr_t, c_long, c_null_char, c_ptr, c_short, c_size_t
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use errors, only: error_t, exit_files, fail
   use kinds, only: int64, real64
   implicit none
   private
   public :: watch_signals, stop_requested, checkpoint_requested
-  public :: seconds, is_terminal, leave, host_name, process_id
+  public :: seconds, talks_to_terminal, leave, host_name, process_id
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, folder_of, obstacle_to_opening, free_bytes, last_problem, lock_t
+  public :: is_folder, folder_of, list_folder, obstacle_to_opening, free_bytes, last_problem, lock_t
+  public :: fill_standard_streams, print_text
 
   integer(c_int), parameter :: sig_hup = 1, sig_int = 2, sig_usr1 = 10, sig_term = 15, &
     sig_xcpu = 24, sig_xfsz = 25
@@ -36,6 +38,14 @@ module system
     procedure :: acquire
     procedure :: release
   end type lock_t
+
+  !> A file in a folder, as readdir gives it.
+  type, bind(C) :: entry_t
+    integer(c_int64_t) :: number, offset
+    integer(c_short) :: length
+    character(kind=c_char) :: kind
+    character(kind=c_char) :: name(256)
+  end type entry_t
 
   interface
     function c_signal(number, handler) bind(C, name="signal") result(previous)
@@ -106,6 +116,21 @@ module system
       integer(c_int), value :: descriptor
       integer(c_int) :: status
     end function c_close
+    function c_opendir(path) bind(C, name="opendir") result(folder)
+      import :: c_char, c_ptr
+      character(kind=c_char), intent(in) :: path(*)
+      type(c_ptr) :: folder
+    end function c_opendir
+    function c_readdir(folder) bind(C, name="readdir") result(entry)
+      import :: c_ptr
+      type(c_ptr), value :: folder
+      type(c_ptr) :: entry
+    end function c_readdir
+    function c_closedir(folder) bind(C, name="closedir") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: folder
+      integer(c_int) :: status
+    end function c_closedir
     function c_fsync(descriptor) bind(C, name="fsync") result(status)
       import :: c_int
       integer(c_int), value :: descriptor
@@ -146,6 +171,34 @@ module system
   end interface
 
 contains
+
+  !> Standard streams that the caller has closed lead nowhere. Otherwise the first files that are opened would
+  !> take their places, and messages would end up in them.
+  subroutine fill_standard_streams()
+    integer(c_int) :: descriptor, status
+    do
+      descriptor = c_open("/dev/null"//c_null_char, read_write, 0_c_int)
+      if (descriptor < 0 .or. descriptor > 2) exit
+    end do
+    if (descriptor > 2) status = c_close(descriptor)
+  end subroutine fill_standard_streams
+
+  !> Writes lines to the standard output. Fortran's own `write` does not tell when the disk behind it is full.
+  subroutine print_text(text, error)
+    character(len=*), intent(in) :: text             !! without the last line end
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: left
+    integer(c_size_t) :: written
+    left = text//new_line("a")
+    do while (len(left) > 0)
+      written = c_write(1_c_int, left, len(left, c_size_t))
+      if (written < 0) then
+        call fail(error, exit_files, "standard output: cannot be written: "//last_problem())
+        return
+      end if
+      left = left(written + 1:)
+    end do
+  end subroutine print_text
 
   !> From now on TERM, INT, HUP and XCPU ask for a stop with a checkpoint, USR1 for a checkpoint; what the
   !> caller chose to ignore (nohup) stays ignored. A file that grows beyond its limit is a failed write.
@@ -199,17 +252,15 @@ contains
     t = real(time(1), real64) + 1.0e-9_real64*real(time(2), real64)
   end function seconds
 
-  !> Whether the standard stream (1 output, 2 error) is a terminal.
-  function is_terminal(stream) result(yes)
-    integer, intent(in) :: stream
+  !> Whether messages, on the standard error, go to a terminal.
+  function talks_to_terminal() result(yes)
     logical :: yes
-    yes = c_isatty(int(stream, c_int)) == 1
-  end function is_terminal
+    yes = c_isatty(2_c_int) == 1                   ! its descriptor: not the number of Fortran's unit
+  end function talks_to_terminal
 
   !> Ends the program with an exit status, without a word.
   subroutine leave(code)
     integer, intent(in) :: code
-    flush (output_unit)
     flush (error_unit)
     call c_exit(int(code, c_int))
   end subroutine leave
@@ -301,6 +352,38 @@ contains
     folder = path(:index(path, "/", back=.true.))
     if (folder == "") folder = "."
   end function folder_of
+
+  !> The names in a folder, up to 2000; none if it cannot be read.
+  subroutine list_folder(folder, names)
+    character(len=*), intent(in) :: folder
+    character(len=256), allocatable, intent(out) :: names(:)
+    integer, parameter :: most = 2000
+    type(c_ptr) :: handle, address
+    type(entry_t), pointer :: entry
+    integer(c_int) :: status
+    allocate (names(0))
+    handle = c_opendir(folder//c_null_char)
+    if (.not. c_associated(handle)) return
+    do while (size(names) < most)
+      address = c_readdir(handle)
+      if (.not. c_associated(address)) exit
+      call c_f_pointer(address, entry)
+      names = [names, text_of(entry%name)]
+    end do
+    status = c_closedir(handle)
+  end subroutine list_folder
+
+  !> The letters up to the zero byte.
+  pure function text_of(letters) result(text)
+    character(kind=c_char), intent(in) :: letters(256)
+    character(len=256) :: text
+    integer :: k
+    text = ""
+    do k = 1, len(text)
+      if (letters(k) == c_null_char) exit
+      text(k:k) = letters(k)
+    end do
+  end function text_of
 
   !> Room that is left on the disk where the file is or will be; huge if nobody knows. [bytes]
   function free_bytes(path) result(bytes)

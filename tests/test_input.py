@@ -168,6 +168,34 @@ def test_names_too_long_for_the_system_are_reported(ricochet):
     assert len(lines_of(run)) == 1
 
 
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        ("my/gass.nml", "my/gas.nml"),  # a slip
+        ("my/gas", "my/gas.nml"),  # the ending is missing
+        ("cratre.nml", "input/crater.nml"),  # the folder, too
+        ("nowhere/crater.nml", "input/crater.nml"),
+    ],
+)
+def test_a_file_that_is_not_there_suggests_the_right_one(ricochet, tmp_path, asked, meant):
+    for path in ("my/gas.nml", "my/gas.txt", "input/crater.nml"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
+    run = ricochet(asked)
+    assert run.returncode == FILES
+    assert lines_of(run) == [f"{asked}: there is no such file; did you mean {meant}?"]
+    assert lines_of(ricochet("other.nml")) == ["other.nml: there is no such file"]
+
+
+@pytest.mark.parametrize("command", [["--help"], ["--check", "gas.nml"], ["--quiet", "gas.nml"]])
+def test_a_full_disk_behind_stdout_is_reported(ricochet, tmp_path, command):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    with Path("/dev/full").open("w") as full:
+        run = ricochet(*command, capture_output=False, stdout=full, stderr=subprocess.PIPE)
+    assert run.returncode == FILES
+    assert lines_of(run) == ["standard output: cannot be written: No space left on device"]
+
+
 @pytest.mark.parametrize("command", [["--help"], ["--version"], ["--explain", "restitution"]])
 def test_questions_are_answered_on_stdout(ricochet, command):
     run = ricochet(*command)

@@ -1,11 +1,14 @@
 """What a kill, a signal, a full disk, a twin or a curious reader can do to a run: nothing."""
 
+import os
+import pty
 import random
 import re
 import shutil
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import h5py
 import pytest
@@ -127,6 +130,35 @@ def test_a_kill_while_checkpoints_are_written_leaves_a_whole_one(
         assert process.communicate()[1] == ""
     run = ricochet(*always, "--resume", "--set", "stop.wall_clock=1e-3")
     assert run.returncode == STOPPED
+
+
+def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
+    """Else messages would be written into them."""
+    command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
+    shell = ["bash", "-c", 'exec "$@" <&- >&- 2>&-', "bash", *map(str, command)]
+    process = subprocess.Popen(shell, cwd=tmp_path)
+    try:
+        wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 0)
+        places = Path(f"/proc/{process.pid}/fd")
+        assert [str((places / str(k)).readlink()) for k in range(3)] == ["/dev/null"] * 3
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_progress_stays_on_one_line_of_a_narrow_terminal(program, tmp_path):
+    """It is cut, not wrapped; the share done is also that of the wall clock."""
+    text = BUSY.replace("collisions = 20000", "wall_clock = 1")
+    write_input(tmp_path, text)
+    screen, keyboard = pty.openpty()
+    run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
+    assert run.wait(timeout=20) == STOPPED
+    os.close(keyboard)
+    shown = os.read(screen, 65536).decode()
+    os.close(screen)
+    lines = re.findall(r"\r\x1b\[\?7l(.*?)\x1b\[K\x1b\[\?7h", shown)
+    shares = [float(re.search(r"([\d.]+) %", line)[1]) for line in lines]
+    assert len(shares) >= 2 and 0 < shares[0] < shares[-1] <= 100
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])

@@ -265,6 +265,16 @@ def test_other_tools_read_the_file(ran, tmp_path):
     assert "3.75, 4" in dump.stdout
 
 
+def test_the_summary_says_what_the_file_says(ricochet, tmp_path):
+    run = ricochet(write_input(tmp_path), "-o", "gas.h5")
+    said = dict(line.split(" = ") for line in run.stdout.splitlines())
+    found = contents(tmp_path / "gas.h5")
+    for name in ("total_energy", "dissipated_energy", "collisions"):
+        assert float(said[name]) == pytest.approx(found[f"/observables/{name}/value"][-1], rel=1e-6)
+    rate = found["/provenance@collisions_per_second"]
+    assert float(said["collisions_per_second"]) == pytest.approx(rate, rel=1e-6)
+
+
 def test_folders_are_made_and_nothing_is_left_beside_the_result(ricochet, tmp_path):
     input_file = write_input(tmp_path)
     run = ricochet(input_file, "-o", "some/where/gas.h5")
