@@ -80,7 +80,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
             axes.set(yscale="log", ylim=(0.8 * floor, 2), xlim=(0, x[-1]))
             axes.set_xlabel("collisions per disk" if row else "time (reduced units)")
             if column == 0:
-                axes.set_ylabel("$\\langle K \\rangle / K_0$")
+                axes.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
             if row == 0:
                 axes.set_title(f"ξ = {xi:g}")
             if row == column == 0:

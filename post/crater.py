@@ -182,9 +182,10 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     hits.set_title("collisions of each disk, drawn where it lay")
     scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
     bar = figure.colorbar(
-        scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02, label="1 + collisions"
+        scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02, label="collisions"
     )
-    bar.set_ticks(np.arange(top + 1), labels=[f"{10**k:.0f}" for k in np.arange(top + 1)])
+    ticks = [0, *(10**k for k in range(int(top) + 1))]
+    bar.set_ticks(np.log10(1.0 + np.array(ticks[:-1])), labels=ticks[:-1])
     draw_energy(energy, run)
     tip = projectile(run)
     lying = np.flatnonzero(bed(run))[0]

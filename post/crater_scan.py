@@ -29,11 +29,12 @@ from read_run import Run
 from theory import Estimate, PowerLaw, estimate, fit_power_law
 
 AXES = {
-    "mass": "mass of the projectile / mass of a bed disk",
-    "speed": "speed of the projectile (reduced units)",
-    "radius": "radius of the projectile / radius of a bed disk",
+    "mass": "mass of the projectile / mass of a bed disk, $M$",
+    "speed": "speed of the projectile $v$ (reduced units)",
+    "radius": "radius of the projectile / radius of a bed disk, $R$",
     "restitution": "restitution ξ",
 }
+SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # fitted against
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
 EXTENTS = {"width": "width", "depth": "depth"}
 
@@ -118,7 +119,6 @@ def draw_sizes(
 ) -> None:
     """Some of the sizes with their fits on one pair of axes."""
     x = np.array([p.x for p in points])
-    base = "(1-ξ^2)" if axis == "restitution" else "x"
     free = np.array([p.free for p in points])
     for (name, title), colour, marker in zip(names.items(), colours, "osD^", strict=False):
         y = np.array([p.sizes[name].mean for p in points])
@@ -127,7 +127,7 @@ def draw_sizes(
         label = title
         if fit:
             power = f"{fit.exponent:z.2f} \\pm {fit.exponent_error:.2f}"
-            label += f", $\\propto {base}^{{{power}}}$"
+            label += f", $\\propto {SYMBOLS[axis]}^{{{power}}}$"
             inside = np.linspace(x[free].min(), x[free].max(), 200)
             inside = inside[abscissa(axis, inside) > 0]
             axes.plot(inside, fit(abscissa(axis, inside)), color=colour, lw=1, ls="-")

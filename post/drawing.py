@@ -83,7 +83,7 @@ def species_label(run: Run, name: str) -> str:
 
 
 def draw_box(axes: plt.Axes, run: Run) -> None:
-    """Walls solid, periodic sides dashed, obstacles grey; equal scales, no ticks."""
+    """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners."""
     (x0, y0), (x1, y1) = run.lower, run.upper
     for axis, (xs, ys) in (
         (0, ((x0, x0), (y0, y1))),
@@ -100,7 +100,13 @@ def draw_box(axes: plt.Axes, run: Run) -> None:
             axes.add_patch(
                 Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
             )
-    axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1), xticks=[], yticks=[])
+    axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1))
+    axes.set_xticks([x0, x1], [f"{x0:g}", f"{x1:g}"])
+    axes.set_yticks([y0, y1], [f"{y0:g}", f"{y1:g}"])
+    axes.set_xlabel("x", labelpad=-8)
+    axes.set_ylabel("y", labelpad=-8)
+    axes.tick_params(length=3)
+    axes.label_outer()
     axes.spines[:].set_visible(False)
 
 

@@ -71,7 +71,7 @@ def draw(found: Divergence) -> plt.Figure:
     label = f"$e^{{\\lambda t}}$, $\\lambda$ = {mean_slope:.3f} ± {error:.3f}"
     axes.plot(t, np.exp(line), color=COLOURS[1], lw=2.5, ls="--", label=label)
     axes.set(xlabel="time t (reduced units)", ylabel="distance of the positions (reduced units)")
-    axes.legend(loc="lower right")
+    axes.legend(loc="upper left")
     return figure
 
 

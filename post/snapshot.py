@@ -8,6 +8,7 @@ Colour: species, speed, displacement from the first frame, or collisions so far.
 """
 
 import numpy as np
+from matplotlib.colors import to_rgba_array
 
 from drawing import (
     COLOURS,
@@ -57,6 +58,11 @@ def panel_grid(count: int, aspect: float) -> tuple[int, int]:
     return rows, int(np.ceil(count / rows))
 
 
+def darker(colours: list[str]) -> np.ndarray:
+    """(N, 4) the same hues, which stand out against them."""
+    return to_rgba_array(colours) * (0.6, 0.6, 0.6, 1)
+
+
 def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -> None:
     """Velocities as arrows; `longest` is the speed drawn as a tenth of the box."""
     scale = longest / (0.1 * run.edges.max())
@@ -89,7 +95,7 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
             style = {"array": values[k], "clim": limits}
         disks = disk_collection(axes, run, run.position[frames[k]], **style)
         if quiver:
-            arrows = species_colours(run) if colour == "species" else "0.2"
+            arrows = darker(species_colours(run)) if colour == "species" else "0.2"
             draw_arrows(axes, run, frames[k], longest, arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":

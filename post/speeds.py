@@ -7,7 +7,8 @@ equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at
 u is v itself.  Runs of the same N are put together.  Equilibrium takes the frames after --skip
 collisions per disk that are at least --apart collisions per disk from each other (then they
 count as independent).  Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law,
-KS against the exact law of N disks that share a fixed energy.  a2 = <v^4> / (2 <v^2>^2) - 1.
+KS against the exact law of N disks that share a fixed energy, which matters if they are few.
+a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 import numpy as np
@@ -148,14 +149,13 @@ def draw(groups: list, samples: list[np.ndarray], tests: dict) -> plt.Figure:
         last, [reduced_speeds(largest, [-1])], [f"one frame, t = {time:.4g}, N = {largest.count}"]
     )
     last.set_title("One frame at the end")
+    columns = (tests[key] for key in ("N", "speeds", "KS_D", "KS_p", "KS_p_exact"))
     labels = [
-        f"N = {n}: {size} speeds, KS D = {d:.4f}, p = {p:.2g}"
-        for n, size, d, p in zip(
-            tests["N"], tests["speeds"], tests["KS_D"], tests["KS_p"], strict=True
-        )
+        f"N = {n}: {size} speeds\nKS D = {d:.4f}, p = {p:.2g} (at fixed energy {q:.2g})"
+        for n, size, d, p, q in zip(*columns, strict=True)
     ]
     draw_histogram(pooled, samples, labels)
-    pooled.set(title="Equilibrium, many frames", ylim=(0, 1.25))
+    pooled.set(title="Equilibrium, many frames", ylim=(0, 1.1 + 0.25 * len(groups)))
     draw_relaxation(way, groups)
     way.set_title("The way to equilibrium")
     figure.suptitle(caption(everyone), fontsize=10)
