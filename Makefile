@@ -146,13 +146,14 @@ jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/demo/
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
-	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force
+	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
 	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
+	$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement
 	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
 	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
-	@echo 'In runs/demo: the crater (crater.png), the speeds of the gas (speeds.png), its last state (gas.png);'
-	@echo 'the data are in crater.h5 and gas.h5.'
+	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
+	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
 
 figures:  ## reproduces the figures of every system into runs/figures/ (long)
 	@.ci/set-up demo
