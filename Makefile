@@ -1,10 +1,10 @@
 # Ricochet. `make` builds the program, `make help` lists everything.
 #
-#   BUILD=folder      where everything generated goes; another set of flags wants another folder
+#   BUILD=folder      where all that is made goes; other flags want another folder
 #   DEBUG=1           all run-time checks, no optimisation, in build/debug
-#   ARCH=x86-64-v3    code for other machines than this one (a cluster); default: this machine
+#   ARCH=x86-64-v3    code for other machines, such as a cluster; default: this one
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
-#   PFUNIT_DIR=folder an installed pFUnit; without it the tests run on the substitute in tests/support
+#   PFUNIT_DIR=folder an installed pFUnit; else unit tests run on a substitute
 #   V=1               shows the commands
 #
 # Modules and their order are derived from src/*.f90: file name = module name.
@@ -41,7 +41,8 @@ objects := $(modules:%=$(BUILD)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-.PHONY: all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean help FORCE
+targets := all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean help
+.PHONY: $(targets) FORCE
 
 all: $(BUILD)/ricochet  ## builds the program (default)
 
@@ -143,7 +144,7 @@ $(BUILD)/tests.inc: FORCE | $(BUILD)
 venv := .venv/bin/python
 jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
-demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/demo/
+demo:  ## sets up, builds, runs crater and gas, draws them in runs/demo/
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002
@@ -155,7 +156,7 @@ demo:  ## sets up, builds, runs the crater and the gas, draws them into runs/dem
 	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
 	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
 
-figures:  ## reproduces the figures of every system into runs/figures/ (long)
+figures:  ## reproduces the figures of every system in runs/figures/ (long)
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
@@ -175,11 +176,11 @@ check:  ## validates the physics and provokes faults (minutes)
 bench: all  ## measures collisions per second
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh
 
-bench-check: all  ## holds instructions per collision against what is promised (valgrind)
+bench-check: all  ## counts instructions per collision against what is promised
 	@.ci/set-up bench
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh --check
 
-lint:  ## compiler warnings, fortitude, fprettify, ruff, shellcheck, and the rules of the design
+lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint
 	@$(MAKE) $(jobs) --keep-going --output-sync lint-compiler lint-fortran lint-python lint-shell lint-design
 
@@ -213,6 +214,12 @@ set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 
 clean:  ## removes what was built; runs/ and .venv stay
 	rm -rf '$(BUILD)'
+
+nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1); \
+  print(*(f"; did you mean {name}?" for name in near))
+.DEFAULT:
+	@echo "There is no target and no file $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null)" >&2; \
+	  echo '`make help` lists the targets.' >&2; exit 2
 
 help:  ## this list
 	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile

@@ -2,10 +2,12 @@
 
 import argparse
 import csv
+import re
 import sys
 from collections.abc import Callable, Iterable
 from itertools import groupby
 from pathlib import Path
+from typing import NoReturn
 
 import matplotlib
 
@@ -16,7 +18,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.patches import Circle, Rectangle
 
-from read_run import Run, RunError, read_run
+from read_run import Run, RunError, did_you_mean, read_run
 
 plt.style.use(Path(__file__).with_name("ricochet.mplstyle"))
 
@@ -24,11 +26,21 @@ COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
 WALL = {"color": "0.25", "linewidth": 1.2}
 
 
+class Parser(argparse.ArgumentParser):
+    """Answers a wrong option or choice with the right one."""
+
+    def error(self, message: str) -> NoReturn:
+        words = [*self._option_string_actions, *re.findall(r"'([^']*)'", message)[1:]]
+        for wrong in re.findall(r"unrecognized arguments: (-[^\s=]+)|choice: '([^']*)'", message):
+            message += did_you_mean("".join(wrong), words)
+        super().error(message)
+
+
 def command_line(
     doc: str, output: str, one: bool = False, table: bool = False
 ) -> argparse.ArgumentParser:
     """A parser whose help is the script's docstring; `one` run or any number, --csv or not."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     if one:

@@ -12,8 +12,9 @@ Frames are read on demand, so a file may be larger than the memory.  A file that
 being written (`.part`) is read up to its last committed frame.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -219,7 +220,9 @@ def open_file(path: Path) -> h5py.File:
     """The HDF5 file for reading, also while a simulation writes it."""
     if not path.exists():
         part = Path(f"{path}.part")
-        hint = f", but there is {part} of an unfinished run" if part.exists() else ""
+        near = (f"{other}" for other in path.parent.glob("*.h5*") if ".chk." not in other.name)
+        hint = f", but there is {part} of an unfinished run" if part.exists() else None
+        hint = hint or did_you_mean(str(path), near)
         raise RunError(f"{path}: no such file{hint}")
     if path.is_dir():
         raise RunError(f"{path}: is a folder, not a run")
@@ -230,6 +233,11 @@ def open_file(path: Path) -> h5py.File:
     except OSError:
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
         raise RunError(f"{path}: {state}") from None
+
+
+def did_you_mean(word: str, others: Iterable[str]) -> str:
+    """A suggestion, if one of the others is like the word."""
+    return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
 def read_values(path: Path, name: str, chosen: int | slice | list[int]) -> np.ndarray:

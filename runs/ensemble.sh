@@ -39,6 +39,13 @@ die() {
   exit 2
 }
 
+# "; did you mean --seeds?", if one of the words behind the first is like it (and Python is there)
+nearest() {
+  python3 -c 'import difflib, sys
+for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; did you mean {near}?")' \
+    "$@" 2>/dev/null || true
+}
+
 # --- members: two parallel arrays, the name and the overrides ("--set A=B --set C=D") ---
 
 names=()
@@ -367,7 +374,10 @@ while (($#)); do
   -h | --help) usage && exit 0 ;;
   --dry-run) dry=1 && shift && continue ;;
   -d | -j | --seeds | --scan | --set | --manifest | --engine | --sshloginfile | --share) (($# > 1)) || die "$1 needs a value" ;;
-  -*) die "unknown option $1, see --help" ;;
+  -*)
+    near=$(nearest "$1" --seeds --scan --set --manifest --engine --sshloginfile --share --dry-run --help)
+    die "unknown option $1${near:-, see --help}"
+    ;;
   *)
     [[ -z $input ]] || die "one input file, not '$input' and '$1'"
     input=$1 && shift && continue
@@ -388,7 +398,7 @@ while (($#)); do
 done
 
 [[ -n $input ]] || die "no input file, see --help"
-[[ -r $input && -f $input ]] || die "cannot read $input"
+[[ -r $input && -f $input ]] || die "cannot read $input$(nearest "$input" "${input%"${input##*/}"}"*.nml)"
 [[ -n $folder ]] || die "no folder for the members: -d FOLDER"
 [[ $jobs =~ ^[1-9][0-9]*$ ]] || die "-j $jobs: not a number of members"
 [[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: pool, slurm or parallel"

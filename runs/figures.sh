@@ -7,19 +7,20 @@
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 figures=runs/figures
-systems=(scattering gas mixture cooling crater lab cost billiards gravity state)
+known=(scattering gas mixture cooling crater lab cost billiards gravity state)
 
 options=()
 while [[ ${1:-} == -* ]]; do
   options+=("$1" "${2:?"$1 needs a value"}")
   shift 2
 done
-(($# == 0)) || systems=("$@")
+systems=("$@")
+(($# > 0)) || systems=("${known[@]}")
 
 failed=()
 for system in "${systems[@]}"; do
-  [[ -x runs/$system.sh && $system != figures && $system != ensemble ]] || {
-    printf 'figures.sh: no system %s\n' "$system" >&2
+  [[ " ${known[*]} " == *" $system "* ]] || {
+    printf 'figures.sh: no system %s; there are: %s\n' "$system" "${known[*]}" >&2
     exit 2
   }
   printf '== %s\n' "$system" >&2

@@ -50,6 +50,18 @@ def test_options_that_are_named_exist(program):
                     assert option in known, f"{page.name}: {line}"
 
 
+def test_make_lists_its_targets_in_one_screen_and_suggests_them():
+    def make(target):
+        return subprocess.run(["make", target], capture_output=True, text=True, cwd=ROOT)
+
+    screen = make("help").stdout.splitlines()
+    assert len(screen) <= 24 and max(map(len, screen)) <= 80
+    for target in ("demo", "test", "figures", "check", "bench", "lint", "docs", "clean"):
+        assert any(line.startswith(f"  make {target} ") for line in screen)
+    wrong = make("tset")
+    assert wrong.returncode == 2 and "no file tset; did you mean test?" in wrong.stderr
+
+
 def completed(program, *words):
     """What bash proposes for the last word."""
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet

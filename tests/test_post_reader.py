@@ -174,6 +174,21 @@ def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, ca
     assert said.startswith(f"{script}.py: {path}") and said.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (["snapshot", "run.h5", "--cuont", "3"], "did you mean --count?"),
+        (["snapshot", "run.h5", "--colour=sped"], "did you mean speed?"),
+        (["snapshot", "rum.h5"], "no such file; did you mean run.h5?"),
+    ],
+)
+def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, wrong, words):
+    monkeypatch.chdir(small.parent)
+    small.rename("run.h5")
+    assert run_script(*wrong) == 2
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_scripts_explain_themselves(script, capsys):
     assert run_script(script, "--help") == 0
