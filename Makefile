@@ -2,7 +2,7 @@
 #
 #   BUILD=folder      where all that is made goes; other flags want another folder
 #   DEBUG=1           all run-time checks, no optimisation, in build/debug
-#   ARCH=x86-64-v3    code for other machines, such as a cluster; default: this one
+#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
 #   PFUNIT_DIR=folder an installed pFUnit; else unit tests run on a substitute
 #   V=1               shows the commands
@@ -144,7 +144,7 @@ $(BUILD)/tests.inc: FORCE | $(BUILD)
 venv := .venv/bin/python
 jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
-demo:  ## sets up, builds, runs crater and gas, draws them in runs/demo/
+demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002
@@ -156,7 +156,7 @@ demo:  ## sets up, builds, runs crater and gas, draws them in runs/demo/
 	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
 	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
 
-figures:  ## reproduces the figures of every system in runs/figures/ (long)
+figures:  ## reproduces the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
