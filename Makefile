@@ -156,7 +156,7 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
 	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
 
-figures:  ## reproduces the figures of all systems in runs/figures/ (long)
+figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
