@@ -41,7 +41,7 @@ objects := $(modules:%=$(BUILD)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean help
+targets := all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean distclean help
 .PHONY: $(targets) FORCE
 
 all: $(BUILD)/ricochet  ## builds the program (default)
@@ -96,7 +96,7 @@ $(BUILD)/deps.mk: FORCE | $(BUILD)
 $(BUILD):
 	@mkdir -p $@
 
-ifneq ($(filter-out help clean set-up,$(or $(MAKECMDGOALS),all)),)
+ifneq ($(filter-out help clean distclean set-up,$(or $(MAKECMDGOALS),all)),)
 -include $(BUILD)/deps.mk
 endif
 
@@ -214,6 +214,9 @@ set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 
 clean:  ## removes what was built; runs/ and .venv stay
 	rm -rf '$(BUILD)'
+
+distclean: clean  ## removes .venv, too; results in runs/ stay
+	rm -rf .venv
 
 nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1); \
   print(*(f"; did you mean {name}?" for name in near))

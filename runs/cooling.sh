@@ -1,9 +1,6 @@
 #!/usr/bin/env bash
 # S4: kinetic energies of the mixture for restitution 1, 0.9, 0.8; eight seeds, both wall rules.
-set -euo pipefail
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
-python=${PYTHON:-.venv/bin/python}
-data=runs/cooling figures=runs/figures
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
 
 runs/ensemble.sh input/cooling.nml -d "$data" --scan contact.wall_rule=velocity,normal \
   --scan contact.restitution=1,0.9,0.8 --seeds 1-8 "$@"

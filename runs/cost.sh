@@ -1,11 +1,7 @@
 #!/usr/bin/env bash
 # L2: time per collision against the number of disks for the three ways of finding the next one.
 # One run at a time, for the clock's sake; remove runs/cost to measure anew.
-set -euo pipefail
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
-python=${PYTHON:-.venv/bin/python}
-data=runs/cost figures=runs/figures
-mkdir -p "$data" "$figures"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
 
 # Packing fraction 0.3 whatever the number; no output on the way. Collisions enough that the first
 # predictions, one per disk, do not count: 10 per disk, 5 of a million disks; with `rescan`, which

@@ -1,10 +1,6 @@
 #!/usr/bin/env bash
 # S5: one crater in pictures, then its size against mass, speed, radius and restitution.
-set -euo pipefail
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
-python=${PYTHON:-.venv/bin/python}
-data=runs/crater figures=runs/figures
-mkdir -p "$data" "$figures"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
 
 # Eight beds (seeds) for each of ten values of each parameter, the other three at the base
 # mass 25, speed 5, radius 5, restitution 0.5.  There is no energy scale, so the speed must not

@@ -4,9 +4,7 @@
 #   runs/figures.sh                 all
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
-set -euo pipefail
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
-figures=runs/figures
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
 known=(scattering gas mixture cooling crater lab cost billiards gravity state)
 
 options=()
@@ -14,11 +12,10 @@ while [[ ${1:-} == -* ]]; do
   options+=("$1" "${2:?"$1 needs a value"}")
   shift 2
 done
-systems=("$@")
-(($# > 0)) || systems=("${known[@]}")
+(($# > 0)) || set -- "${known[@]}"
 
 failed=()
-for system in "${systems[@]}"; do
+for system; do
   [[ " ${known[*]} " == *" $system "* ]] || {
     printf 'figures.sh: no system %s; there are: %s\n' "$system" "${known[*]}" >&2
     exit 2
@@ -51,7 +48,6 @@ section() {
   done
 }
 
-mkdir -p "$figures"
 {
   cat <<'HTML'
 <!DOCTYPE html>

@@ -1,10 +1,6 @@
 #!/usr/bin/env bash
 # Bulk hard disks: equation of state, memory and order, Haff's law; four seeds each.
-set -euo pipefail
-cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
-python=${PYTHON:-.venv/bin/python}
-data=runs/state figures=runs/figures
-mkdir -p "$data" "$figures"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
 
 # Pressure: at random up to 0.5, grown to 0.7, a crystal from 0.72 in a box that fits it.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \

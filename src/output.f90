@@ -77,7 +77,8 @@ contains
       call fail(error, exit_files, path//": is there already, and is no output of a run: it is left " &
         //"as it is; choose another name")
     else if (exists .and. .not. force) then
-      call fail(error, exit_files, path//": is there already, from a finished run; --force replaces it")
+      call fail(error, exit_files, path//": is there already, from a finished run; --force replaces it, "// &
+        "-o writes elsewhere")
     else if (is_file(checkpoint_of(path)) .and. .not. force) then
       call fail(error, exit_files, checkpoint_of(path)//": is there already, from a run that was " &
         //"stopped; --resume goes on, --force starts over")
