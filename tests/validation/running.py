@@ -42,9 +42,9 @@ class Workshop:
         path.write_text(text)
         output = path.with_suffix(".h5")
         command = [self.program, path, "-o", output, "--force", "--quiet"]
-        seed = re.search(r"\bseed = (\d+)", text)
-        if self.seed_shift and seed:
-            command += ["--set", f"run.seed={int(seed[1]) + self.seed_shift}"]
+        if self.seed_shift:
+            seed = re.search(r"\bseed = (\d+)", text)  # 1 is the program's default
+            command += ["--set", f"run.seed={int(seed[1] if seed else 1) + self.seed_shift}"]
         ended = subprocess.run(
             command, capture_output=True, text=True, check=False, timeout=MOST_SECONDS
         )
