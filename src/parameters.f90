@@ -47,6 +47,7 @@ module parameters
   type(range_t), parameter :: not_negative = range_t(0, largest, '>= 0')
   type(range_t), parameter :: unit_interval = range_t(0, 1, 'from 0 to 1')
   type(range_t), parameter :: fraction = range_t(smallest, nearest(1.0_real64, -1.0), '> 0 and < 1')
+  type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, '>= 1e-12 and < 1')
   type(range_t), parameter :: few = range_t(1, 100000000, 'from 1 to 100000000')
 
   type(parameter_t), parameter :: run_rows(*) = [ &
@@ -138,7 +139,7 @@ module parameters
       'end when 2 collisions/N reaches this'), &
     parameter_t('stop', 'events', 'integer', 1, 'optional', '100000', not_negative, '', '', &
       'end after so many collisions of any kind: pair, side, obstacle'), &
-    parameter_t('stop', 'energy_fraction', 'real', 1, 'optional', '0.1', fraction, '', '', &
+    parameter_t('stop', 'energy_fraction', 'real', 1, 'optional', '0.1', energy_left, '', '', &
       'end when collisions have left this part of the kinetic energy'), &
     parameter_t('stop', 'wall_clock', 'real', 1, 'optional', '3600', positive, 's', '', &
       'stop with a checkpoint after so much computing time')]

@@ -103,7 +103,7 @@ contains
       limits = stop_rule%limits
       limits%time = min(limits%time, output%next_time())
       limits%collisions = min(limits%collisions, output%next_collisions())
-      limits%events = min(limits%events, output%next_events())
+      limits%events = min(limits%events, output%next_events(), stop_rule%next_look(sim))
       limits%turns = turns
       call evolution%advance(sim, limits, error)
       if (allocated(error)) exit
@@ -129,14 +129,15 @@ contains
     call line%clear()
   end subroutine main_loop
 
-  !> Whether the run has come to its end: by a rule, or because nothing will ever happen any more and no
-  !> rule names a time to wait for.
+  !> Whether the run has come to its end: by a rule, because there is nothing but rounding left to follow,
+  !> or because nothing will ever happen any more and no rule names a time to wait for.
   pure function is_over(sim, evolution, stop_rule) result(yes)
     type(simulation_t), intent(in) :: sim
     class(evolution_t), intent(in) :: evolution
     type(stop_rule_t), intent(in) :: stop_rule
     logical :: yes
-    yes = stop_rule%met(sim) .or. (evolution%idle .and. .not. stop_rule%limits%time < never)
+    yes = stop_rule%met(sim) .or. stop_rule%too_cold(sim) .or. &
+      (evolution%idle .and. .not. stop_rule%limits%time < never)
   end function is_over
 
   !> The number of turns that takes about `look_around`.
@@ -181,8 +182,14 @@ contains
       eol//"dissipated_energy = "//written(sim%dissipated)// &
       eol//"wall_time = "//written(elapsed)// &
       eol//"collisions_per_second = "//written(rate)
-    if (.not. stop_rule%met(sim)) text = text//eol// &
-      "note = nothing will ever happen any more: the run ended before its stop rule was met"
+    if (stop_rule%met(sim)) return
+    text = text//eol//"note = "
+    if (stop_rule%too_cold(sim)) then
+      text = text//"cooled to 1e-25 of the first temperature, and beyond that rounding rules"
+    else
+      text = text//"nothing will ever happen any more"
+    end if
+    text = text//": the run ended before its stop rule was met"
   end function summary
 
 end module run

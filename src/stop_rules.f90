@@ -1,6 +1,11 @@
-!> When a run ends: the first of the rules in the input that is met.
+!> When a run ends: the first of the rules in the input that is met; and before rounding begins to rule.
+!>
+!> In a periodic box inelastic disks cool until they fly on side by side: what is left is the momentum that
+!> rounding gave to all of them. Long before, no digit of the temperature is true. So the run ends when
+!> the gas is that cold. It is looked for at certain numbers of events, so that the end depends on
+!> nothing but the trajectory.
 module stop_rules
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use evolution, only: limits_t
   use settings, only: stop_settings_t
   use simulation_state, only: simulation_t
@@ -8,11 +13,17 @@ module stop_rules
   private
   public :: stop_rule_t
 
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
+  integer, parameter :: look_interval = 4                    !! events per disk between two looks at it
+
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
+    integer(int64) :: look_every = huge(0_int64)    !! events between two looks at the temperature
   contains
     procedure :: met
+    procedure :: next_look
+    procedure :: too_cold
     procedure :: share
   end type stop_rule_t
 
@@ -37,6 +48,8 @@ contains
       min(rule%limits%collisions, ceiling(collisions, int64))
     if (settings%energy_fraction > 0) rule%limits%dissipated = &
       (1 - settings%energy_fraction)*sim%start_energy
+    if (all(sim%box%periodic) .and. size(sim%box%obstacle) == 0 .and. any(sim%law%restitution < 1)) &
+      rule%look_every = look_interval*int(sim%n_disks(), int64)
   end function new_stop_rule
 
   !> Whether the simulation has come to its end, wall clock aside.
@@ -47,6 +60,42 @@ contains
     yes = sim%time() >= self%limits%time .or. sim%collisions >= self%limits%collisions &
       .or. sim%events >= self%limits%events .or. sim%dissipated >= self%limits%dissipated
   end function met
+
+  !> The number of events at which to pause for a look at the temperature.
+  pure function next_look(self, sim) result(events)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: events
+    events = self%look_every*(sim%events/self%look_every + 1)
+  end function next_look
+
+  !> Whether the motion relative to the common one has all but died out.
+  pure function too_cold(self, sim) result(yes)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+    yes = .false.
+    if (sim%events > 0 .and. modulo(sim%events, self%look_every) == 0) &
+      yes = relative_energy(sim) <= coldest*sim%start_energy
+  end function too_cold
+
+  !> Kinetic energy relative to the common motion. Two passes: a difference of sums would be rounded.
+  pure function relative_energy(sim) result(energy)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: energy                          !! [energy]
+    real(real64) :: common(2), mass(sim%n_disks())
+    integer(int32) :: i
+    mass = sim%species(sim%tag%species)%mass
+    common = 0
+    do i = 1, sim%n_disks()
+      common = common + mass(i)*sim%velocity(i)
+    end do
+    common = common/sum(mass)
+    energy = 0
+    do i = 1, sim%n_disks()
+      energy = energy + 0.5_real64*mass(i)*sum((sim%velocity(i) - common)**2)
+    end do
+  end function relative_energy
 
   !> How much of the run is done, from 0 to 1, by the rule that is nearest to its end.
   pure function share(self, sim, elapsed) result(done)
