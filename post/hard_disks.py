@@ -89,12 +89,17 @@ def collision_rate(z: float, diameter: float, free: int, kt: float = 1.0, mass: 
 
 
 def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
-    """chi_ij of a mixture, Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987)."""
+    """chi_ij of a mixture, from that of equal disks at the same packing fraction.
+
+    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
+    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002). Good to a percent.
+    """
     s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
     eta = math.pi / 4 * np.sum(n * s**2)
     mean = np.sum(n * s) / np.sum(n * s**2)
     pair = (s[:, None] + s) / 2
-    return 1 / (1 - eta) + 9 / 16 * eta / (1 - eta) ** 2 * (s[:, None] * s / pair) * mean
+    more = contact_value(float(simulated(eta)), eta) - 1 / (1 - eta)
+    return 1 / (1 - eta) + more * (s[:, None] * s / pair) * mean
 
 
 def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:

@@ -16,7 +16,7 @@ class Member:
 
     text: str | Callable[..., str]
     after: tuple["Member", ...] = ()
-    exit_code: int = 0  # a run that breaks off on purpose is read from its .part file
+    exit_codes: tuple[int, ...] = (0,)  # a run that breaks off on purpose is read from its .part
 
 
 class Tolerance(NamedTuple):

@@ -93,6 +93,15 @@ BULK = [
             1, within(1e-3), "D",
         ),
     )
+] + [
+    Case(
+        "P8-01", "periodic, packing 0.3, N = 256: Z by the virial",
+        tuple(
+            long_gas(256, 4000, seed, packing_fraction=0.3, periodic=True) for seed in (1, 2, 3, 4)
+        ),
+        lambda *runs: combined([z_virial(run) for run in runs]),
+        hd.simulated_finite(0.3, 256), sigmas(3, 0.003), "KR",
+    ),
 ]  # fmt: skip
 
 # --- walls ---
@@ -247,7 +256,7 @@ def mixture(count: int, radii: tuple, masses: tuple, seed: int = 1, **output) ->
         run={"seed": seed},
         box=PERIODIC,
         species=species,
-        stop={"collisions_per_disk": 1500},
+        stop={"collisions_per_disk": 2000},
         output=output,
     )
 
@@ -257,10 +266,18 @@ def radii_for(eta: float, factor: float, count: int) -> tuple[float, float]:
     return small, factor * small
 
 
-UNEQUAL = radii_for(0.3, 1.4, N)
-TWO_RADII = (
-    Member(mixture(N, UNEQUAL, (1, 1), observables_every_collisions=500)),
-)  # fmt: skip
+def two_radii(eta: float) -> tuple[Member, ...]:
+    return tuple(
+        Member(mixture(N, radii_for(eta, 1.4, N), (1, 1), seed, observables_every_collisions=500))
+        for seed in (1, 2, 3)
+    )
+
+
+def mixed_z(eta: float) -> float:
+    """Z of radii 1 : 1.4, half of each."""
+    return hd.mixture_z(2 * np.array(radii_for(eta, 1.4, N)), [N / 2, N / 2])
+
+
 SPECIES_RATES = tuple(
     Member(mixture(N, radii_for(0.1, 2, N), (1, 4), seed, event_log=True)) for seed in (1, 2, 3, 4)
 )
@@ -280,16 +297,19 @@ def species_rates(run: Run) -> np.ndarray:
 
 
 MIXTURES = [
-    Case(
-        "P8-02", "radii 1 : 1.4, packing 0.3: Z",
-        TWO_RADII, z_virial, hd.mixture_z(2 * np.array(UNEQUAL), [N / 2, N / 2]),
-        relative(0.01), "Jenkins and Mancini 1987",
-    ),
+    *[
+        Case(
+            "P8-02", f"radii 1 : 1.4, packing {eta}: Z",
+            two_radii(eta), lambda *runs: combined([z_virial(run) for run in runs]),
+            mixed_z(eta), relative(0.004), "Santos, Yuste and Lopez de Haro 2002",
+        )
+        for eta in (0.3, 0.5)
+    ],
     Case(
         "P7-07", "radii 1 : 2, masses 1 : 4, packing 0.1: w_ij",
         SPECIES_RATES, lambda *runs: over_runs(species_rates, runs),
         hd.mixture_rates(2 * np.array(radii_for(0.1, 2, N)), [N / 2, N / 2], [1, 4]).ravel(),
-        relative(0.01), "section 7; Jenkins and Mancini 1987",
+        relative(0.01), "section 7",
     ),
 ]  # fmt: skip
 
@@ -324,6 +344,9 @@ def no_overlap(run: Run) -> float:
     return closest_gap(run) if packing(run) > 0.74 else -np.inf
 
 
+# Packing: beta P (2 r)^2 of 870 disks in a square box.
+NEAR_FREEZING = {0.67: 7.986779, 0.69: 8.969898}
+
 DENSE = [
     Case(
         "P8-04", f"dense start, packing {hd.FLUID[k, 0]:.4f}, N = 1024: Z",
@@ -332,6 +355,13 @@ DENSE = [
         hd.FLUID[k, 1], relative(0.005), "Erpenbeck and Luban 1985",
     )
     for k in (10, 11, 12)
+] + [
+    Case(
+        "P8-04", f"dense start, packing {eta}, N = 870: Z",
+        dense(870, eta, "dense", 15000), lambda *runs: combined([z_virial(run) for run in runs]),
+        pressure * pi / (4 * eta), relative(0.005), "Li et al., J. Chem. Phys. 157, 234111 (2022)",
+    )
+    for eta, pressure in NEAR_FREEZING.items()
 ] + [
     Case(
         "P8-05", "lattice start, crystal at packing 0.80: Z",

@@ -48,7 +48,7 @@ class Workshop:
         ended = subprocess.run(
             command, capture_output=True, text=True, check=False, timeout=MOST_SECONDS
         )
-        if ended.returncode != member.exit_code:
+        if ended.returncode not in member.exit_codes:
             reason = ended.stderr.strip().splitlines() or ["no reason given"]
             raise RunError(f"{path.name} ended with {ended.returncode}: {reason[-1]}")
         part = output.with_name(f"{output.name}.part")

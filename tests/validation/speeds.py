@@ -10,7 +10,7 @@ from theory import Estimate, estimate, excess_kurtosis, finite_n_cdf, hold_again
 from thermodynamics import temperature
 
 from .case import AT_MOST, Case, Member, Tolerance, relative, sigmas, within
-from .estimators import at_collisions, over_runs
+from .estimators import at_collisions, middle, over_runs
 from .inputs import PERIODIC, gas, namelist
 
 LEAST = 1.63  #: times 1/sqrt(n): a larger distance has a probability below 1 %
@@ -39,11 +39,17 @@ def uniform(u: np.ndarray) -> np.ndarray:
 # --- one kind of disk ---
 
 
-def sampled(count: int, radius: float, interval: float, frames: int, **more) -> Member:
+SEEDS = (1, 2, 3)
+
+
+def sampled(count: int, radius: float, interval: float, frames: int) -> tuple[Member, ...]:
     """Frames at equal intervals of time."""
     time = interval * frames
     output = {"frames_every_time": interval, "observables_every_time": time / 400}
-    return Member(gas(count, radius=radius, stop={"time": time}, output=output, **more))
+    return tuple(
+        Member(gas(count, seed=seed, radius=radius, stop={"time": time}, output=output))
+        for seed in SEEDS
+    )
 
 
 LARGE = sampled(1000, 0.004, 0.17, 200)  # 5 collisions per disk apart
@@ -52,32 +58,37 @@ FINITE = {  # N: <v>/v_rms; frames 5 collisions per disk apart
     60: (0.888075, sampled(60, 0.01, 1.05, 10000)),
     100: (0.887335, sampled(100, 0.01, 0.62, 6000)),
 }
-LAB = Member(
-    namelist(
-        species={"grid": (10, 10), "radius": 0.01, "speed": 1.0},
-        stop={"events": 55000}, output={"frames_every_events": 100},
+LAB = tuple(
+    Member(
+        namelist(
+            run={"seed": seed}, species={"grid": (10, 10), "radius": 0.01, "speed": 1.0},
+            stop={"events": 55000}, output={"frames_every_events": 100},
+        )
     )
+    for seed in SEEDS
 )  # fmt: skip
 
 
-def moments(run: Run) -> Estimate:
-    """<v>, median, <v^3>, <v^4>, variance at v_rms = 1, with errors from groups of frames."""
-    u = reduced(run).reshape(-1, run.count)
-    groups = np.array_split(u, 20)
-    parts = [[np.mean(g), np.median(g), np.mean(g**3), np.mean(g**4), np.var(g)] for g in groups]
-    return estimate(parts)
+def moments(run: Run) -> list[float]:
+    """<v>, median, <v^3>, <v^4>, variance at v_rms = 1."""
+    u = reduced(run)
+    return [np.mean(u), np.median(u), np.mean(u**3), np.mean(u**4), np.var(u)]
 
 
-def mean_speed(run: Run) -> Estimate:
-    """<v> / v_rms, with the error from groups of frames."""
-    u = reduced(run).reshape(-1, run.count)
-    return estimate([g.mean() for g in np.array_split(u, 20)])
+def in_groups(measure, runs: tuple[Run, ...]) -> Estimate:
+    """A mean over the speeds of all runs, with the error from groups of frames."""
+    speeds = np.concatenate([reduced(run).reshape(-1, run.count) for run in runs])
+    return estimate([measure(group) for group in np.array_split(speeds, 60)])
 
 
-def fourth(run: Run) -> Estimate:
-    """<v^4> / v_rms^4."""
-    u = reduced(run).reshape(-1, run.count)
-    return estimate([np.mean(g**4) for g in np.array_split(u, 20)])
+def fourth(speed: np.ndarray) -> float:
+    """<v^4>; v_rms = 1."""
+    return np.mean(speed**4)
+
+
+def exact_distance(run: Run) -> float:
+    """Of the speeds from the law of N disks that share a fixed energy."""
+    return distance(reduced(run), finite_n_cdf(run.count))
 
 
 def component_distance(run: Run) -> float:
@@ -94,52 +105,57 @@ def lab_speeds(run: Run) -> np.ndarray:
 LAWS = [
     Case(
         "P5-01", "speeds against the Maxwell law: KS distance sqrt(n)",
-        (LARGE,), lambda run: distance(reduced(run), maxwell_cdf), LEAST, AT_MOST, "EX, LAB",
+        LARGE, lambda *runs: middle(lambda run: distance(reduced(run), maxwell_cdf), runs),
+        LEAST, AT_MOST, "EX, LAB",
     ),
     Case(
         "P5-01", "the same: chi^2 in 30 bins, probability of less",
-        (LARGE,), lambda run: 1 - hold_against(reduced(run), maxwell_cdf).chi2_p,
+        LARGE,
+        lambda *runs: middle(lambda run: 1 - hold_against(reduced(run), maxwell_cdf).chi2_p, runs),
         0.99, AT_MOST, "EX, LAB",
     ),
     Case(
         "P5-02", "<v>, median, <v^3>, <v^4>, variance at v_rms = 1",
-        (LARGE,), lambda run: moments(run).mean,
+        LARGE, lambda *runs: over_runs(moments, runs),
         [0.886227, 0.832555, 1.329340, 2, 0.214602], relative(0.01), "D",
     ),
     *[
         case
-        for count, (mean, member) in FINITE.items()
+        for count, (mean, members) in FINITE.items()
         for case in (
             Case(
-                "P5-03", f"N = {count}: <v> / v_rms", (member,), mean_speed, mean,
-                sigmas(3, 0.0015), "D",
+                "P5-03", f"N = {count}: <v> / v_rms", members,
+                lambda *runs: in_groups(np.mean, runs), mean, relative(0.001), "D",
             ),
             Case(
-                "P5-03", f"N = {count}: <v^4> / v_rms^4", (member,), fourth,
-                2 * count / (count + 1), sigmas(3, 0.01), "D",
+                "P5-03", f"N = {count}: <v^4> / v_rms^4", members,
+                lambda *runs: in_groups(fourth, runs), 2 * count / (count + 1),
+                relative(0.005), "D",
             ),
             Case(
                 "P5-03", f"N = {count}: speeds against the exact law: KS distance sqrt(n)",
-                (member,), lambda run: distance(reduced(run), finite_n_cdf(run.count)),
-                LEAST, AT_MOST, "D",
+                members, lambda *runs: middle(exact_distance, runs), LEAST, AT_MOST, "D",
             ),
             Case(
                 "P5-03", f"N = {count}: vx against the exact law: KS distance sqrt(n)",
-                (member,), component_distance, LEAST, AT_MOST, "D",
+                members, lambda *runs: middle(component_distance, runs), LEAST, AT_MOST, "D",
             ),
         )
     ],
     Case(
         "P5-04", "10 x 10 disks, 50 000 speeds: <v> / v_rms",
-        (LAB,), lambda run: lab_speeds(run).mean(), 0.88734, within(0.003), "LAB; D",
+        LAB, lambda *runs: middle(lambda run: lab_speeds(run).mean(), runs),
+        0.88734, within(0.003), "LAB; D",
     ),
     Case(
         "P5-04", "the same: <v^4> / <v^2>^2",
-        (LAB,), lambda run: 2 + 2 * excess_kurtosis(lab_speeds(run)), 1.980, within(0.05), "D",
+        LAB, lambda *runs: middle(lambda run: 2 + 2 * excess_kurtosis(lab_speeds(run)), runs),
+        1.980, within(0.05), "D",
     ),
     Case(
         "P5-04", "the same against the exact law: KS distance",
-        (LAB,), lambda run: hold_against(lab_speeds(run), finite_n_cdf(100)).ks,
+        LAB,
+        lambda *runs: middle(lambda run: hold_against(lab_speeds(run), finite_n_cdf(100)).ks, runs),
         0.015, AT_MOST, "D",
     ),
 ]  # fmt: skip
@@ -147,13 +163,18 @@ LAWS = [
 # --- collisions in equilibrium ---
 
 
-def hits_on_record(periodic: bool) -> Member:
-    """Every event of a gas that has been in equilibrium from the start."""
-    member = {"periodic": True} if periodic else {}
+def hits_on_record(periodic: bool) -> tuple[Member, ...]:
+    """Every event of gases that have been in equilibrium from the start."""
     output = {"frames_every_events": 1, "event_log": True, "observables_every_time": 0.1}
-    return Member(
-        gas(100, radius=0.005, temperature=1.0, stop={"events": 20000}, output=output, **member)
-    )
+    return tuple(
+        Member(
+            gas(
+                100, seed=seed, radius=0.005, temperature=1.0, stop={"events": 12000},
+                output=output, periodic=periodic,
+            )
+        )
+        for seed in SEEDS
+    )  # fmt: skip
 
 
 def wall_speeds(run: Run) -> np.ndarray:
@@ -163,19 +184,29 @@ def wall_speeds(run: Run) -> np.ndarray:
     return log.impulse[hit] / (2 * sqrt(2 * temperature(run)))
 
 
-def wall_energies(run: Run) -> Estimate:
+def wall_energies(run: Run) -> np.ndarray:
     """K of a disk that hits a side, over kT; exact for fixed energy."""
     log = run.events
     hit = np.flatnonzero(log.j <= 0)
-    disks = log.i[hit] - 1
-    energy = run.kinetic_energy(slice(1, None))[hit, disks] / temperature(run)
-    return estimate([part.mean() for part in np.array_split(energy, 20)])
+    return run.kinetic_energy(slice(1, None))[hit, log.i[hit] - 1] / temperature(run)
+
+
+def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
+    """The mean of what is measured at each hit, with the error from parts of the runs."""
+    values = np.concatenate([measure(run) for run in runs])
+    return estimate([part.mean() for part in np.array_split(values, 60)])
 
 
 def approach_speeds(run: Run) -> np.ndarray:
     """g_n of pair collisions over sqrt(4 kT / m)."""
     log = run.events
     return log.impulse[log.j > 0] / sqrt(4 * temperature(run))
+
+
+def approach_moments(run: Run) -> list[float]:
+    """<g_n> and <g_n^2> over what they should be."""
+    g = approach_speeds(run)
+    return [g.mean() * 2 / sqrt(pi), np.mean(g**2)]
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
@@ -196,43 +227,41 @@ WALLED, BULK = hits_on_record(False), hits_on_record(True)
 COLLISIONS = [
     Case(
         "P5-06", "speeds of hits on sides against the flux law: KS distance sqrt(n)",
-        (WALLED,), lambda run: distance(wall_speeds(run), maxwell_cdf), LEAST, AT_MOST, "D",
+        WALLED, lambda *runs: middle(lambda run: distance(wall_speeds(run), maxwell_cdf), runs),
+        LEAST, AT_MOST, "D",
     ),
     Case(
         "P5-06", "the same: mean over sqrt(pi kT / 2m)",
-        (WALLED,),
-        lambda run: estimate(
-            [g.mean() * 2 / sqrt(pi) for g in np.array_split(wall_speeds(run), 20)]
-        ),
+        WALLED, lambda *runs: in_parts(lambda run: wall_speeds(run) * 2 / sqrt(pi), runs),
         gamma(100.5) / gamma(100) / sqrt(100), sigmas(3, 0.03), "D, for N = 100",
     ),
     Case(
         "P5-06", "energy of a disk that hits a side, over kT",
-        (WALLED,), wall_energies, 1.5 * 200 / 201, sigmas(3, 0.03), "D, for N = 100",
+        WALLED, lambda *runs: in_parts(wall_energies, runs),
+        1.5 * 200 / 201, sigmas(3, 0.03), "D, for N = 100",
     ),
     Case(
         "P5-07", "approach speeds of pairs against their law: KS distance sqrt(n)",
-        (BULK,), lambda run: distance(approach_speeds(run), maxwell_cdf), LEAST, AT_MOST, "D",
+        BULK, lambda *runs: middle(lambda run: distance(approach_speeds(run), maxwell_cdf), runs),
+        LEAST, AT_MOST, "D",
     ),
     Case(
         "P5-07", "the same: <g_n> over sqrt(pi kT / m), <g_n^2> over 4 kT / m",
-        (BULK,),
-        lambda run: [
-            approach_speeds(run).mean() * 2 / sqrt(pi), np.mean(approach_speeds(run) ** 2),
-        ],
-        1, within(0.03), "D",
+        BULK, lambda *runs: over_runs(approach_moments, runs), 1, within(0.03), "D",
     ),
     Case(
         "P5-07", "impact parameters are uniform: KS distance sqrt(n)",
-        (BULK,), lambda run: distance(contacts(run)[1], uniform), LEAST, AT_MOST, "D",
+        BULK, lambda *runs: middle(lambda run: distance(contacts(run)[1], uniform), runs),
+        LEAST, AT_MOST, "D",
     ),
     Case(
         "P5-07", "directions of contact are uniform: KS distance sqrt(n)",
-        (BULK,), lambda run: distance(contacts(run)[0], uniform), LEAST, AT_MOST, "D",
+        BULK, lambda *runs: middle(lambda run: distance(contacts(run)[0], uniform), runs),
+        LEAST, AT_MOST, "D",
     ),
     Case(
         "P5-08", "momentum between walls: <Px^2>, <Py^2> over sum m kT",
-        (FINITE[60][1],),
+        (FINITE[60][1][0],),
         lambda run: np.mean(run.observable("momentum").value ** 2, axis=0) / run.count,
         1, Tolerance("factor 2", lambda ref, _: np.full_like(ref, 0.5)), "D",
     ),
@@ -283,8 +312,12 @@ MIXING = tuple(
     light_heavy(
         0.001, {"collisions_per_disk": 8}, {"observables_every_collisions": 50}, seed, box=PERIODIC
     )
-    for seed in range(1, 33)
+    for seed in range(1, 129)
 )  # fmt: skip
+MIXING_WALLED = tuple(
+    light_heavy(0.007, {"collisions_per_disk": 6}, {"observables_every_collisions": 50}, seed)
+    for seed in range(1, 129)
+)
 
 
 def settled(run: Run, name: str) -> np.ndarray:
@@ -299,10 +332,10 @@ def energies(run: Run) -> list[float]:
     return [settled(run, name).mean() for name in names]
 
 
-def ratios(*runs: Run) -> np.ndarray:
-    """Mean K_heavy over mean K_light at `TAU`."""
+def ratios(runs: tuple[Run, ...], tau: tuple) -> np.ndarray:
+    """Mean K_heavy over mean K_light after so many collisions per disk."""
     heavy, light = (
-        np.mean([at_collisions(r, f"{name}/kinetic_energy", TAU) for r in runs], axis=0)
+        np.mean([at_collisions(r, f"{name}/kinetic_energy", tau) for r in runs], axis=0)
         for name in ("heavy", "light")
     )
     return heavy / light
@@ -336,8 +369,14 @@ MIXTURE = [
     ),
     Case(
         "P6-03", "K_heavy / K_light at 0, 1, 2, 3, 4, 5, 6, 8 collisions per disk",
-        MIXING, ratios, [4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005],
-        within(0.02 + 0.063 / sqrt(32)), "DSMC",
+        MIXING, lambda *runs: ratios(runs, TAU),
+        [4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005],
+        within(0.02 + 0.063 / sqrt(len(MIXING))), "DSMC",
+    ),
+    Case(
+        "P6-03", "between walls, radius 0.007: the same at 4, 6",
+        MIXING_WALLED, lambda *runs: ratios(runs, (4, 6)), [1.14, 1.03],
+        within(0.02 + 0.063 / sqrt(len(MIXING_WALLED))), "R",
     ),
     Case(
         "P6-04", "scatter of K_light and of the ratio between snapshots",
