@@ -83,17 +83,17 @@ contains
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]
-    real(real64) :: common(2), mass(sim%n_disks())
+    real(real64) :: drift(2), mass(sim%n_disks())
     integer(int32) :: i
     mass = sim%species(sim%tag%species)%mass
-    common = 0
+    drift = 0
     do i = 1, sim%n_disks()
-      common = common + mass(i)*sim%velocity(i)
+      drift = drift + mass(i)*sim%velocity(i)
     end do
-    common = common/sum(mass)
+    drift = drift/sum(mass)
     energy = 0
     do i = 1, sim%n_disks()
-      energy = energy + 0.5_real64*mass(i)*sum((sim%velocity(i) - common)**2)
+      energy = energy + 0.5_real64*mass(i)*sum((sim%velocity(i) - drift)**2)
     end do
   end function relative_energy
 
