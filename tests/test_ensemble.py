@@ -1,6 +1,10 @@
-"""runs/ensemble.sh with a stand-in for the program: what is run, skipped, resumed and reported."""
+"""runs/ensemble.sh with a stand-in for the program: what is run, skipped, resumed and reported.
+
+With the program itself: neither faults nor the order of the work show in the results.
+"""
 
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -8,6 +12,8 @@ import time
 from pathlib import Path
 
 import pytest
+
+from whole_runs import MIXTURE, differences, write_input
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
@@ -247,6 +253,94 @@ def test_dry_run_starts_nothing(lab):
     result = ensemble(lab, "--seeds", "1-2", "--dry-run")
     assert result.stdout == "seed_1\t--set run.seed=1\nseed_2\t--set run.seed=2\n"
     assert not (lab / "out").exists()
+
+
+@pytest.fixture
+def real(program, tmp_path):
+    """`real(folder, *options)` starts an ensemble of the program itself, six members by default."""
+    text = MIXTURE.replace("event_log", "checkpoint_every = 0.05 event_log")
+    input_file = write_input(tmp_path, text.replace("time = 4", "time = 80"))
+
+    def start(folder, *options, members=("--seeds", "1-6")):
+        return subprocess.Popen(
+            [SCRIPT, input_file, "-d", tmp_path / folder, *members, *options],
+            env={**os.environ, "RICOCHET": str(program)},
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            text=True,
+        )
+
+    return start
+
+
+def finish(process) -> int:
+    """The exit code of an ensemble, when it has come to its end."""
+    process.communicate(timeout=120)
+    return process.returncode
+
+
+def members_in(folder) -> list[int]:
+    """Process ids of the programs that write into a folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().split(b"\0")
+        except OSError:  # gone
+            continue
+        if any(word.startswith(f"{folder}/".encode()) for word in words) and b"-o" in words:
+            found.append(int(path.parent.name))
+    return found
+
+
+def disturb(process, folder, rng):
+    """TERM or KILL, for the launcher or a member."""
+    how = rng.choice([signal.SIGTERM, signal.SIGKILL])
+    members = members_in(folder)
+    victim = rng.choice(members) if members and rng.random() < 0.5 else process.pid
+    try:
+        os.kill(victim, how)
+    except ProcessLookupError:
+        return  # it has just ended
+
+
+def differences_of(one, other) -> list[str]:
+    """What is not the same in the six members of two ensembles."""
+    names = [f"seed_{k}.h5" for k in range(1, 7)]
+    return [f"{name}: {what}" for name in names for what in differences(one / name, other / name)]
+
+
+@pytest.mark.parametrize("times", [5, pytest.param(20, marks=pytest.mark.check)])
+def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
+    """TERM and KILL to launcher and members at random moments, and the command given again."""
+    begin = time.monotonic()
+    assert finish(real("calm", "-j", "2")) == 0
+    duration = time.monotonic() - begin
+    rng, disturbed = random.Random(times), 0
+    while disturbed < times:
+        process = real("rough", "-j", "2")
+        time.sleep(rng.uniform(0, duration / 2))
+        disturb(process, tmp_path / "rough", rng)
+        code = finish(process)
+        assert code in (0, 1, 75, -signal.SIGTERM, -signal.SIGKILL)
+        disturbed += 1
+        if code == 0:
+            assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
+            shutil.rmtree(tmp_path / "rough")
+    wait_for(lambda: members_in(tmp_path / "rough") == [])
+    assert finish(real("rough", "-j", "2")) == 0
+    assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
+
+
+def test_members_depend_neither_on_order_nor_on_jobs_nor_on_company(real, ricochet, tmp_path):
+    assert finish(real("one", "-j", "1")) == 0
+    lines = (tmp_path / "one" / "manifest.txt").read_text().splitlines(keepends=True)
+    (tmp_path / "backwards.txt").write_text("".join(reversed(lines)))
+    assert finish(real("two", "-j", "3", members=("--manifest", tmp_path / "backwards.txt"))) == 0
+    assert differences_of(tmp_path / "one", tmp_path / "two") == []
+    run = ricochet("gas.nml", "-o", "alone.h5", "--set", "run.seed=4")
+    assert run.returncode == 0
+    assert differences(tmp_path / "alone.h5", tmp_path / "one" / "seed_4.h5") == []
+    assert "/parameters/seed" in differences(tmp_path / "alone.h5", tmp_path / "one" / "seed_5.h5")
 
 
 @pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")

@@ -75,9 +75,7 @@ def stops_until_the_end(program, command, folder, longest, rng, most):
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     for stops in range(most + 1):
         resume = ["--resume"] if list(folder.glob("*.chk.h5")) else []
-        process = subprocess.Popen(
-            [program, *command, *resume], cwd=folder, text=True, **pipes
-        )
+        process = subprocess.Popen([program, *command, *resume], cwd=folder, text=True, **pipes)
         if stops < most:
             time.sleep(rng.uniform(0, longest))
             process.send_signal(rng.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
