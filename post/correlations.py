@@ -34,7 +34,10 @@ def lags(frames: int, per_decade: int = 12) -> np.ndarray:
 
 def mean_free_time(run: Run) -> float:
     """1 / w, over the whole run."""
-    return run.time[-1] / run.collisions_per_disk.value[-1]
+    collisions = run.collisions_per_disk.value[-1]
+    if not collisions > 0:
+        raise RunError(f"{run.path}: no disks have met so far")
+    return run.time[-1] / collisions
 
 
 def check_frames(run: Run) -> None:

@@ -25,7 +25,7 @@ def microseconds(run: Run) -> float:
     """Time per collision in microseconds."""
     rate = float(run.provenance.get("collisions_per_second", 0))
     if rate <= 0:
-        raise RunError(f"{run.path}: does not say its collisions per second")
+        raise RunError(f"{run.path}: is not finished: does not say its collisions per second")
     return 1e6 / rate
 
 

@@ -47,6 +47,8 @@ class Crater(NamedTuple):
 
 def projectile(run: Run) -> int:
     """Index of the projectile."""
+    if run.count < 2:
+        raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
     if "projectile" in run.names:
         return int(np.flatnonzero(run.of_species("projectile"))[0])
     moving = np.flatnonzero(run.speed(0) > 0)

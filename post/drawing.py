@@ -54,12 +54,21 @@ def command_line(
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run a script: a file that cannot be used is one line on stderr and exit code 2."""
+    """Run a script: a file that cannot be used is one line on stderr and exit code 2.
+
+    So are numbers of which the script can make no sense; `python -X dev` shows where.
+    """
     name = Path(sys.argv[0]).name
     try:
         main()
     except (RunError, OSError) as problem:
         print(f"{name}: {' '.join(str(problem).split())}", file=sys.stderr)
+        sys.exit(2)
+    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as problem:
+        if sys.flags.dev_mode:
+            raise
+        text = f"cannot make sense of {' '.join(sys.argv[1:])}: {problem!r}"
+        print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)

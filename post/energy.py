@@ -22,7 +22,7 @@ from drawing import (
     write_csv,
 )
 from equipartition import windows
-from read_run import Run
+from read_run import Run, RunError
 
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
@@ -38,6 +38,8 @@ def method(run: Run) -> str:
 def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Time and E / E(0) - 1 of the total energy."""
     time, energy = run.observable("total_energy")
+    if len(time) < 2:
+        raise RunError(f"{run.path}: has one sample of the energies so far; nothing has changed")
     return time, energy / energy[0] - 1
 
 

@@ -13,6 +13,7 @@ being written (`.part`) is read up to its last committed frame.
 """
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
@@ -78,7 +79,12 @@ class Frames:
                 if not -self.count <= one < self.count:
                     raise RunError(f"{self.path}: no frame {one}, there are {self.count}")
             chosen = np.mod(frame, self.count).tolist()
-        values = read_values(self.path, f"{DISKS}/{self.name}/value", chosen)
+        with open_file(self.path) as file:
+            data = file[f"{DISKS}/{self.name}/value"]
+            if isinstance(chosen, list):  # far faster than a list as index in h5py
+                values = np.stack([data[k] for k in chosen])
+            else:
+                values = data[chosen]
         values = values.astype(float) if values.dtype.kind == "f" else values
         return values[::-1] if backwards else values
 
@@ -153,11 +159,9 @@ class Run:
             if not isinstance(group, h5py.Group) or "value" not in group:
                 raise RunError(f"{self.path}: has no observable '{name}'")
             count = committed(file, "observables", group["value"].shape[0])
-        chosen = slice(0, count)
-        return Series(
-            read_values(self.path, f"observables/{name}/time", chosen),
-            read_values(self.path, f"observables/{name}/value", chosen),
-        )
+            if count == 0:
+                raise RunError(f"{self.path}: holds no observables yet")
+            return Series(*(checked(group[part], count)[:count] for part in Series._fields))
 
     @cached_property
     def events(self) -> Events:
@@ -166,9 +170,8 @@ class Run:
             if "events" not in file:
                 raise RunError(f"{self.path}: has no event log, set output.event_log = .true.")
             count = committed(file, "events", file["events/time"].shape[0])
-        return Events(
-            *(read_values(self.path, f"events/{name}", slice(0, count)) for name in Events._fields)
-        )
+            events = (checked(file[f"events/{part}"], count, ()) for part in Events._fields)
+            return Events(*(data[:count] for data in events))
 
     @cached_property
     def collisions_per_disk(self) -> Series:
@@ -208,16 +211,25 @@ def read_run(path: str | Path) -> Run:
     path = Path(path)
     with open_file(path) as file:
         check_format(path, file)
+        return run_of(path, file)
+
+
+@contextmanager
+def open_file(path: Path) -> Iterator[h5py.File]:
+    """The HDF5 file for reading; whatever turns out to be wrong with it is a RunError."""
+    with hdf5_file(path) as file:
         try:
-            return run_of(path, file)
+            yield file
         except KeyError as problem:
             raise RunError(f"{path}: not a complete Ricochet run, {problem.args[0]}") from None
-        except (OSError, RuntimeError):
+        except (OSError, RuntimeError, MemoryError):
             raise RunError(f"{path}: the file is damaged") from None
+        except (AttributeError, IndexError, TypeError, ValueError):
+            raise RunError(f"{path}: not laid out as a Ricochet run, or damaged") from None
 
 
-def open_file(path: Path) -> h5py.File:
-    """The HDF5 file for reading, also while a simulation writes it."""
+def hdf5_file(path: Path) -> h5py.File:
+    """The open file, also while a simulation writes it."""
     if not path.exists():
         part = Path(f"{path}.part")
         near = (f"{other}" for other in path.parent.glob("*.h5*") if ".chk." not in other.name)
@@ -240,16 +252,12 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
-def read_values(path: Path, name: str, chosen: int | slice | list[int]) -> np.ndarray:
-    """A part of a dataset; damage that shows only on reading is a RunError too."""
-    with open_file(path) as file:
-        try:
-            values = file[name]
-            if isinstance(chosen, list):  # far faster than a list as index in h5py
-                return np.stack([values[k] for k in chosen])
-            return values[chosen]
-        except (OSError, RuntimeError, KeyError):
-            raise RunError(f"{path}: cannot read {name}, the file is damaged") from None
+def checked(data: h5py.Dataset, count: int, item: tuple[int, ...] | None = None) -> h5py.Dataset:
+    """A dataset of numbers, `count` or more, or of arrays of them of the shape `item`."""
+    usual = data.dtype.kind in "iuf" and data.dtype.itemsize <= 8
+    if not usual or len(data) < count or item not in (None, data.shape[1:]):
+        raise ValueError(f"{data.name}: not {count} numbers, or arrays of the shape {item}")
+    return data
 
 
 def check_format(path: Path, file: h5py.File) -> None:
@@ -269,19 +277,24 @@ def run_of(path: Path, file: h5py.File) -> Run:
     count = committed(file, DISKS, disks["position/value"].shape[0])
     if count == 0:
         raise RunError(f"{path}: holds no frame yet")
-    box = disks["box"]
+    box, mass = disks["box"], checked(disks["mass"], 1, ())[:]
     parameters = tree(file["parameters"]) if "parameters" in file else {}
-    species = np.asarray(disks["species"][:], dtype=int)
+    species = checked(disks["species"], len(mass), ())[:].astype(int)
     names = parameters.get("species", {}).get("names")
+    frames = {}
+    for name, item in {"position": (2,), "velocity": (2,), "image": (2,), "collisions": ()}.items():
+        if name in disks:
+            checked(disks[name]["value"], count, (len(mass), *item))
+            frames[name] = Frames(path, name, count)
     return Run(
         path=path,
-        time=disks["position/time"][:count],
-        position=Frames(path, "position", count),
-        velocity=Frames(path, "velocity", count),
-        image=Frames(path, "image", count) if "image" in disks else None,
-        collisions=Frames(path, "collisions", count) if "collisions" in disks else None,
-        mass=disks["mass"][:],
-        radius=disks["radius"][:],
+        time=checked(disks["position/time"], count, ())[:count],
+        position=frames["position"],
+        velocity=frames["velocity"],
+        image=frames.get("image"),
+        collisions=frames.get("collisions"),
+        mass=mass,
+        radius=checked(disks["radius"], len(mass), ())[:],
         species=species,
         names=tuple(np.atleast_1d(names)) if names is not None else default_names(species),
         lower=vector(box, "lower", np.zeros(2)),
@@ -296,7 +309,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
 def committed(file: h5py.File, group: str, extent: int) -> int:
     """How many of the `extent` samples of a group are valid (a `.part` is allocated ahead)."""
     counter = file[group].get("committed")
-    return extent if counter is None else min(extent, int(counter[()]))
+    return extent if counter is None else max(0, min(extent, int(counter[()])))
 
 
 def default_names(species: np.ndarray) -> tuple[str, ...]:
@@ -318,7 +331,7 @@ def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
 def vector(group: h5py.Group, name: str, default: np.ndarray | None) -> np.ndarray:
     """A small vector that is a dataset or an attribute."""
     if name in group:
-        return group[name][:]
+        return checked(group[name], 2, ())[:]
     if name in group.attrs or default is None:
         return np.asarray(group.attrs[name])
     return default

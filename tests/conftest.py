@@ -34,3 +34,20 @@ def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
         return subprocess.run(command, check=False, timeout=timeout, **options)
 
     return run
+
+
+@pytest.fixture
+def started(program, tmp_path):
+    """`started(*arguments)` starts the program in `tmp_path`; whatever still runs is ended."""
+    processes = []
+
+    def start(*arguments):
+        command = [program, *map(str, arguments)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()

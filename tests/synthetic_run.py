@@ -11,6 +11,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "post"))
 
+#: What is called by its user; the other files in post/ are their parts.
+SCRIPTS = sorted(
+    path.stem for path in (ROOT / "post").glob("*.py") if "launch(main)" in path.read_text()
+)
+
 
 def text(value: str) -> np.bytes_:
     """A fixed-length string, as the program writes them."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from whole_runs import MIXTURE, differences, write_input
+from whole_runs import MIXTURE, differences, wait_for, write_input
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
@@ -73,13 +73,6 @@ def starts(lab):
     return {
         path.stem: path.read_text().splitlines() for path in sorted((lab / "out").glob("*.starts"))
     }
-
-
-def wait_for(condition, seconds=20):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
 
 
 def test_members_are_seeds_times_values(lab):

@@ -20,8 +20,10 @@ from whole_runs import (
     STOPPED,
     committed,
     differences,
+    frames_in,
     is_beginning,
     one_line,
+    wait_for,
     write_input,
 )
 
@@ -38,40 +40,6 @@ PLANNED = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
 LONG = ["--set", "stop.collisions=1000000000", "--set", "output.checkpoint_every="]
 #: What a run says on a disk without room: which file, how much is wanted, how much is free.
 NO_ROOM = r"^disk/gas\.(h5|h5\.part|chk\.h5): .*: (\d+ bytes needed, \d+ bytes free|.* are free.*)$"
-
-
-@pytest.fixture
-def started(program, tmp_path):
-    """`started(*arguments)` starts the program in `tmp_path`; whatever still runs is ended."""
-    processes = []
-
-    def start(*arguments):
-        command = [program, *map(str, arguments)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes))
-        return processes[-1]
-
-    yield start
-    for process in processes:
-        process.kill()
-        process.communicate()
-
-
-def wait_for(condition, limit=20.0):
-    """Returns when the condition holds."""
-    end = time.monotonic() + limit
-    while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.005)
-
-
-def frames_in(path) -> int:
-    """Committed frames; 0 if there is no file, or it is just growing."""
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            return int(file["particles/disks/committed"][()])
-    except OSError:
-        return 0
 
 
 def frames_by_h5dump(path) -> int:

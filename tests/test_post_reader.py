@@ -6,27 +6,9 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from synthetic_run import ROOT, run_script, write_run
+from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 from read_run import Obstacle, RunError, read_run
-
-SCRIPTS = [
-    "speeds",
-    "snapshot",
-    "crater",
-    "crater_scan",
-    "scattering",
-    "mixture",
-    "cooling",
-    "animate",
-    "energy",
-    "equipartition",
-    "gravity",
-    "missed",
-    "trajectory",
-    "export",
-    "cost",
-]
 
 
 @pytest.fixture
@@ -124,54 +106,6 @@ def test_restitution_per_pair_of_species(tmp_path):
         contact = {"restitution": 0.7, "pair_restitution": pairs}
         path = write_run(tmp_path / "run.h5", x, x, parameters={"contact": contact})
         np.testing.assert_equal(read_run(path).restitution, expected)
-
-
-def bad_files(folder):
-    """Files that are not finished runs, each with the word that tells why."""
-    good = write_run(folder / "good.h5", np.zeros((4, 50, 2)), np.zeros((4, 50, 2)))
-    (folder / "empty.h5").touch()
-    (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
-    data = good.read_bytes()
-    (folder / "short.h5").write_bytes(data[: len(data) // 2])
-    with h5py.File(folder / "foreign.h5", "w") as file:
-        file["x"] = 1
-    write_run(folder / "future.h5", np.zeros((1, 1, 2)), np.zeros((1, 1, 2)))
-    with h5py.File(folder / "future.h5", "r+") as file:
-        file["h5md"].attrs["version"] = np.array([2, 0])
-    write_run(folder / "partial.h5", np.zeros((1, 1, 2)), np.zeros((1, 1, 2)))
-    with h5py.File(folder / "partial.h5", "r+") as file:
-        del file["particles/disks/velocity"], file["particles/disks/mass"]
-    (folder / "unfinished.h5.part").touch()
-    with h5py.File(folder / "gas.chk.h5", "w") as file:
-        file["clock"] = 1.0
-    return {
-        "empty.h5": "empty",
-        "text.h5": "not an HDF5",
-        "short.h5": "cut short",
-        "foreign.h5": "not of a Ricochet run",
-        "future.h5": "version 2.0",
-        "partial.h5": "mass",
-        "missing.h5": "no such file",
-        "gas.chk.h5": "a checkpoint",
-        "unfinished.h5": "unfinished run",
-        "": "folder",
-    }
-
-
-def test_unusable_files_are_told_apart(tmp_path):
-    for name, word in bad_files(tmp_path).items():
-        with pytest.raises(RunError, match=word) as caught:
-            read_run(tmp_path / name)
-        assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
-
-
-@pytest.mark.parametrize("script", SCRIPTS)
-def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, capsys):
-    path = tmp_path / "text.h5"
-    path.write_text("no HDF5 at all\n")
-    assert run_script(script, path) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"{script}.py: {path}") and said.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """What the tests of whole runs share: inputs, and ways to look at and compare output files."""
 
+import time
 from pathlib import Path
 
 import h5py
@@ -82,3 +83,20 @@ def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
     path = Path(folder) / name
     path.write_text(text)
     return path
+
+
+def wait_for(condition, limit=20.0):
+    """Returns when the condition holds."""
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.005)
+
+
+def frames_in(path, group="particles/disks") -> int:
+    """Committed frames, or samples of another group; 0 if there is no file yet."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return int(file[group]["committed"][()])
+    except OSError:
+        return 0
