@@ -285,9 +285,9 @@ summarise() {
 
 # --- engines: the same script, with one share of the members, started elsewhere ---
 
-# Fills `share_command`, which lacks only K/M, and `shares`, M.
+# Fills `share_command`, which lacks only K/M, and `shares`, M: no more than Slurm allows in an array.
 prepare_shares() {
-  local most=$1 k here left=0
+  local most=1000 k here left=0
   here=$(cd -- "$folder" && pwd)
   for k in "${!names[@]}"; do
     [[ -e $folder/${names[k]}.h5 ]] || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
@@ -314,7 +314,7 @@ judge_by_files() {
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
-  prepare_shares 1000000
+  prepare_shares
   [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
   [[ ! -t 2 ]] || options+=(--bar)
   parallel "${options[@]}" "exec $(printf '%q ' "${share_command[@]}"){}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
@@ -344,7 +344,7 @@ submit_to_slurm() {
     printf '%s: Slurm job %s goes on: %d of %d members finished\n' "$folder" "$id" "$finished" "$total" >&2
     exit 75
   fi
-  prepare_shares 1000
+  prepare_shares
   task="#!/usr/bin/env bash
 trap 'kill -TERM \$child' TERM
 $(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!

@@ -173,7 +173,8 @@ def hosts(tmp_path):
 
 def test_parallel_runs_all_members_on_this_machine(ensemble, tmp_path):
     need("parallel")
-    arguments = ("--engine", "parallel", "-j", 2, "--seeds", "1-4", *SMALL)
+    folder = ("-d", "my members")  # a blank must not matter
+    arguments = (*folder, "--engine", "parallel", "-j", 2, "--seeds", "1-4", *SMALL)
     result = ensemble(*arguments)
     assert result.returncode == 0, result.stderr
     assert "4 of 4 members finished" in result.stderr
@@ -183,7 +184,7 @@ def test_parallel_runs_all_members_on_this_machine(ensemble, tmp_path):
     assert plain.returncode == 0
     for k in range(1, 5):
         name = f"seed_{k}.h5"
-        assert data_of(tmp_path / "members" / name) == data_of(tmp_path / "plain" / name)
+        assert data_of(tmp_path / "my members" / name) == data_of(tmp_path / "plain" / name)
 
 
 def test_parallel_runs_members_on_two_hosts(ensemble, hosts, tmp_path):
