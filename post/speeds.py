@@ -5,9 +5,10 @@
 Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
 equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start
 u is v itself.  Runs of the same N are put together.  Equilibrium takes the frames after --skip
-collisions per disk that are at least --apart collisions per disk from each other (then they
-count as independent).  Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law,
-KS against the exact law of N disks that share a fixed energy, which matters if they are few.
+collisions per disk that are at least --apart collisions per disk from each other.  Tests:
+Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N disks
+that share a fixed energy, which matters if they are few.  A disk has forgotten its speed after 5
+collisions: frames that are closer count for the tests as one frame every 5 collisions per disk.
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
@@ -42,6 +43,7 @@ RELAXATION = np.array(
     ]
 )
 BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
+MEMORY = 5.0  # collisions per disk after which a speed is independent
 
 
 def reduced_speeds(run: Run, frames: list[int]) -> np.ndarray:
@@ -62,6 +64,12 @@ def equilibrium_frames(run: Run, skip: float, apart: float, first: int = 0) -> l
     return chosen
 
 
+def independent_frames(run: Run, frames: list[int]) -> int:
+    """As how many independent ones these frames count."""
+    tau = run.collisions_per_disk_at(run.time)[frames]
+    return min(len(frames), 1 + int((tau[-1] - tau[0]) / MEMORY * (1 + 1e-9)))
+
+
 def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
     """Collisions per disk and a2 of each frame up to `until` collisions per disk."""
     tau = run.collisions_per_disk_at(run.time)
@@ -69,21 +77,23 @@ def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
     return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
 
 
-def table(groups: list, samples: list[np.ndarray]) -> dict[str, list]:
+def table(groups: list, samples: list[np.ndarray], independent: list[int]) -> dict[str, list]:
     """The tests of each group, as columns."""
     rows = []
-    for (count, runs), u in zip(groups, samples, strict=True):
-        maxwell = hold_against(u, maxwell_cdf)
-        exact = hold_against(u, finite_n_cdf(count, bool(runs[0].periodic.all())))
+    for (count, runs), u, n in zip(groups, samples, independent, strict=True):
+        maxwell = hold_against(u, maxwell_cdf, independent=n)
+        law = finite_n_cdf(count, bool(runs[0].periodic.all()))
+        exact = hold_against(u, law, independent=n)
         rows.append(
             {
                 "N": count,
                 "runs": len(runs),
                 "speeds": len(u),
+                "independent": n,
                 "mean_u": float(np.mean(u)),
                 "kurtosis": float(np.mean(u**4)),
                 "KS_D": maxwell.ks,
-                "KS_limit_1%": 1.63 / len(u) ** 0.5,
+                "KS_limit_1%": 1.63 / n**0.5,
                 "KS_p": maxwell.ks_p,
                 "chi2/dof": maxwell.chi2,
                 "chi2_p": maxwell.chi2_p,
@@ -149,11 +159,12 @@ def draw(groups: list, samples: list[np.ndarray], tests: dict) -> plt.Figure:
         last, [reduced_speeds(largest, [-1])], [f"one frame, t = {time:.4g}, N = {largest.count}"]
     )
     last.set_title("One frame at the end")
-    columns = (tests[key] for key in ("N", "speeds", "KS_D", "KS_p", "KS_p_exact"))
+    columns = ("N", "speeds", "independent", "KS_D", "KS_p", "KS_p_exact")
     labels = [
-        f"N = {n}: {size} speeds\nKS D = {d:.4f}, p = {p:.2g} (at fixed energy {q:.2g})"
-        for n, size, d, p, q in zip(*columns, strict=True)
-    ]
+        f"N = {n}: {size} speeds" + (f", {free} independent" if free < size else "")
+        + f"\nKS D = {d:.4f}, p = {p:.2g} (at fixed energy {q:.2g})"
+        for n, size, free, d, p, q in zip(*(tests[key] for key in columns), strict=True)
+    ]  # fmt: skip
     draw_histogram(pooled, samples, labels)
     pooled.set(title="Equilibrium, many frames", ylim=(0, 1.1 + 0.25 * len(groups)))
     draw_relaxation(way, groups)
@@ -170,16 +181,15 @@ def main() -> None:
     args = parser.parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: run.count)
-    samples = []
-    for _, members in groups:
+    samples, independent = [], []
+    for count, members in groups:
         picked = [
-            reduced_speeds(
-                r, equilibrium_frames(r, args.skip, args.apart, args.first) or [r.frames - 1]
-            )
+            (r, equilibrium_frames(r, args.skip, args.apart, args.first) or [r.frames - 1])
             for r in members
         ]
-        samples.append(np.concatenate(picked))
-    tests = table(groups, samples)
+        samples.append(np.concatenate([reduced_speeds(r, frames) for r, frames in picked]))
+        independent.append(int(count) * sum(independent_frames(*pick) for pick in picked))
+    tests = table(groups, samples, independent)
     print_table(tests)
     save(draw(groups, samples, tests), args.output, runs, "Speed distribution of hard disks")
     if args.csv:

@@ -23,9 +23,9 @@ class Estimate(NamedTuple):
 
 
 class LawTest(NamedTuple):
-    """A sample of n values held against a law."""
+    """A sample held against a law."""
 
-    n: int
+    n: int  # values that count as independent
     ks: float  # largest distance of the two distribution functions
     ks_p: float  # probability of a larger distance by chance
     chi2: float  # per degree of freedom, bins of equal probability
@@ -86,17 +86,24 @@ def excess_kurtosis(speed: np.ndarray) -> float:
     return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
 
 
-def hold_against(sample: np.ndarray, cdf: Law, bins: int = 30) -> LawTest:
-    """Kolmogorov-Smirnov and chi-square test of independent values against a law."""
-    ks = stats.ks_1samp(sample, cdf)
+def hold_against(
+    sample: np.ndarray, cdf: Law, bins: int = 30, independent: int | None = None
+) -> LawTest:
+    """Kolmogorov-Smirnov and chi-square test of a sample against a law.
+
+    `independent` tells how many of the values are (all, if not given): correlated ones scatter as
+    if there were only so many.
+    """
+    n = len(sample) if independent is None else independent
+    distance = float(stats.ks_1samp(sample, cdf).statistic)
     counts, _ = np.histogram(cdf(np.asarray(sample)), bins=bins, range=(0, 1))
-    chi2 = stats.chisquare(counts, np.full(bins, counts.sum() / bins))
+    chi2 = stats.chisquare(counts, np.full(bins, counts.sum() / bins)).statistic * n / len(sample)
     return LawTest(
-        len(sample),
-        float(ks.statistic),
-        float(ks.pvalue),
-        float(chi2.statistic) / (bins - 1),
-        float(chi2.pvalue),
+        n,
+        distance,
+        float(stats.kstwo.sf(distance, n)),
+        float(chi2) / (bins - 1),
+        float(stats.chi2.sf(chi2, bins - 1)),
     )
 
 

@@ -53,6 +53,8 @@ def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng):
     energies *= 5 / energies.sum(axis=1, keepdims=True)
     u = np.sqrt(energies[:, 0])
     assert theory.hold_against(u, theory.finite_n_cdf(5)).ks_p > 0.01
+    again = theory.hold_against(np.repeat(u, 4), theory.finite_n_cdf(5), independent=len(u))
+    assert again == pytest.approx(theory.hold_against(u, theory.finite_n_cdf(5)), rel=0.02)
     assert theory.hold_against(u, theory.maxwell_cdf).ks_p < 0.01
     largest = np.max(np.abs(theory.finite_n_cdf(100)(u) - theory.maxwell_cdf(u)))
     assert largest == pytest.approx(0.232 / 100, rel=0.02)
