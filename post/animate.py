@@ -13,9 +13,18 @@ import numpy as np
 from matplotlib import animation
 from tqdm import tqdm
 
-from drawing import caption, command_line, disk_collection, draw_box, launch, plt, species_colours
+from drawing import (
+    caption,
+    command_line,
+    disk_collection,
+    draw_box,
+    launch,
+    plt,
+    positive,
+    species_colours,
+)
 from read_run import Run, RunError, read_run
-from snapshot import LABELS, chosen_frames, default_colour, values_of
+from snapshot import LABELS, default_colour, spread_frames, values_of
 
 
 def film_path(asked: Path | None, run: Run) -> Path:
@@ -70,12 +79,12 @@ def main() -> None:
     parser = command_line(__doc__, "RUN.mp4", one=True)
     parser.set_defaults(output=None)
     parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
-    parser.add_argument("--frames", type=int, default=300, help="at most this many [300]")
-    parser.add_argument("--fps", type=int, default=25, help="frames per second [25]")
+    parser.add_argument("--frames", type=positive, default=300, help="at most this many [300]")
+    parser.add_argument("--fps", type=positive, default=25, help="frames per second [25]")
     args = parser.parse_args()
     run = read_run(args.run)
     path = film_path(args.output, run)
-    frames = chosen_frames(run, None, min(args.frames, run.frames))
+    frames = spread_frames(run, min(args.frames, run.frames))
     animate(run, frames, args.colour or default_colour(run), path, args.fps)
     print(f"film = {path}")
 

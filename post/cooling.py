@@ -11,7 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drawing import COLOURS, caption, command_line, grouped, launch, plt, read_all, save, write_csv
+from drawing import (
+    COLOURS,
+    band,
+    caption,
+    command_line,
+    dilute_limit,
+    grouped,
+    launch,
+    plt,
+    read_all,
+    save,
+    write_csv,
+)
 from read_run import Run
 from theory import Estimate, estimate
 
@@ -59,12 +71,6 @@ def lightest(run: Run) -> int:
     return int(np.argmin([run.mass[run.of_species(name)][0] for name in run.names]))
 
 
-def band(axes: plt.Axes, x: np.ndarray, y: Estimate, **style) -> None:
-    """A line with its standard error."""
-    axes.plot(x, y.mean, **style)
-    axes.fill_between(x, y.mean - y.error, y.mean + y.error, color=style["color"], alpha=0.25, lw=0)
-
-
 def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.Figure:
     """Columns: restitution.  Rows: against time, against collisions; below the ratio."""
     figure = plt.figure(figsize=(10, 9))
@@ -76,7 +82,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
         for row, (x, y) in enumerate((result.by_time, result.by_collisions)):
             axes = figure.add_subplot(grid[row, column])
             for label, mean, error, colour in zip(labels, y.mean, y.error, colours, strict=False):
-                band(axes, x, Estimate(mean, error), color=colour, label=label)
+                band(axes, x, mean, error, color=colour, label=label)
             axes.set(yscale="log", ylim=(0.8 * floor, 2), xlim=(0, x[-1]))
             axes.set_xlabel("collisions per disk" if row else "time (reduced units)")
             if column == 0:
@@ -87,15 +93,8 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
                 axes.legend()
     axes = figure.add_subplot(grid[2, :])
     for (xi, _), result, colour in zip(groups, results, COLOURS[2:], strict=False):
-        band(axes, result.by_collisions[0], result.ratio, color=colour, label=f"ξ = {xi:g}")
-    axes.plot(
-        *EQUIPARTITION.T,
-        ls="",
-        marker="o",
-        mfc="none",
-        color="black",
-        label="ξ = 1, dilute limit (Boltzmann equation)",
-    )
+        band(axes, result.by_collisions[0], *result.ratio, color=colour, label=f"ξ = {xi:g}")
+    dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", xlim=(0, None), ylabel="temperature ratio heavy / light")
     axes.legend(ncols=2)

@@ -16,7 +16,18 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 import hard_disks
-from drawing import COLOURS, caption, command_line, grouped, launch, plt, read_all, save, write_csv
+from drawing import (
+    COLOURS,
+    caption,
+    command_line,
+    dilute_limit,
+    grouped,
+    launch,
+    plt,
+    read_all,
+    save,
+    write_csv,
+)
 from read_run import Run, RunError
 from speeds import RELAXATION
 from theory import estimate, excess_kurtosis
@@ -195,8 +206,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figu
         ylabel="mean square displacement / $\\sigma^2$",
     )
     if min(found["a2"][0] for found in results) < -0.4:
-        dilute = "dilute limit (Boltzmann equation)"
-        a2.plot(*RELAXATION.T, ls="", marker="o", mfc="none", color="black", label=dilute)
+        dilute_limit(a2, RELAXATION)
         a2.legend(loc="lower right")
     a2.axhline(0, color="0.6", lw=0.8, zorder=0)
     a2.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)", xlim=(0, None))

@@ -40,9 +40,7 @@ def command_line(
     doc: str, output: str, one: bool = False, table: bool = False
 ) -> argparse.ArgumentParser:
     """A parser whose help is the script's docstring; `one` run or any number, --csv or not."""
-    parser = Parser(
-        description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = Parser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     if one:
         parser.add_argument("run", metavar="RUN.h5", help="file written by ricochet")
     else:
@@ -51,6 +49,21 @@ def command_line(
     if table:
         parser.add_argument("--csv", type=Path, help="write the numbers behind the figure")
     return parser
+
+
+def whole_numbers(text: str) -> list[int]:
+    """A list such as '0,10,-1' on the command line."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no list such as 1,5,9") from None
+
+
+def positive(text: str) -> int:
+    """A number of things on the command line."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number above 0")
+    return int(text)
 
 
 def launch(main: Callable[[], None]) -> None:
@@ -152,6 +165,18 @@ def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> 
     )
     axes.add_collection(collection)
     return collection
+
+
+def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
+    """A line with its standard error."""
+    axes.plot(x, y, **style)
+    axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
+
+
+def dilute_limit(axes: plt.Axes, points: np.ndarray, of: str = "") -> None:
+    """Points (P, 2) of a solution of the Boltzmann equation as open circles."""
+    label = f"{of}dilute limit (Boltzmann equation)"
+    axes.plot(*points.T, ls="", marker="o", mfc="none", color="black", label=label)
 
 
 def species_colours(run: Run) -> list[str]:

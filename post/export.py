@@ -13,10 +13,22 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from drawing import command_line, launch
+from drawing import command_line, launch, positive
 from read_run import Run, RunError, read_run
 
 PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1:id:I:1"
+
+
+def disks(run: Run, frame: int) -> Iterator[tuple]:
+    """Species, x, y, vx, vy, radius, mass of each disk."""
+    return zip(
+        (run.names[s - 1] for s in run.species),
+        *run.position[frame].T.tolist(),
+        *run.velocity[frame].T.tolist(),
+        run.radius.tolist(),
+        run.mass.tolist(),
+        strict=True,
+    )
 
 
 def xyz_frame(run: Run, frame: int) -> str:
@@ -27,34 +39,18 @@ def xyz_frame(run: Run, frame: int) -> str:
         f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
         f"Time={run.time[frame]} Properties={PROPERTIES}"
     )
-    names = [run.names[s - 1].replace(" ", "_") for s in run.species]
-    rows = zip(
-        names,
-        run.position[frame].tolist(),
-        run.velocity[frame].tolist(),
-        run.radius.tolist(),
-        run.mass.tolist(),
-        strict=True,
-    )
     lines = [
-        f"{name} {x} {y} {u} {v} {r} {m} {k}"
-        for k, (name, (x, y), (u, v), r, m) in enumerate(rows, start=1)
+        " ".join(map(str, (species.replace(" ", "_"), *numbers, k)))
+        for k, (species, *numbers) in enumerate(disks(run, frame), start=1)
     ]
     return "\n".join([str(run.count), head, *lines, ""])
 
 
 def csv_frame(run: Run, frame: int) -> str:
     """One frame as comma-separated lines."""
-    rows = zip(
-        run.position[frame].tolist(),
-        run.velocity[frame].tolist(),
-        run.radius.tolist(),
-        run.mass.tolist(),
-        strict=True,
-    )
     return "".join(
-        f"{run.time[frame]},{k},{run.names[run.species[k - 1] - 1]},{x},{y},{u},{v},{r},{m}\n"
-        for k, ((x, y), (u, v), r, m) in enumerate(rows, start=1)
+        ",".join(map(str, (run.time[frame], k, *disk))) + "\n"
+        for k, disk in enumerate(disks(run, frame), start=1)
     )
 
 
@@ -70,7 +66,7 @@ def exported(run: Run, suffix: str, step: int) -> Iterator[str]:
 def main() -> None:
     parser = command_line(__doc__, "RUN.xyz", one=True)
     parser.set_defaults(output=None)
-    parser.add_argument("--every", type=int, default=1, help="every so many frames [1]")
+    parser.add_argument("--every", type=positive, default=1, help="every so many frames [1]")
     args = parser.parse_args()
     run = read_run(args.run)
     path = args.output or Path(run.path.name).with_suffix(".xyz")
@@ -78,7 +74,7 @@ def main() -> None:
         raise RunError(f"{path}: export ends in .xyz or .csv")
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:
-        file.writelines(exported(run, path.suffix, max(1, args.every)))
+        file.writelines(exported(run, path.suffix, args.every))
     print(f"export = {path}")
 
 

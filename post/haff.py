@@ -11,7 +11,18 @@ energy and it falls more slowly.  Periodic boxes at rest as a whole.
 import numpy as np
 
 import hard_disks
-from drawing import COLOURS, caption, command_line, grouped, launch, plt, read_all, save, write_csv
+from drawing import (
+    COLOURS,
+    band,
+    caption,
+    command_line,
+    grouped,
+    launch,
+    plt,
+    read_all,
+    save,
+    write_csv,
+)
 from read_run import Run, RunError
 from theory import Estimate, estimate
 from thermodynamics import packing
@@ -58,8 +69,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figu
             (right, found["tau"], found["by_collisions"], hard_disks.haff_by_collisions),
         )
         for axes, x, y, law in panels:
-            axes.plot(x, y.mean, color=colour, label=f"ξ = {xi:g}")
-            axes.fill_between(x, y.mean - y.error, y.mean + y.error, color=colour, alpha=0.25, lw=0)
+            band(axes, x, *y, color=colour, label=f"ξ = {xi:g}")
             axes.plot(x, law(x, xi), color="black", ls="--", lw=1)
     left.plot([], [], color="black", ls="--", lw=1, label="Haff 1983")
     right.plot([], [], color="black", ls="--", lw=1, label="van Noije and Ernst 1998")

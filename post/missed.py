@@ -123,7 +123,7 @@ def compare(runs: list[Run], after: float) -> list[Missed]:
     """A row per step; the event-driven runs come first, with dt = 0."""
     groups = grouped(runs, step_of)
     if groups[0][0] != 0 or len(groups) < 2:
-        raise RunError("missed.py needs event-driven runs and runs by time steps")
+        raise RunError("event-driven runs and runs by time steps are needed")
     exact = {run.seed: rate_after(run, after) for run in groups[0][1]}
     rows = []
     for step, members in groups:

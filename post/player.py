@@ -19,9 +19,9 @@ import numpy as np
 from matplotlib.colors import to_hex
 from tqdm import tqdm
 
-from drawing import COLOURS, caption, command_line, launch, plt
+from drawing import COLOURS, caption, command_line, launch, plt, positive
 from read_run import Run, RunError, read_run
-from snapshot import LABELS, chosen_frames, default_colour, values_of
+from snapshot import LABELS, default_colour, spread_frames, values_of
 
 PAGE = Path(__file__).with_suffix(".html")
 ROOM = 29e6  # bytes of base64 for the disks
@@ -189,7 +189,7 @@ def page(run: Run, facts: dict, blocks: dict) -> str:
 def main() -> None:
     parser = command_line(__doc__, "RUN.html", one=True)
     parser.set_defaults(output=None)
-    parser.add_argument("--frames", type=int, help="so many frames, evenly spread")
+    parser.add_argument("--frames", type=positive, help="so many frames, evenly spread")
     parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
     parser.add_argument("--disk", type=int, metavar="ID", help="show the trace of this disk")
     args = parser.parse_args()
@@ -202,7 +202,7 @@ def main() -> None:
     colour = args.colour or default_colour(run)
     if colour == "collisions" and colour not in quantities(run):
         raise RunError(f"{run.path}: has no collisions per disk")
-    frames = chosen_frames(run, None, max(1, min(run.frames, args.frames or frames_that_fit(run))))
+    frames = spread_frames(run, max(1, min(run.frames, args.frames or frames_that_fit(run))))
     text = page(run, *film(run, frames, colour, args.disk))
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")

@@ -18,8 +18,10 @@ from drawing import (
     draw_box,
     launch,
     plt,
+    positive,
     save,
     species_colours,
+    whole_numbers,
 )
 from read_run import Run, read_run
 
@@ -30,13 +32,9 @@ LABELS = {
 }
 
 
-def chosen_frames(run: Run, frames: str | None, count: int | None) -> list[int]:
-    """Frame numbers from a list such as '0,10,-1', or `count` frames evenly spread."""
-    if frames is not None:
-        return [int(text) for text in frames.split(",")]
-    if count is not None:
-        return np.unique(np.linspace(0, run.frames - 1, count).round().astype(int)).tolist()
-    return [-1]
+def spread_frames(run: Run, count: int) -> list[int]:
+    """Numbers of `count` frames, evenly spread."""
+    return np.unique(np.linspace(0, run.frames - 1, count).round().astype(int)).tolist()
 
 
 def values_of(run: Run, frame: int, colour: str) -> np.ndarray:
@@ -113,13 +111,18 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
 
 def main() -> None:
     parser = command_line(__doc__, "snapshot.png", one=True)
-    parser.add_argument("--frames", help="frame numbers, e.g. 0,10,-1 (negative: from the end)")
-    parser.add_argument("--count", type=int, help="this many frames, evenly spread")
+    parser.add_argument(
+        "--frames",
+        type=whole_numbers,
+        default=[-1],
+        help="frame numbers, e.g. 0,10,-1 (negative: from the end) [-1]",
+    )
+    parser.add_argument("--count", type=positive, help="this many frames, evenly spread")
     parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
     parser.add_argument("--quiver", action="store_true", help="velocities as arrows")
     args = parser.parse_args()
     run = read_run(args.run)
-    frames = chosen_frames(run, args.frames, args.count)
+    frames = spread_frames(run, args.count) if args.count else args.frames
     figure = draw(run, frames, args.colour or default_colour(run), args.quiver)
     save(figure, args.output, [run], f"Frames of {run.path.name}")
 

@@ -18,6 +18,7 @@ from drawing import (
     COLOURS,
     caption,
     command_line,
+    dilute_limit,
     grouped,
     launch,
     plt,
@@ -134,14 +135,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
-    axes.plot(
-        *RELAXATION.T,
-        ls="",
-        marker="o",
-        mfc="none",
-        color="black",
-        label="dilute limit (Boltzmann equation)",
-    )
+    dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
     axes.legend()

@@ -17,8 +17,10 @@ from drawing import (
     draw_box,
     launch,
     plt,
+    positive,
     read_all,
     save,
+    whole_numbers,
 )
 from matplotlib.patches import Circle
 from read_run import Run, RunError
@@ -50,13 +52,12 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
     return np.concatenate(rows)
 
 
-def chosen_disks(run: Run, text: str | None) -> list[int]:
+def chosen_disks(run: Run, numbers: list[int] | None) -> list[int]:
     """Indices from numbers that count from 1; the first twelve without a choice."""
-    disks = [int(t) - 1 for t in text.split(",")] if text else list(range(min(12, run.count)))
-    for disk in disks:
-        if not 0 <= disk < run.count:
-            raise RunError(f"{run.path}: no disk {disk + 1}, there are {run.count}")
-    return disks
+    for number in numbers or []:
+        if not 1 <= number <= run.count:
+            raise RunError(f"{run.path}: no disk {number}, there are {run.count}")
+    return [number - 1 for number in numbers] if numbers else list(range(min(12, run.count)))
 
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
@@ -79,8 +80,8 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
 
 def main() -> None:
     parser = command_line(__doc__, "trajectory.png")
-    parser.add_argument("--disks", help="their numbers from 1, e.g. 1,5,9")
-    parser.add_argument("--first", type=int, metavar="K", help="only the first K frames")
+    parser.add_argument("--disks", type=whole_numbers, help="their numbers from 1, e.g. 1,5,9")
+    parser.add_argument("--first", type=positive, metavar="K", help="only the first K frames")
     args = parser.parse_args()
     runs = read_all(args.runs)
     figure, panels = plt.subplots(1, len(runs), squeeze=False, figsize=(5.2 * len(runs), 5.7))

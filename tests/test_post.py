@@ -517,10 +517,9 @@ def test_equilibrium_values_are_means_over_the_second_half(tmp_path, rng):
 
 def test_chosen_frames(tmp_path, rng):
     run = read_run(gas(tmp_path / "gas.h5", rng, count=2))
-    assert snapshot.chosen_frames(run, "0,10,-1", None) == [0, 10, -1]
-    assert snapshot.chosen_frames(run, None, 5) == [0, 10, 20, 30, 40]
-    assert snapshot.chosen_frames(run, None, 1000) == list(range(41))
-    assert snapshot.chosen_frames(run, None, None) == [-1]
+    assert snapshot.spread_frames(run, 1) == [0]
+    assert snapshot.spread_frames(run, 5) == [0, 10, 20, 30, 40]
+    assert snapshot.spread_frames(run, 1000) == list(range(41))
 
 
 def test_paths_break_where_a_period_is_crossed(tmp_path):

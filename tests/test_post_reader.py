@@ -123,6 +123,24 @@ def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, w
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (["snapshot", "--frames", "0,a"], "'0,a' is no list"),
+        (["snapshot", "--count", "0"], "'0' is no whole number above 0"),
+        (["animate", "--frames", "-3"], "'-3' is no whole number above 0"),
+        (["trajectory", "--disks", "one"], "'one' is no list"),
+        (["trajectory", "--disks", "0"], "no disk 0"),
+        (["export", "--every", "0.5"], "'0.5' is no whole number above 0"),
+    ],
+)
+def test_numbers_that_are_none_are_refused(small, capsys, wrong, words):
+    script, *options = wrong
+    assert run_script(script, small, *options) == 2
+    said = capsys.readouterr().err
+    assert words in said and "Traceback" not in said
+
+
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_scripts_explain_themselves(script, capsys):
     assert run_script(script, "--help") == 0
