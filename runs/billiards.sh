@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # L3: circular walls and unequal disks: paths in the billiards of Sinai and Lorentz, the divergence of
 # neighbouring paths, a round container, Brownian motion.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for name in sinai lorentz container; do
   runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 "$@"

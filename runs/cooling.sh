@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # S4: kinetic energies of the mixture for restitution 1, 0.9, 0.8; eight seeds, both wall rules.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/cooling.nml -d "$data" --scan contact.wall_rule=velocity,normal \
   --scan contact.restitution=1,0.9,0.8 --seeds 1-8 "$@"

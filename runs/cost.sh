@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # L2: time per collision against the number of disks for the three ways of finding the next one.
 # One run at a time, for the clock's sake; remove runs/cost to measure anew.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Packing fraction 0.3 whatever the number; no output on the way. Collisions enough that the first
 # predictions, one per disk, do not count: 10 per disk, 5 of a million disks; with `rescan`, which

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # S5: one crater in pictures, then its size against mass, speed, radius and restitution.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Eight beds (seeds) for each of ten values of each parameter, the other three at the base
 # mass 25, speed 5, radius 5, restitution 0.5.  There is no energy scale, so the speed must not

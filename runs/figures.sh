@@ -4,7 +4,7 @@
 #   runs/figures.sh                 all
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 known=(scattering gas mixture cooling crater lab cost billiards gravity state)
 
 options=()

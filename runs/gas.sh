@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # S2: speeds of 1000 and of 2000 disks, from equal speeds to the Maxwell law; four seeds each.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # A frame every half collision per disk shows the relaxation; the histogram takes every tenth.
 for count in 1000 2000; do

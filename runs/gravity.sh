@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # G1-G4: the gravity box: energies, equipartition, exponential laws, pictures and a film.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # G1: event driven beside time steps: the total energy; how many collisions steps miss.
 runs/ensemble.sh input/gravity.nml -d "$data/events" --seeds 1 "$@"

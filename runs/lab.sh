@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # L1: 10 x 10 disks on a grid: frames, speeds of the last and of every 100th state, a film; and the
 # same with different masses.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/lab.nml -d "$data" --seeds 1 "$@"
 # Frame 50 is the state after 5000 events; the 500 that follow give 50 000 speeds.

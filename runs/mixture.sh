@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # S3: speeds and energies of a mixture of light and heavy disks, before and in equilibrium.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 runs/ensemble.sh input/mixture.nml -d "$data" --seeds 1-8 --set stop.collisions_per_disk=150 "$@"
 "$python" post/mixture.py "$data"/*.h5 -o "$figures/mixture.png" --csv "$figures/mixture.csv"

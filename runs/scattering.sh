@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # S1: scattering angle of a light disk off a heavy one, for 41 impact parameters b/R12 in 0..1.2.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Height of the light disk: 0.5 + b, R12 = 0.1 + 0.001.
 for k in {0..40}; do

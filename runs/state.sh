@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Bulk hard disks: equation of state, memory and order, Haff's law; four seeds each.
-. "$(dirname -- "${BASH_SOURCE[0]}")/common.bash"
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Pressure: at random up to 0.5, grown to 0.7, a crystal from 0.72 in a box that fits it.
 runs/ensemble.sh input/bulk.nml -d "$data/fluid" --seeds 1-4 \

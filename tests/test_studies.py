@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-NO_SYSTEM = ("ensemble", "figures", "bench")
+NO_SYSTEM = ("common", "ensemble", "figures", "bench")
 SYSTEMS = sorted(p.stem for p in (ROOT / "runs").glob("*.sh") if p.stem not in NO_SYSTEM)
 
 
