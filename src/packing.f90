@@ -214,20 +214,21 @@ contains
     real(real64) :: corner(2)
     logical :: yes
     if (by < 0) then
-      yes = bars(self%box%obstacle(-by), &
-        self%separation(self%box%obstacle(-by)%centre, centre), half, radius)
+      yes = bars(self, self%box%obstacle(-by), centre, half, radius)
     else
       corner = abs(self%separation(self%disk(by)%x, centre)) + half
       yes = corner(1)**2 + corner(2)**2 < (self%layer(self%disk(by)%species)%radius + radius)**2
     end if
   end function covers
 
-  !> The same for an obstacle, with the rectangle's middle seen from the obstacle's.
-  pure function bars(obstacle, d, half, radius) result(yes)
+  !> The same for an obstacle.
+  pure function bars(packing, obstacle, centre, half, radius) result(yes)
+    type(packing_t), intent(in) :: packing
     type(obstacle_t), intent(in) :: obstacle
-    real(real64), intent(in) :: d(2), half(2), radius
-    real(real64) :: corner(2)
+    real(real64), intent(in) :: centre(2), half(2), radius
+    real(real64) :: d(2), corner(2)
     logical :: yes
+    d = packing%separation(obstacle%centre, centre)
     if (obstacle%inside) then
       corner = max(abs(d) - half, 0.0_real64)
       yes = radius > obstacle%radius .or. &
