@@ -2,6 +2,7 @@
 !> and a lock file keeps other runs away; the name OUT.h5 means finished.
 module output
   use kinds, only: int32, int64, never, real64
+  use box_geometry, only: box_t
   use cadence, only: cadence_t
   use errors, only: error_t, exit_files, fail
   use event_log, only: event_log_t
@@ -225,68 +226,56 @@ contains
     call self%h5md%file%failure(error)
   end subroutine write_what_is_due
 
-  !> Writes one frame, disks in file order. One field after the other: then one buffer of 16 bytes per disk
-  !> is enough.
+  !> Writes one frame, disks in file order.
   subroutine write_frame(self, sim)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), allocatable :: vectors(:)
-    integer(int32), allocatable :: numbers(:)
-    integer(int32) :: i
-    integer(int64) :: k
-    call self%progress%frames%take(sim)
-    call self%h5md%reserve_frame()
+    real(real64), allocatable :: x(:), v(:)       ! vectors one after the other
+    integer(int32), allocatable :: image(:), collisions(:)
+    integer(int32) :: i, k
+    integer(int64) :: frame
     associate (file => self%h5md%file, track => self%h5md%frames, n => sim%n_disks())
-      k = track%put + 1
+      allocate (x(2*n), v(2*n), collisions(n))
+      do i = 1, n
+        k = sim%tag(i)%id
+        x(2*k - 1:2*k) = sim%position(i)
+        v(2*k - 1:2*k) = sim%velocity(i)
+        collisions(k) = sim%tag(i)%collisions
+      end do
+      call self%progress%frames%take(sim)
+      call self%h5md%reserve_frame()
+      frame = track%put + 1
       call track%put_moment(file, sim%time())
-      allocate (vectors(2*n))
-      do i = 1, n
-        vectors(2*sim%tag(i)%id - 1:2*sim%tag(i)%id) = position_in_box(sim, i)
-      end do
-      call track%series(position_series)%put(file, k, 1_int64, vectors)
-      do i = 1, n
-        vectors(2*sim%tag(i)%id - 1:2*sim%tag(i)%id) = sim%velocity(i)
-      end do
-      call track%series(velocity_series)%put(file, k, 1_int64, vectors)
-      deallocate (vectors)
-      allocate (numbers(n))
-      numbers(sim%tag%id) = sim%tag%collisions
-      call track%series(collisions_series)%put(file, k, 1_int64, numbers)
       if (any(sim%box%periodic)) then
-        deallocate (numbers)
-        allocate (numbers(2*n))
+        allocate (image(2*n))
         do i = 1, n
-          numbers(2*sim%tag(i)%id - 1:2*sim%tag(i)%id) = sim%tag(i)%image + periods_out(sim, i)
+          k = sim%tag(i)%id
+          image(2*k - 1:2*k) = sim%tag(i)%image
+          call wrap(sim%box, x(2*k - 1:2*k), image(2*k - 1:2*k))
         end do
-        call track%series(image_series)%put(file, k, 1_int64, numbers)
+        call track%series(image_series)%put(file, frame, 1_int64, image)
       end if
+      call track%series(position_series)%put(file, frame, 1_int64, x)
+      call track%series(velocity_series)%put(file, frame, 1_int64, v)
+      call track%series(collisions_series)%put(file, frame, 1_int64, collisions)
       call track%commit(file, 1_int64)
     end associate
   end subroutine write_frame
 
-  !> Periods by which disk i has flown out of the box since it last passed a side.
-  pure function periods_out(sim, i) result(periods)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
+  !> Moves a point by whole periods into the box, which holds its lower sides only, and counts them.
+  pure subroutine wrap(box, x, image)
+    type(box_t), intent(in) :: box
+    real(real64), intent(inout) :: x(2)           !! [length]
+    integer(int32), intent(inout) :: image(2)     !! periods travelled
     integer(int32) :: periods(2)
-    real(real64) :: x(2)
-    x = sim%position(i)
-    associate (box => sim%box, edges => sim%box%edges())
+    associate (edges => box%edges())
       periods = merge(floor((x - box%lower)/edges), 0, box%periodic)
       where (box%periodic .and. x - periods*edges >= box%upper) periods = periods + 1
+      image = image + periods
+      x = x - periods*edges
     end associate
-  end function periods_out
-
-  !> Where disk i is, moved by whole periods into the box, which holds its lower sides only.
-  pure function position_in_box(sim, i) result(x)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    real(real64) :: x(2)
-    x = sim%position(i)
-    if (.not. any(sim%box%periodic)) return
-    x = x - periods_out(sim, i)*sim%box%edges()
-    where (sim%box%periodic) x = max(x, sim%box%lower)        ! by rounding only
-  end function position_in_box
+    where (box%periodic) x = max(x, box%lower)    ! by rounding only
+  end subroutine wrap
 
   subroutine write_observables(self, sim)
     class(output_t), intent(inout) :: self
