@@ -173,12 +173,13 @@ check:  ## validates the physics and provokes faults (minutes)
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
-bench: all  ## measures collisions per second
-	@RICOCHET=$(BUILD)/ricochet runs/bench.sh
+bench: all  ## measures collisions per second; FULL=1: and more
+	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
 
-bench-check: all  ## counts instructions per collision against what is promised
+bench-check:  ## counts instructions per collision against what is promised
 	@.ci/set-up bench
-	@RICOCHET=$(BUILD)/ricochet runs/bench.sh --check
+	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
+	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
 
 lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint

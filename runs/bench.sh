@@ -1,48 +1,182 @@
 #!/usr/bin/env bash
-# Measures what a collision costs: equal disks, elastic, in a walled box, observables on, one core.
-# Prints million collisions per second of processor time, the median of some runs.
+# What a collision costs, and what everything around it costs. docs/performance.md says more.
 #
-#   runs/bench.sh            N = 1e3, 1e4, 1e5 at four packings, and all pairs at N = 1e3
-#   runs/bench.sh --full     N = 1e6 as well
+#   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
+#   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; two runs on two cores
 #   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
 #
-# Nothing else should run meanwhile. RUNS=5 and RICOCHET=build/ricochet can be set.
+# Rates are million collisions per second of processor time of one run with observables on; medians
+# of RUNS=5 on one core. All runs start from a state that was mixed before. Nothing else should run
+# meanwhile. RICOCHET=build/ricochet is measured; for --check it must not contain AVX-512 code.
 set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
-program=${RICOCHET:-build/ricochet}
-repeats=${RUNS:-3}
+program=$(realpath "${RICOCHET:-build/ricochet}")
+repeats=${RUNS:-5}
+full=
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+one_core=()
+if command -v taskset >/dev/null; then one_core=(taskset -c $(($(nproc) - 1))); fi
 
-# input DISKS PACKING COLLISIONS SEARCH: writes the input file of one state.
+# --- One state, one run ---------------------------------------------------------------------------
+
+# input FILE START SPECIES...: writes an input file; every species starts as START says.
 input() {
-  local placement=random
-  [ "$2" = 0.7 ] && placement=lattice            # beyond what random insertion reaches; it melts at once
-  cat >"$work/bench.nml" <<EOF
-&run search = '$4' /
-&species name = 'gas', count = $1, packing_fraction = $2, placement = '$placement', velocities = 'maxwell' /
-&stop collisions = $3 /
-&output observables_every_collisions = $((5 * $1)) /
-EOF
+  local file=$1 start=$2 species
+  shift 2
+  for species; do echo "&species $species, $start /"; done >"$file"
 }
 
-# rate DISKS PACKING COLLISIONS [SEARCH]: median rate in million collisions per second.
-rate() {
-  input "$1" "$2" "$3" "${4:-cells}"
-  for ((run = 0; run < repeats; run++)); do
-    "$program" "$work/bench.nml" -o "$work/bench.h5" --force --quiet |
-      awk '$1 == "collisions_per_second" { print $3/1e6 }'
-  done | sort -n | awk '{ r[NR] = $1 } END { printf "%.2f", r[int((NR + 1)/2)] }'
+# state NAME SPECIES...: mixes the disks of these species and writes $work/NAME.nml, which goes on
+# from there. Mixing takes 20 collisions per disk, from random places or, beyond what random
+# insertion reaches, from a lattice, which melts at once.
+state() {
+  local name=$1 placement=random
+  shift
+  [ -e "$work/$name.nml" ] && return
+  [[ $* == *'packing_fraction = 0.7'* ]] && placement=lattice
+  input "$work/start.nml" "placement = '$placement', velocities = 'maxwell'" "$@"
+  "$program" "$work/start.nml" -o "$work/$name.h5" --quiet --set stop.collisions_per_disk=20 >/dev/null
+  input "$work/$name.nml" "placement = 'file', file = '$work/$name.h5', velocities = 'file'" "$@"
 }
+
+# gas DISKS PACKING: the state of equal disks.
+gas() { state "gas_$1_$2" "name = 'gas', count = $1, packing_fraction = $2"; }
+
+# run NAME COLLISIONS [OPTION...]: one run from a state.
+run() {
+  local name=$1 collisions=$2
+  shift 2
+  "${run_by[@]}" "$program" "$work/$name.nml" -o "$work/bench.h5" --force --quiet --set "stop.collisions=$collisions" "$@"
+}
+
+# rate NAME COLLISIONS [OPTION...]: million collisions per second of one run.
+rate() {
+  run_by=("${one_core[@]}")
+  run "$@" | awk '$1 == "collisions_per_second" { print $3/1e6 }'
+}
+
+median() { sort -g | awk '{ r[NR] = $1 } END { printf "%.3f", r[int((NR + 1)/2)] }'; }
+
+repeated() { local k; for ((k = 0; k < repeats; k++)); do "$@"; done; }
+
+# --- Rates by number and packing -------------------------------------------------------------------
+
+samples() { echo "output.observables_every_collisions=$((5 * $1))"; }      # for so many disks
+
+table() {
+  local packing disks sizes=(1000 10000 100000)
+  [ "$full" ] && sizes+=(1000000)
+  printf '\n%-10s' packing
+  printf '%10s' "${sizes[@]/#/N=}"
+  for packing in 0.1 0.3 0.5 0.7; do
+    printf '\n%-10s' "$packing"
+    for disks in "${sizes[@]}"; do
+      gas "$disks" "$packing"
+      printf '%10.2f' "$(repeated rate "gas_${disks}_$packing" 6000000 --set "$(samples "$disks")" | median)"
+    done
+  done
+  printf '\n\nall pairs, N=1000, packing 0.5: %.3f\n' \
+    "$(repeated rate gas_1000_0.5 20000 --set run.search=pairs | median)"
+}
+
+# --- Rates with something more, by turns with rates without -----------------------------------------
+
+# beside WHAT LEAST NAME OTHER COLLISIONS [OPTION...]: the rate from state OTHER with options,
+# relative to the one from state NAME without.
+beside() {
+  local what=$1 least=$2 name=$3 other=$4 collisions=$5 k
+  shift 5
+  for ((k = 0; k < repeats; k++)); do
+    rate "$name" "$collisions" >>"$work/without"
+    rate "$other" "$collisions" "$@" >>"$work/with"
+  done
+  awk -v what="$what" -v least="$least" -v without="$(median <"$work/without")" -v with="$(median <"$work/with")" \
+    'BEGIN { printf "%-52s%8.2f%10.2f%10.3f%10s\n", what, without, with, with/without, least }'
+  rm "$work/without" "$work/with"
+}
+
+costs() {
+  local g=gas_10000_0.5 frames="output.frames_every_collisions=50000" disks
+  printf '\n%-52s%8s%10s%10s%10s\n' 'with something more (packing 0.5)' without with ratio 'at least'
+  gas 10000 0.5
+  gas 100000 0.5
+  beside 'gravity' 0.87 $g $g 6000000 --set box.gravity=0,-1
+  beside 'periodic sides' 0.95 $g $g 6000000 --set box.boundary=periodic,periodic
+  beside 'restitution and TC model' 0.95 $g $g 6000000 --set contact.restitution=0.999999 \
+    --set contact.contact_time=1e-9
+  beside 'observables, ten collisions per disk apart' 0.97 $g $g 6000000 --set "$(samples 10000)"
+  beside '1e5 disks: frames, one collision per disk apart' 0.91 gas_100000_0.5 gas_100000_0.5 3000000 --set "$frames"
+  state sizes "${sizes[@]}"
+  beside 'radii from 1 to 1.4' 0.85 $g sizes 6000000 --set "$(samples 10000)"
+  for disks in 100000 ${full:+1000000}; do
+    gas "$disks" 0.5
+    state "crater_$disks" "name = 'gas', count = $disks, packing_fraction = 0.5" \
+      "name = 'projectile', count = 1, relative_to = 'gas', radius = 5, mass = 25"
+    beside "$disks disks: a projectile of 5 radii" 0.90 "gas_${disks}_0.5" "crater_$disks" 6000000
+  done
+  gas 100000 0.45
+  state brownian "name = 'gas', count = 100000, packing_fraction = 0.45" \
+    "name = 'brownian', count = 1, relative_to = 'gas', radius = 100, mass = 1000"
+  beside '1e5 disks, packing 0.45: a disk of 100 radii' 0.90 gas_100000_0.45 brownian 6000000
+}
+
+# Five species with radii 1, 1.1, ... 1.4 and together a packing of 0.5.
+sizes=()
+for tenths in 10 11 12 13 14; do
+  sizes+=("name = 'r$tenths', count = 2000, packing_fraction = $(awk -v r=$tenths 'BEGIN { print r*r/1460 }')")
+done
+
+# --- Whole processes ---------------------------------------------------------------------------------
+
+# process COMMAND...: seconds of processor time and bytes of a whole process.
+process() {
+  python3 -c 'import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+use = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(use.ru_utime + use.ru_stime, 1024*use.ru_maxrss)' "$@"
+}
+
+# seconds COMMAND...: how long it takes by the wall clock.
+seconds() {
+  local from=$EPOCHREALTIME
+  "$@" >/dev/null
+  awk -v from="$from" -v to="$EPOCHREALTIME" 'BEGIN { print to - from }'
+}
+
+processes() {
+  printf '\nwhole processes\n'
+  printf '%-52s%8.1f ms, at most 20\n' 'a run of 60 disks, processor time' \
+    "$(repeated process "$program" input/gravity.nml -o "$work/bench.h5" --force --quiet --set stop.time=0.01 |
+      awk '{ print 1000*$1 }' | median)"
+  [ "$full" ] || return 0
+  input "$work/start.nml" "placement = 'random', velocities = 'maxwell'" "name = 'gas', count = 1000000, packing_fraction = 0.5"
+  printf '%-52s%8.1f s, at most 15\n' 'a random start of 1e6 disks at 0.5, processor time' \
+    "$(process "$program" "$work/start.nml" --check | awk '{ print $1 }')"
+  run_by=(process)
+  printf '%-52s%8.0f bytes per disk, at most 300\n' '1e6 disks, memory' "$(run gas_1000000_0.5 1000000 | awk '{ print $2/1e6 }')"
+  [ "$(nproc)" -ge 2 ] || return 0
+  printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' \
+    "$(awk -v one="$(seconds ensemble 1)" -v two="$(seconds ensemble 2)" 'BEGIN { print one/two }')"
+}
+
+# ensemble JOBS: four runs of some seconds, so many at a time.
+ensemble() {
+  RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
+    --set stop.collisions=20000000
+}
+
+# --- The gate ------------------------------------------------------------------------------------------
 
 # instructions DISKS PACKING: per collision, from two lengths of the same run.
 instructions() {
-  local short long length
+  local short long='' length
+  gas "$1" "$2"
   for length in 40000 90000; do
-    input "$1" "$2" "$length" cells
-    valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$work/bench.nml" \
-      -o "$work/bench.h5" --force --quiet >/dev/null 2>"$work/count"
-    short=${long:-}
+    run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
+    run "gas_$1_$2" "$length" --set "$(samples "$1")" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
+    short=$long
     long=$(awk '/Collected/ { print $4 }' "$work/count")
   done
   echo $(((long - short) / 50000))
@@ -53,32 +187,32 @@ check() {
   while read -r packing limit; do
     count=$(instructions 1000 "$packing")
     printf 'packing %s: %s instructions per collision, at most %s\n' "$packing" "$count" "$limit"
-    [ "$count" -le "$limit" ] || verdict=1
-  done <<EOF
-0.5 ${LIMIT_FLUID:-1600}
-0.7 ${LIMIT_DENSE:-1700}
-EOF
+    [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
+  done <<'LIMITS'
+0.5 1600
+0.7 1700
+LIMITS
   return $verdict
 }
 
-table() {
-  local packing disks sizes=(1000 10000 100000)
-  [ "${1:-}" = --full ] && sizes+=(1000000)
-  printf 'million collisions per second of processor time\n%-10s' packing
-  printf '%10s' "${sizes[@]/#/N=}"
-  printf '\n'
-  for packing in 0.05 0.1 0.3 0.5 0.7; do
-    printf '%-10s' "$packing"
-    for disks in "${sizes[@]}"; do
-      printf '%10s' "$(rate "$disks" "$packing" $((disks < 1000000 ? 4000000 : 6000000)))"
-    done
-    printf '\n'
-  done
-  printf 'all pairs, N=1000, packing 0.5: %s\n' "$(rate 1000 0.5 20000 pairs)"
+conditions() {
+  local flags
+  flags=$(dirname "$program")/flags
+  echo "machine   $(nproc) x $(awk -F ': ' '/model name/ { print $2; exit }' /proc/cpuinfo)"
+  echo "load      $(cut -d ' ' -f 1-3 /proc/loadavg) at $(date -u +%FT%RZ)"
+  echo "program   $("$program" --version), commit $(git describe --always --dirty 2>/dev/null || echo unknown)"
+  [ ! -e "$flags" ] || echo "built by  $(cat "$flags")"
+  awk '$1 > 0.5 { print "Other programs are running: these figures say little." }' /proc/loadavg
 }
 
 case ${1:-} in
   --check) check ;;
-  --full | '') table "${1:-}" ;;
-  *) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  --full | '')
+    full=${1:-}
+    conditions
+    table
+    costs
+    processes
+    ;;
+  *) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac
