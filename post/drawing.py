@@ -74,18 +74,23 @@ def launch(main: Callable[[], None]) -> None:
     name = Path(sys.argv[0]).name
     try:
         main()
-    except (RunError, OSError) as problem:
-        print(f"{name}: {' '.join(str(problem).split())}", file=sys.stderr)
-        sys.exit(2)
+    except RunError as problem:
+        give_up(name, str(problem))
+    except OSError as problem:  # without a name: while writing, on a full disk
+        give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
     except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as problem:
         if sys.flags.dev_mode:
             raise
-        text = f"cannot make sense of {' '.join(sys.argv[1:])}: {problem!r}"
-        print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
-        sys.exit(2)
+        give_up(name, f"cannot make sense of {' '.join(sys.argv[1:])}: {problem!r}")
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
         sys.exit(130)
+
+
+def give_up(name: str, reason: str) -> None:
+    """Exit code 2 and one line."""
+    print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
+    sys.exit(2)
 
 
 def read_all(paths: Iterable[str]) -> list[Run]:

@@ -51,3 +51,23 @@ def started(program, tmp_path):
     for process in processes:
         process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """`small_disk(kilobytes, mode)` gives a folder on such a disk; needs the rights of root."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = []
+
+    def mount(kilobytes, mode="rw"):
+        options = f"size={kilobytes}k,{mode}" + (",remount" if mounted else "")
+        command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
+        if subprocess.run(command, check=False, capture_output=True).returncode != 0:
+            pytest.skip("cannot mount a small disk here: needs root")
+        mounted.append(folder)
+        return folder
+
+    yield mount
+    if mounted:
+        subprocess.run(["umount", folder], check=True)

@@ -236,26 +236,6 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
     assert differences(tmp_path / "alone.h5", tmp_path / "gas.h5") == []
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """`small_disk(kilobytes, mode)` gives a folder on such a disk; needs the rights of root."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounted = []
-
-    def mount(kilobytes, mode="rw"):
-        options = f"size={kilobytes}k,{mode}" + (",remount" if mounted else "")
-        command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
-        if subprocess.run(command, capture_output=True).returncode != 0:
-            pytest.skip("cannot mount a small disk here: needs root")
-        mounted.append(folder)
-        return folder
-
-    yield mount
-    if mounted:
-        subprocess.run(["umount", folder], check=True)
-
-
 @pytest.mark.parametrize("sizes", [6, pytest.param(40, marks=pytest.mark.check)])
 def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk, sizes):
     """From 64 kB, no room for the layout, to 4 MB; with more room the run goes on."""

@@ -145,7 +145,7 @@ def read_damaged(path, first, last):
             read_everything(copy)
 
 
-@pytest.mark.parametrize("flips", [100, pytest.param(20000, marks=pytest.mark.check)])
+@pytest.mark.parametrize("flips", [100, pytest.param(5000, marks=pytest.mark.check)])
 def test_a_damaged_file_is_refused_or_read(ricochet, tmp_path, flips):
     write_input(tmp_path, TINY)
     assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
@@ -217,3 +217,13 @@ def test_every_script_draws_a_running_simulation():
     """All but `cost`, which wants the time that a whole run took."""
     drawn = {script for _, scripts in RUNNING.values() for script in scripts}
     assert drawn == {*SCRIPTS} - {"cost"}
+
+
+@pytest.mark.parametrize("ending", ["png", "csv", "xyz", "html", "gif"])
+def test_a_full_disk_is_one_line(unfinished, small_disk, capsys, ending):
+    folder = small_disk(4)
+    script = {"png": "snapshot", "csv": "export"} | {end: name for name, end in ENDINGS.items()}
+    few = ("--frames", "1") if ending == "gif" else ()
+    assert run_script(script[ending], unfinished, "-o", folder / f"a.{ending}", *few) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == f"{script[ending]}.py: cannot write the output: No space left on device"
