@@ -13,6 +13,7 @@ import numpy as np
 from drawing import COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv
 from read_run import Run, RunError
 from theory import PowerLaw, fit_power_law
+from thermodynamics import packing
 
 LABELS = {
     "rescan": "everything anew at each collision",
@@ -50,7 +51,9 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
     return laws
 
 
-def draw(measured: dict, laws: dict[str, PowerLaw], low: float, high: float) -> plt.Figure:
+def draw(
+    measured: dict, laws: dict[str, PowerLaw], low: float, high: float, title: str
+) -> plt.Figure:
     """Doubly logarithmic; the fits dotted where they are prolonged."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
@@ -68,7 +71,7 @@ def draw(measured: dict, laws: dict[str, PowerLaw], low: float, high: float) -> 
         fitted = n[(n >= low) & (n <= high)]
         label = f"$\\propto N^{{{law.exponent:.3f} \\pm {law.exponent_error:.3f}}}$"
         axes.plot(fitted, law(fitted), label=label, **style)
-    axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
+    axes.set(xlabel="number of disks N", ylabel="time per collision (µs)", title=title)
     axes.legend()
     return figure
 
@@ -90,7 +93,9 @@ def main() -> None:
     print_table(table)
     for search, law in laws.items():
         print(f"exponent_{search} = {law.exponent:.3f} +- {law.exponent_error:.3f}")
-    save(draw(measured, laws, *args.fit), args.output, runs, "Cost of a collision")
+    eta = ", ".join(f"{value:g}" for value in sorted({round(packing(run), 3) for run in runs}))
+    figure = draw(measured, laws, *args.fit, f"packing fraction {eta}")
+    save(figure, args.output, runs, "Cost of a collision")
     if args.csv:
         write_csv(args.csv, table)
 
