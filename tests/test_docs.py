@@ -8,6 +8,7 @@ import pytest
 from synthetic_run import ROOT
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
+PROMISES = ROOT / "docs" / "reliability.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
@@ -29,6 +30,19 @@ def test_links_lead_somewhere(page):
 def test_the_readme_leads_to_every_page():
     readme = (ROOT / "README.md").read_text()
     assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
+
+
+def test_promises_are_held_by_tests_that_exist():
+    """In the tables of docs/reliability.md the second column names files and tests."""
+    sources = [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*.pf")]
+    known = re.findall(
+        r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
+    )
+    known = {name for pair in known for name in pair}
+    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", PROMISES.read_text(), re.M)
+    named = [word for row in rows for word in re.findall(r"`([^`]+)`", row) if "/" not in word]
+    assert len(named) > 20
+    assert [word for word in named if word not in known] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
