@@ -1,11 +1,15 @@
 """The pages say what is there: current reference, no dead links, commands that exist."""
 
 import importlib.util
+import os
 import re
 import subprocess
+import sys
+import textwrap
 
+import numpy as np
 import pytest
-from synthetic_run import ROOT
+from synthetic_run import ROOT, write_run
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
 PROMISES = ROOT / "docs" / "reliability.md"
@@ -74,6 +78,23 @@ def test_make_lists_its_targets_in_one_screen_and_suggests_them():
         assert any(line.startswith(f"  make {target} ") for line in screen)
     wrong = make("tset")
     assert wrong.returncode == 2 and "no file tset; did you mean test?" in wrong.stderr
+
+
+def test_every_script_of_post_is_in_the_list():
+    page = (ROOT / "docs" / "getting-started.md").read_text()
+    scripts = [p.name for p in ROOT.glob("post/*.py") if "def main()" in p.read_text()]
+    assert [name for name in scripts if f"| `{name}`" not in page and f", `{name}`" not in page] == []
+
+
+def test_the_script_that_the_page_on_extending_shows_works(tmp_path):
+    page = (ROOT / "docs" / "extending.md").read_text()
+    script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
+    (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
+    still = np.zeros((2, 3, 2))
+    command = [sys.executable, "fastest.py", write_run(tmp_path / "run.h5", still, still)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    assert (tmp_path / "fastest.png").exists()
 
 
 def completed(program, *words):
