@@ -22,6 +22,7 @@ from drawing import (
     plt,
     positive,
     species_colours,
+    species_legend,
 )
 from read_run import Run, RunError, read_run
 from snapshot import LABELS, default_colour, spread_frames, values_of
@@ -56,6 +57,7 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
     draw_box(axes, run)
     if colour == "species":
         disks = disk_collection(axes, run, run.position[0], facecolors=species_colours(run))
+        species_legend(figure, run)
     else:
         limits = colour_limits(run, frames, colour)
         disks = disk_collection(axes, run, run.position[0], array=np.zeros(run.count), clim=limits)

@@ -189,6 +189,16 @@ def species_colours(run: Run) -> list[str]:
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
+def species_legend(figure: plt.Figure, run: Run) -> None:
+    """Which colour is which species, below all panels; nothing for a single one."""
+    handles = [
+        plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
+        for k in range(len(run.names))
+    ]
+    if len(run.names) > 1:
+        figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
+
+
 def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
     """Write the figure with its source in the metadata; the folder is made."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")

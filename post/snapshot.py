@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.colors import to_rgba_array
 
 from drawing import (
-    COLOURS,
     caption,
     command_line,
     disk_collection,
@@ -21,6 +20,7 @@ from drawing import (
     positive,
     save,
     species_colours,
+    species_legend,
     whole_numbers,
 )
 from read_run import Run, read_run
@@ -97,12 +97,7 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
             draw_arrows(axes, run, frames[k], longest, arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
-        handles = [
-            plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
-            for k in range(len(run.names))
-        ]
-        if len(run.names) > 1:
-            figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
+        species_legend(figure, run)
     else:
         figure.colorbar(disks, ax=panels, label=LABELS[colour], shrink=0.8, aspect=30, extend="max")
     figure.suptitle(caption([run]), fontsize=10)
