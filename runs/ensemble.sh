@@ -229,7 +229,7 @@ forward() {
 }
 
 run_all() {
-  local k status slot
+  local k status slot part message=''
   claims=$(mktemp -d)
   trap 'rm -rf -- "$claims"' EXIT
   mkfifo "$claims/pipe"
@@ -243,9 +243,13 @@ run_all() {
   done
   set +m
   while ((ended < ${#workers[@]})); do
-    if read -r -t 1 -u "$events" k status; then
+    if IFS= read -r -t 1 -u "$events" part; then
+      read -r k status <<<"$message$part"
+      message=''
       count_reply "$k" "$status"
-    elif ! kill -0 "${workers[@]}" 2>/dev/null; then
+    elif kill -0 "${workers[@]}" 2>/dev/null; then
+      message+=$part # the second was over in the midst of a line
+    else
       break # all were killed
     fi
     show_progress
