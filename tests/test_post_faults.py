@@ -90,7 +90,7 @@ def read_everything(path):
     return sum(np.size(value) for value in asked)
 
 
-@pytest.mark.parametrize("cuts", [12, pytest.param(1000, marks=pytest.mark.check)])
+@pytest.mark.parametrize("cuts", [12, pytest.param(300, marks=pytest.mark.check)])
 def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
     """A finished one, and one that was being written."""
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
@@ -145,7 +145,7 @@ def read_damaged(path, first, last):
             read_everything(copy)
 
 
-@pytest.mark.parametrize("flips", [100, pytest.param(5000, marks=pytest.mark.check)])
+@pytest.mark.parametrize("flips", [100, pytest.param(2000, marks=pytest.mark.check)])
 def test_a_damaged_file_is_refused_or_read(ricochet, tmp_path, flips):
     write_input(tmp_path, TINY)
     assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
