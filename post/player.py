@@ -40,7 +40,8 @@ def frames_that_fit(run: Run) -> int:
     """
     one = run.count * (4 + len(quantities(run)) + (run.image is not None)) * 4 / 3
     words = 40 + 200 * len(run.names)
-    return int(np.clip(ROOM / (one + words), 2, MOST_FRAMES))
+    fixed = run.count * 2 * 4 / 3  # the species
+    return int(np.clip((ROOM - fixed) / (one + words), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:

@@ -35,3 +35,4 @@ runs/ensemble.sh input/brownian.nml -d "$data/brownian" --seeds 1 --set stop.tim
   -o "$figures/container.png"
 "$python" post/trajectory.py "$data/brownian/seed_1.h5" --disks 2001 -o "$figures/brownian.png"
 "$python" post/animate.py "$data/container/seed_1.h5" -o "$figures/container_film"
+"$python" post/player.py "$data/container/seed_1.h5" --colour speed -o "$figures/container_film.html"

@@ -26,6 +26,7 @@ runs/ensemble.sh input/crater.nml -d "$data/one" --seeds 1 \
   --set output.frames_every_time=0.002 --set output.observables_every_time=0.001 "$@"
 "$python" post/crater.py "$data/one/seed_1.h5" -o "$figures/crater.png"
 "$python" post/animate.py "$data/one/seed_1.h5" --colour speed -o "$figures/crater_film"
+"$python" post/player.py "$data/one/seed_1.h5" --colour displacement -o "$figures/crater_film.html"
 
 runs/ensemble.sh input/crater.nml -d "$data" --manifest "$data/members.txt" "$@"
 "$python" post/crater_scan.py "$data"/*.h5 -o "$figures/crater_scan.png" \

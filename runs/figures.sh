@@ -43,6 +43,7 @@ section() {
     fi
     printf '<figcaption><b>%s</b> <code>runs/%s.sh</code>' "$title" "$script"
     [[ ! -e $figures/$name.csv ]] || printf ' <a href="%s.csv">numbers</a>' "$name"
+    [[ ! -e $figures/$name.html ]] || printf ' <a href="%s.html">to play with</a>' "$name"
     printf '</figcaption>\n</figure>\n'
     return
   done

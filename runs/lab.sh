@@ -12,6 +12,7 @@ runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 
 "$python" post/snapshot.py "$data/start/seed_1.h5" --frames 0,50,100,300 --quiver \
   -o "$figures/lab_frames.png"
 "$python" post/animate.py "$data/start/seed_1.h5" -o "$figures/lab_film"
+"$python" post/player.py "$data/start/seed_1.h5" -o "$figures/lab_film.html"
 
 # Large heavy disks in the left half, small light ones in the right, all with speed 1.
 runs/ensemble.sh input/mixture.nml -d "$data/masses" --seeds 1 \
