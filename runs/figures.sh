@@ -93,6 +93,7 @@ HTML
   section gravity_film 'Gravity, film' gravity
   section equation_of_state 'Bulk: equation of state' state
   section correlations 'Bulk: memory, diffusion, order' state
+  section rates 'Bulk: pressure in time, free paths' state
   section haff 'Bulk: cooling by the law of Haff' state
   printf '</main>\n</html>\n'
 } >"$figures/index.html"

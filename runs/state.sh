@@ -20,6 +20,7 @@ while read -r packing interval placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/memory_$packing" --seeds 1-4 \
     --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" \
     --set "output.frames_every_time=$interval" --set stop.collisions_per_disk=220 \
+    --set output.event_log=true \
     --set species.disks.temperature= --set species.disks.speed=1.4142135623730951 "$@"
   memory+=("$data/memory_$packing"/*.h5)
 done <<'TABLE'
@@ -30,6 +31,7 @@ done <<'TABLE'
 TABLE
 "$python" post/correlations.py "${memory[@]}" -o "$figures/correlations.png" \
   --csv "$figures/correlations.csv"
+"$python" post/rates.py "$data"/memory_0.3/*.h5 -o "$figures/rates.png" --csv "$figures/rates.csv"
 
 # Cooling: dilute, until streams set in.
 runs/ensemble.sh input/bulk.nml -d "$data/cooling" --seeds 1-8 \

@@ -11,8 +11,9 @@ import correlations
 import equation_of_state
 import haff
 import hard_disks as hd
+import rates
 import thermodynamics
-from read_run import RunError, read_run
+from read_run import Events, RunError, read_run
 
 BULK = Path(__file__).resolve().parents[1] / "input" / "bulk.nml"
 PERIODIC = (True, True)
@@ -122,6 +123,32 @@ def test_inelastic_runs_have_no_equation_of_state(tmp_path):
         equation_of_state.pressures(run)
 
 
+# --- rates and free paths ---
+
+
+def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path):
+    """A disk that flies 1, 1, 4, 1, 1, 4, ... time units between hits; another one without hits."""
+    hits = np.cumsum(np.tile([1.0, 1.0, 4.0], 40))
+    time = np.linspace(0.05, hits[-1] - 0.05, 2400)
+    v = np.tile([[0.5, 0.0], [1.0, 0.0]], (len(time), 1, 1))
+    run = written(
+        tmp_path / "run.h5", np.full_like(v, 0.5), v, time=time,
+        observables={"collisions": np.zeros(len(time), int)},
+    )  # fmt: skip
+    zero = np.zeros(len(hits), int)
+    run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
+    path, weight = rates.free_paths(run)
+    assert set(np.round(path, 9)) == {0.5, 2.0}
+    assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
+
+
+def test_free_paths_without_memory_have_the_mean_one():
+    x = np.linspace(0, 40, 20001)
+    density = rates.path_density(x)
+    assert np.trapezoid(density, x) == pytest.approx(1, rel=1e-3)
+    assert np.trapezoid(x * density, x) == pytest.approx(1, rel=1e-3)
+
+
 # --- correlations ---
 
 
@@ -200,6 +227,7 @@ def bulk(ricochet, tmp_path):
     """Small gases at two packing fractions, and one that cools."""
     settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
     settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
+    settings += ["output.event_log=true"]
     paths = [tmp_path / f"{k}.h5" for k in range(len(RUNS))]
     for path, more in zip(paths, RUNS, strict=True):
         options = [word for value in (*settings, *more) for word in ("--set", value)]
@@ -210,6 +238,7 @@ def bulk(ricochet, tmp_path):
 
 def test_scripts_draw(bulk, tmp_path):
     scripts = {"equation_of_state": bulk[:2], "correlations": bulk[:2], "haff": bulk[2:]}
+    scripts["rates"] = bulk[:1]
     for script, runs in scripts.items():
         figure, csv = tmp_path / f"{script}.png", tmp_path / f"{script}.csv"
         with warnings.catch_warnings():
@@ -217,7 +246,20 @@ def test_scripts_draw(bulk, tmp_path):
             assert run_script(script, *runs, "-o", figure, "--csv", csv) == 0
         assert figure.stat().st_size > 10000
         assert len(csv.read_text().splitlines()) > 2
-    assert run_script("equation_of_state", bulk[2], "-o", tmp_path / "no.png") == 2
+    for script, runs in (("equation_of_state", bulk[2:]), ("rates", bulk[2:])):
+        assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+
+
+def test_rates_of_a_gas_agree_with_each_other(bulk):
+    run = read_run(bulk[0])
+    found = rates.quantities(run)
+    per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
+    assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
+    assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
+    mean, density = rates.histogram([run])
+    speed = np.mean(run.speed(slice(None)))
+    assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
+    assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
 
 
 def test_a_gas_cools_by_haff(bulk):
