@@ -90,13 +90,16 @@ def ledger(run: Run) -> float:
     return float(np.max(np.abs(total + booked - total[0])) / total[0])
 
 
+SLOW = 0.99999
+
+
 def slow_loss(rule: str) -> tuple[Member, ...]:
     """Walls that take so little that the gas stays in equilibrium."""
     return tuple(
         Member(
             gas(
                 1000, seed=seed, radius=0.001, temperature=1.0,
-                contact={"restitution": 1, "wall_restitution": 0.9999, "wall_rule": rule},
+                contact={"restitution": 1, "wall_restitution": SLOW, "wall_rule": rule},
                 stop={"collisions_per_disk": 400}, output={"observables_every_collisions": 5000},
             )
         )
@@ -108,7 +111,7 @@ def loss_per_hit(run: Run) -> float:
     """Mean energy lost per hit on a side, over (1 - xi^2) kT."""
     energy = run.observable("total_energy").value
     hits = run.observable("wall_collisions").value.sum(axis=1)
-    return -log(energy[-1] / energy[0]) * run.count / hits[-1] / (1 - 0.9999**2)
+    return -log(energy[-1] / energy[0]) * run.count / hits[-1] / (1 - SLOW**2)
 
 
 GAS = [
