@@ -245,7 +245,7 @@ contains
     character(len=1), parameter :: eol = new_line('a')
     integer :: g, k
     text = '! Every variable of Ricochet with its default. A file needs only what differs.'//eol// &
-      '! Lines that start with "!" have no default or not always: they show an example.'//eol// &
+      '! Lines that begin with "!" or say so are examples: there is no default, or not always.'//eol// &
       '! Groups may stand in any order; &obstacle and &species as often as there are.'//eol
     do g = 1, size(group_names)
       text = text//eol//margin(group_names(g))//'&'//trim(group_names(g))//eol
@@ -275,7 +275,9 @@ contains
       setting = '  ! '//trim(row%name)//' = '//trim(row%value)
     end select
     if (row%group == 'obstacle') setting = '!   '//setting(verify(setting, ' !'):)
-    line = setting//' ! '//trim(row%help)
+    line = setting//' ! '
+    if (row%status == 'example') line = line//'an example: '
+    line = line//trim(row%help)
     if (row%unit /= '') line = line//' ['//trim(row%unit)//']'
     if (row%choices == '') return
     setting = ''
