@@ -193,7 +193,8 @@ contains
       '  -o, --output FILE   where the results go; default runs/<input name>.h5'//eol// &
       '  --set NAME=VALUE    override a variable of the input, any number of times:'//eol// &
       '                      run.seed=7, box.upper=2,2, species.projectile.mass=50;'//eol// &
-      '                      an empty VALUE brings the default back'//eol// &
+      '                      the last one for a variable counts, an empty VALUE'//eol// &
+      '                      brings the default back'//eol// &
       '  --resume            go on from the checkpoint of a stopped run'//eol// &
       '  --check             read and check everything, run nothing'//eol// &
       '  --force             overwrite a finished output file'//eol// &
