@@ -23,6 +23,7 @@ module placement
 
   integer, parameter :: purpose = 1                         !! of this module's random streams
   real(real64), parameter :: rounding = 1.0e-12_real64      !! relative, of disks that touch
+  real(real64), parameter :: denser = 1.5_real64            !! 'dense' packs so much more than 'random'
 
 contains
 
@@ -169,6 +170,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(random_stream_t) :: stream
     real(real64) :: lower(2), upper(2), disk_packing
+    character(len=:), allocatable :: advice
     integer(int32) :: placed
     associate (me => species(s))
       call stream%seed(seed, [s, purpose])
@@ -178,10 +180,12 @@ contains
         upper, stream, placed)
       if (placed == me%count) return
       disk_packing = pi*me%radius**2/product(me%region([2, 4]) - me%region([1, 3]))
+      advice = 'use fewer or smaller disks'
+      if (me%count < denser*placed) advice = 'use placement = ''dense'''
       call fail(error, exit_usage, 'species.'//me%name//'.placement: no more room after '// &
         written(placed)//' of '//written(me%count)//' random disks: reached '// &
         written(placed*disk_packing)//' of the wanted packing '// &
-        written(me%count*disk_packing)//'; use placement = ''dense''')
+        written(me%count*disk_packing)//'; '//advice)
     end associate
   end subroutine place_at_random
 
