@@ -11,6 +11,7 @@ module namelist_input
   use parameters, only: group_names, is_repeated, row_of, table, variables_of
   use settings, only: settings_t
   use similar_files, only: similar_file
+  use system, only: is_folder
   use texts, only: joined, lower_case, shown, suggestion, text_t, written
   implicit none
   private
@@ -23,6 +24,7 @@ module namelist_input
   !> The groups while they are being read; those that cannot be repeated are there from the start.
   type :: reading_t
     integer :: count = 0
+    logical :: complete = .true.                 !! .false.: parts of the text were skipped
     type(parameter_group_t), allocatable :: groups(:)
     type(problem_list_t) :: problems
   end type reading_t
@@ -52,7 +54,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(reading_t) :: reading
     integer :: k
-    call open_reading(reading)
+    call open_reading(reading, count([(text(k:k) == '&', k=1, len(text))]))
     call read_statements(reading, unix_lines(text))
     call name_instances(reading)
     do k = 1, size(overrides)
@@ -60,7 +62,7 @@ contains
       call name_instances(reading)
     end do
     call put_in_order(reading, groups)
-    call resolve_settings(groups, settings, reading%problems)
+    if (reading%complete) call resolve_settings(groups, settings, reading%problems)
     if (reading%problems%count > 0) then
       call fail(error, exit_usage, reading%problems%report(path, overrides))
     end if
@@ -74,15 +76,18 @@ contains
     character(len=200) :: reason
     integer(int64) :: bytes
     integer :: unit, status, odd
-    logical :: exists, is_folder
+    logical :: exists
     inquire (file=path, exist=exists, size=bytes)
-    inquire (file=path//'/.', exist=is_folder)
-    if (.not. exists) call fail(error, exit_files, path//': there is no such file'//meant(path))
-    if (is_folder) call fail(error, exit_files, path//': is a folder, not an input file')
-    if (allocated(error)) return
-    if (bytes <= 0) call fail(error, exit_usage, path//': is empty or not a regular file')
-    if (bytes > largest_file) call fail(error, exit_usage, path//': has '//written(bytes)// &
-      ' bytes; an input file has at most '//written(largest_file))
+    if (.not. exists) then
+      call fail(error, exit_files, path//': there is no such file'//meant(path))
+    else if (is_folder(path)) then
+      call fail(error, exit_files, path//': is a folder, not an input file')
+    else if (bytes <= 0) then
+      call fail(error, exit_usage, path//': is empty, or a pipe or a device instead of a file')
+    else if (bytes > largest_file) then
+      call fail(error, exit_usage, path//': has '//written(bytes)// &
+        ' bytes; an input file has at most '//written(largest_file))
+    end if
     if (allocated(error)) return
     allocate (character(len=bytes) :: text)
     open (newunit=unit, file=path, access='stream', form='unformatted', action='read', &
@@ -143,10 +148,11 @@ contains
     lines = lines(:n)//eol
   end function unix_lines
 
-  subroutine open_reading(reading)
+  subroutine open_reading(reading, most)
     type(reading_t), intent(out) :: reading
+    integer, intent(in) :: most                           !! groups that the file may hold
     integer :: k
-    allocate (reading%groups(size(group_names) + 2*most_instances))
+    allocate (reading%groups(size(group_names) + min(most, 2*most_instances)))
     do k = 1, size(group_names)
       if (.not. is_repeated(group_names(k))) call add_group(reading, group_names(k), 0)
     end do
@@ -239,6 +245,7 @@ contains
         exit
       end select
     end do
+    if (scanner%lost) reading%complete = .false.
   end subroutine read_statements
 
   !> Which group the following assignments belong to; 0 if its name is unknown.
@@ -248,6 +255,7 @@ contains
     integer, intent(out) :: group
     integer :: k
     group = 0
+    if (all(group_names /= statement%name)) reading%complete = .false.
     if (statement%name == '') then
       call reading%problems%add(statement%line, '&', 'the name of a group follows directly after &')
     else if (all(group_names /= statement%name)) then

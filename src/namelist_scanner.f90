@@ -44,6 +44,7 @@ module namelist_scanner
     integer :: group_line = 0                    !! where the open group began
     logical :: in_group = .false.
     logical :: quote_open = .false.              !! in this group: its / may be part of a text
+    logical :: lost = .false.                    !! some of the text made no sense and was skipped
     character(len=:), allocatable :: group       !! name of the open group
   contains
     procedure :: next_statement
@@ -95,6 +96,7 @@ contains
     last = self%at + index(self%text(self%at:), eol) - 2
     call problems%add(self%line, shown(self%text(self%at:last)), &
       'text outside a group; a group is &name ... /, a comment begins with !')
+    self%lost = .true.
     do
       call self%skip_line()
       call self%skip_space()
@@ -143,6 +145,7 @@ contains
       past = self%at + index(self%text(self%at:), eol) - 1
       call problems%add(self%line, self%group, 'unexpected '//shown(self%text(self%at:past - 1)) &
         //'; a variable is name = value')
+      self%lost = .true.
       call self%skip_line()
       return
     end if
@@ -155,6 +158,7 @@ contains
     else if (character_at(self%text, self%at) /= '=') then
       call problems%add(statement%line, self%group//'.'//plain(statement%name), &
         '= is missing after the name; a comment begins with !')
+      self%lost = .true.
       if (self%line == statement%line) call self%skip_line()
     else
       self%at = self%at + 1
@@ -252,6 +256,7 @@ contains
         call problems%add(token%line, where, 'the closing quote '//token%quote//' is missing')
         self%line = self%line + 1
         self%quote_open = .true.
+        self%lost = .true.
         sound = .false.
         return
       end if

@@ -85,7 +85,7 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"", "is empty or not a regular file"),
+        (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
         (b"\n", "gas.nml: species: there is none"),
         (bytes(range(256)), "is not a text file: byte 1"),
         (GOOD.encode() + b"\0", "is not a text file"),
@@ -248,6 +248,41 @@ def test_numbers_that_mean_nothing_are_refused(checked, variable):
         assert bool(lines_of(run)) == (run.returncode == USAGE)
         if value == "-1" and not re.search(SIGNED, name):
             assert run.returncode == USAGE
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "&specis count = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species name = 'gas count = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species /\ncount = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species count 20\n radius = 0.02 /\n&stop time = 1 /\n",
+        "&species count = 20 radius = 0.02\n&stop time = 1 /\n",
+        "&species count = 20 radius = 0.02 /\n&stop time = 1\n",
+    ],
+)
+def test_what_follows_from_a_slip_of_the_pen_is_not_reported(checked, content):
+    run = checked(content)
+    assert run.returncode == USAGE
+    assert len(lines_of(run)) == 1, run.stderr
+
+
+def test_the_last_override_of_a_variable_counts(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    run = ricochet("gas.nml", "-o", "a.h5", "--set", "run.seed=2", "--set", "run.seed=3")
+    assert run.returncode == 0
+    assert fuzz_input.used_values(tmp_path / "a.h5")["run.seed"] == [3]
+    assert "the last one for a variable counts" in ricochet("--help").stdout
+
+
+@pytest.mark.parametrize("radius", [0.8, 0.45])
+def test_dense_placement_is_only_advised_where_it_helps(checked, radius):
+    pin = f"&obstacle centre = 0.5, 0.5 radius = {radius} /\n"
+    run = checked(pin + "&species count = 200 radius = 0.01 /\n&stop time = 1 /\n")
+    assert ("no more room" in run.stderr) == (radius == 0.8)
+    assert "dense" not in run.stderr
+    crowd = "&species count = 174 radius = 0.0315 /\n&stop time = 1 /\n"
+    assert "use placement = 'dense'" in checked(crowd).stderr
 
 
 @pytest.mark.parametrize("option", ["run.seed", "rum.seed=1", "species.x.mass=1", "=", "run.=1"])
