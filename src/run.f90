@@ -7,6 +7,7 @@ module run
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
+  use memory, only: check_memory
   use namelist_input, only: read_settings
   use observables, only: total_energy
   use output, only: output_t
@@ -47,6 +48,7 @@ contains
     input_text = ''
     call watch_signals()
     call read_settings(command%input, command%overrides, settings, groups, input_text, error)
+    if (.not. allocated(error)) call check_memory(settings%species, error)
     if (allocated(error)) return
     if (command%resume) then
       call read_checkpoint(command%output, settings, groups, sim, output, error)
