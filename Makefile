@@ -170,6 +170,7 @@ test:  ## sets up, then unit tests and whole runs (two minutes)
 check:  ## validates the physics and provokes faults (minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) all
+	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
@@ -202,7 +203,7 @@ coverage:  ## which lines of src/ the tests reach
 	@.ci/set-up demo test coverage
 	@$(MAKE) $(jobs) BUILD=$(BUILD)/coverage OPT='-O0 --coverage -Wno-maybe-uninitialized' unit-tests all
 	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
-	@$(venv) -m gcovr --root . --filter src/ $(BUILD)/coverage
+	@$(venv) -m gcovr --root . --filter src/ --fail-under-line 95 $(BUILD)/coverage
 
 docs:  ## pages of the source, with FORD, into build/docs
 	@.ci/set-up docs
