@@ -41,7 +41,7 @@ objects := $(modules:%=$(BUILD)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all demo figures test unit-tests check bench bench-check lint coverage docs set-up clean distclean help
+targets := all demo figures test unit-tests check bench bench-check sanitize lint coverage docs set-up clean distclean help
 .PHONY: $(targets) FORCE
 
 all: $(BUILD)/ricochet  ## builds the program (default)
@@ -181,6 +181,18 @@ bench-check:  ## counts instructions per collision against what is promised
 	@.ci/set-up bench
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
+
+# What the sanitizers watch: the unit tests, runs that write, stop and resume, damaged input.
+watched := $(patsubst %,tests/test_%.py,output_file restart)
+sanitized := $(BUILD)/sanitized
+
+sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
+	@.ci/set-up demo test bench
+	@LIMIT=1200 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
+	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q $(watched)
+	@$(venv) tests/fuzz_input.py --count 500 --program $(sanitized)/ricochet
+	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
+	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 
 lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint
