@@ -101,7 +101,7 @@ contains
     case ('-o', '--output')
       command%output = value
     case ('--set')
-      command%overrides = [command%overrides, text_t(value)]
+      call append(command%overrides, value)
     case ('--explain')
       command%question = 'explain'
       command%topic = value
@@ -120,6 +120,17 @@ contains
       call report_unknown(name, error)
     end select
   end subroutine take_option
+
+  !> Adds a text to a list. (The compiler loses memory when an array is built of texts.)
+  pure subroutine append(list, text)
+    type(text_t), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: text
+    type(text_t), allocatable :: longer(:)
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer))%text = text
+    call move_alloc(longer, list)
+  end subroutine append
 
   !> The value after `=` or in the next argument.
   pure subroutine take_value(arguments, k, name, value, error)
