@@ -122,7 +122,7 @@ contains
       if (checkpoint_requested() .or. now > next_checkpoint) then
         call write_checkpoint(command%output, settings, groups, sim, output, error)
         if (allocated(error)) exit
-        next_checkpoint = now + settings%output%checkpoint_every
+        next_checkpoint = seconds() + settings%output%checkpoint_every     ! after writing, however slow the disk
       end if
       call line%report(sim, stop_rule)
       turns = adapted(turns, now - looked)

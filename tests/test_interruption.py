@@ -240,7 +240,8 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk, sizes):
     """From 64 kB, no room for the layout, to 4 MB; with more room the run goes on."""
     write_input(tmp_path, BUSY.replace("every = 0.05", "every = 0.01"))
-    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    run = ricochet("gas.nml", "-o", "whole.h5", "--set", "output.checkpoint_every=")
+    assert run.returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
     stopped = resumed = 0
     for k in range(sizes):
@@ -257,7 +258,8 @@ def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk, siz
             resumed += 1
             small_disk(100_000)
             assert ricochet("gas.nml", "-o", "disk/gas.h5", "--resume").returncode == FINISHED
-            assert differences(tmp_path / "whole.h5", folder / "gas.h5") == []
+            other = differences(tmp_path / "whole.h5", folder / "gas.h5")
+            assert all(name.startswith("/parameters") for name in other)
         for path in folder.iterdir():
             path.unlink()
     assert resumed >= sizes / 2 and stopped >= resumed
