@@ -38,7 +38,7 @@ def test_the_readme_leads_to_every_page():
 
 def test_promises_are_held_by_tests_that_exist():
     """In the tables of docs/reliability.md the second column names files and tests."""
-    sources = [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*.pf")]
+    sources = [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
     )
