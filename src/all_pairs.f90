@@ -11,7 +11,7 @@ module all_pairs
 
   type, extends(neighbour_search_t) :: all_pairs_t
     private
-    integer(int32), allocatable :: disk(:)         !! 1, 2, ..., n
+    integer(int32), allocatable :: disk(:)         !! 0, 1, ..., n - 1, as the kernel counts them
     integer(int32), allocatable :: obstacle(:)     !! 1, 2, ...
   contains
     procedure :: build
@@ -25,7 +25,7 @@ contains
     class(all_pairs_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: k
-    self%disk = [(k, k=1, sim%n_disks())]
+    self%disk = [(k - 1, k=1, sim%n_disks())]
     self%obstacle = [integer(int32) ::]
     if (allocated(sim%box%obstacle)) self%obstacle = [(k, k=1, size(sim%box%obstacle, kind=int32))]
   end subroutine build

@@ -5,8 +5,8 @@ module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius
   use box_geometry, only: box_t, nearest_image, next_obstacle, next_side, obstacle_t, side_time
-  use cells, only: cells_t, gather, list_capacity
-  use disks, only: disk_t
+  use cells, only: cell_t, cells_t, gather, list_capacity
+  use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle, time_to_line
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use simulation_state, only: simulation_t
@@ -26,9 +26,11 @@ module cell_grid
     integer(int32) :: n(2) = 0                     !! columns, rows
     integer(int32) :: stride = 0                   !! from row to row
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
-    real(real64) :: side(0:1, 2) = 0.0_real64      !! of the box, lower and upper by axis [length]
+    real(real64) :: lower(2) = 0.0_real64          !! sides of the box [length]
+    real(real64) :: upper(2) = 0.0_real64          !! [length]
     real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
-    logical :: periodic = .false.                  !! along one axis at least
+    integer(int32) :: last(0:3) = 0                !! column or row beyond which a face is a side: left, right, ...
+    logical :: special = .false.                   !! more than small disks and walls on straight lines
     logical :: falling = .false.                   !! disks fly on parabolas
     logical :: obstructed = .false.                !! there are obstacles
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
@@ -41,6 +43,8 @@ module cell_grid
     procedure :: build
     procedure :: predict
     procedure :: cross
+    procedure, private :: predict_special
+    procedure, private :: scan_crowd
   end type cell_grid_t
 
 contains
@@ -57,10 +61,10 @@ contains
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%stride = self%n(1) + 2
     self%width = sim%box%edges()/self%n*(1 + 4*epsilon(width))   ! the last face is not before the side
-    self%side(0, :) = sim%box%lower
-    self%side(1, :) = sim%box%upper
+    self%lower = sim%box%lower
+    self%upper = sim%box%upper
+    self%last = [1, self%n(1), 1, self%n(2)]
     self%walled = merge(0, 1, sim%box%periodic)
-    self%periodic = any(sim%box%periodic)
     self%falling = sim%box%falling()
     n_cells = self%stride*(self%n(2) + 2)
     call self%cells%empty(n_cells, sim%n_disks())
@@ -75,6 +79,7 @@ contains
     if (self%obstructed .and. .not. lists_hold(self, sim%box, small)) &
       call list_obstacles(self, sim%box, small)
     call self%big%start(sim, small, self%n, self%width)
+    self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
   end subroutine build
 
   !> Whether the lists of obstacles are up to date.
@@ -222,6 +227,50 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
+    if (self%special) then
+      if (is_special(self, sim, i)) then
+        call self%predict_special(sim, i)      ! by dispatch, which keeps it out of the way of the bulk
+        return
+      end if
+    end if
+    call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, i)
+  end subroutine predict
+
+  !> Whether disk i may meet anything but small disks and walls on straight lines.
+  pure function is_special(self, sim, i) result(yes)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    logical :: yes
+    yes = self%falling .or. self%obstructed .or. self%big%count > 0 .or. at_periodic_edge(self, sim%tag(i)%cell)
+  end function is_special
+
+  !> Where there are but small disks and walls on straight lines.
+  subroutine predict_in_bulk(self, cell, disk, tag, now, i)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    real(real64), intent(in) :: now
+    integer(int32), intent(in) :: i
+    real(real64) :: t
+    integer(int32) :: code, c, n, list(list_capacity)
+    logical :: crowded
+    call next_face(self, disk(i), tag(i)%cell, t, code)
+    c = cell_number(self, tag(i)%cell)
+    call gather(cell, c, self%stride, list, n, crowded)
+    if (crowded) call self%scan_crowd(disk, i, c, no_shift, t, code)
+    call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
+    disk(i)%event_time = t
+    disk(i)%partner = code
+    tag(i)%partner_stamp = disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
+  end subroutine predict_in_bulk
+
+  !> Everywhere else.
+  subroutine predict_special(self, sim, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
     logical :: crowded
@@ -231,23 +280,27 @@ contains
         return
       end if
     end if
-    call next_face(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
+    if (self%falling) then
+      call next_face_falling(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
+    else
+      call next_face(self, sim%disk(i), sim%tag(i)%cell, t, code)
+    end if
     c = cell_number(self, sim%tag(i)%cell)
     if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
       self%obstacle_list(self%obstacle_start(c):self%obstacle_start(c + 1) - 1), t, code)
-    if (at_periodic_edge(self, sim%box, sim%tag(i)%cell)) then
+    if (at_periodic_edge(self, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cells%cell, c, self%stride, list, n, crowded)
       call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
         no_shift, sim%box%gravity, t, code)
-      if (crowded) call scan_crowd(self, sim%disk, i, c, sim%box%gravity, t, code)
+      if (crowded) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
     end if
     if (self%big%count > 0) call scan_big_ones(self, sim, i, t, code)
     sim%disk(i)%event_time = t
     sim%disk(i)%partner = code
-    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
-  end subroutine predict
+    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
+  end subroutine predict_special
 
   !> Contacts of a small disk with the big ones that can be near its cell.
   subroutine scan_big_ones(self, sim, i, t, code)
@@ -260,7 +313,7 @@ contains
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, self%big%disk(entry%number:entry%number), .false., .true., &
+        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .false., .true., &
           entry%image*sim%box%edges(), sim%box%gravity, t, code)
         e = entry%next
       end associate
@@ -285,7 +338,7 @@ contains
     t = min(t, t_margin)
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk, .false., .true., &
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .false., .true., &
           [ix, iy]*sim%box%edges(), sim%box%gravity, t, code)
       end do
     end do
@@ -300,95 +353,87 @@ contains
     sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
   end subroutine predict_big
 
-  !> When and how the disk leaves its cell, or meets a side within it.
-  pure subroutine next_face(self, box, disk, cell, now, t, code)
+  !> When and how the disk leaves its cell on a straight line, or meets a side within it; which axis and
+  !> which way are toss-ups: no branch on them.
+  pure subroutine next_face(self, disk, cell, t, code)
     class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
-    real(real64), intent(in) :: now
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: t_y
-    integer(int32) :: code_y
-    if (self%falling) then
-      call next_face_falling(self, box, disk, cell, now, 1, t, code)
-      call next_face_falling(self, box, disk, cell, now, 2, t_y, code_y)
-    else
-      call next_face_straight(self, disk, cell, 1, t, code)
-      call next_face_straight(self, disk, cell, 2, t_y, code_y)
-    end if
-    code = code + (code_y - code)*merge(1, 0, t_y < t)   ! which axis is a toss-up: no branch
-    t = merge(t_y, t, t_y < t)
+    real(real64) :: t_x, t_y
+    integer(int32) :: face, up_x, up_y
+    t_x = face_time(disk%x(1), disk%v(1), disk%clock, self%walled(1)*disk%radius, cell(1), self%width(1), &
+      self%lower(1), self%upper(1))
+    t_y = face_time(disk%x(2), disk%v(2), disk%clock, self%walled(2)*disk%radius, cell(2), self%width(2), &
+      self%lower(2), self%upper(2))
+    up_x = merge(1, 0, disk%v(1) > 0)
+    up_y = merge(1, 0, disk%v(2) > 0)
+    face = up_x + merge(1, 0, t_y < t_x)*(2 + up_y - up_x)
+    code = merge(0, first_crossing, cell(1 + face/2) == self%last(face)) - face
+    t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_face
 
-  !> Along one axis on a straight line, without a branch. Contact with a side comes out as `side_time` has
-  !> it: it is one event, whoever predicts it.
-  pure subroutine next_face_straight(self, disk, cell, axis, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)
-    integer, intent(in) :: axis
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
-    real(real64) :: to_face, to_side, sense, inset, speed
-    integer(int32) :: up
-    up = merge(1, 0, disk%v(axis) > 0)
-    sense = 2*up - 1
-    inset = self%walled(axis)*disk%radius
-    to_face = sense*((self%side(0, axis) + self%width(axis)*(cell(axis) - 1 + up)) - disk%x(axis))
-    to_side = sense*((self%side(up, axis) - sense*inset) - disk%x(axis))
-    code = merge(0, first_crossing, to_side <= to_face) - 2*(axis - 1) - up
-    to_face = merge(to_side, to_face, to_side <= to_face)
-    to_face = merge(to_face, 0.0_real64, to_face > 0)
-    speed = abs(disk%v(axis))
-    t = disk%clock + to_face/merge(speed, slowest, speed > slowest)
+  !> The same along one axis. Contact with a side comes out as `side_time` has it: it is one event, whoever
+  !> predicts it.
+  pure function face_time(x, v, clock, inset, cell, width, lower, upper) result(t)
+    real(real64), intent(in) :: x, v, clock
+    real(real64), intent(in) :: inset             !! of the side: the disk's radius, or 0 if periodic [length]
+    integer(int16), intent(in) :: cell
+    real(real64), intent(in) :: width, lower, upper
+    real(real64) :: t, line, first, last, speed
+    line = lower + width*((cell - 0.5_real64) + sign(0.5_real64, v))
+    first = lower + inset
+    last = upper - inset
+    line = merge(line, first, line > first)
+    line = merge(line, last, line < last)
+    speed = abs(v)
+    t = (line - x)/sign(merge(speed, slowest, speed > slowest), v)
+    t = clock + merge(t, 0.0_real64, t > 0)
     t = merge(t, never, speed > slowest)
-  end subroutine next_face_straight
+  end function face_time
 
-  !> The same on a parabola: each of the two faces can be the one, and the root before `now`, where the disk
-  !> came in, is not.
-  pure subroutine next_face_falling(self, box, disk, cell, now, axis, t, code)
+  !> The same on a parabola: each of the two faces along an axis can be the one, and the root before `now`, where
+  !> the disk came in, is not.
+  pure subroutine next_face_falling(self, box, disk, cell, now, t, code)
     class(cell_grid_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
-    integer, intent(in) :: axis
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: face, side, t_k, sense
-    integer(int32) :: k
+    real(real64) :: line, side, t_k, sense
+    integer(int32) :: face, axis
     t = never
-    code = -2*(axis - 1)
-    do k = 0, 1
-      sense = 2*k - 1
-      face = box%lower(axis) + self%width(axis)*(cell(axis) - 1 + k)
-      side = merge(box%upper(axis) - disk%radius, box%lower(axis) + disk%radius, k == 1)
-      if (sense*(face - side) >= 0) then
-        t_k = side_time(box, disk, -2*(axis - 1) - k)
+    code = 0
+    do face = 0, 3
+      axis = 1 + face/2
+      sense = 2*modulo(face, 2) - 1
+      line = box%lower(axis) + self%width(axis)*(cell(axis) + min(sense, 0.0_real64))
+      side = merge(box%upper(axis) - disk%radius, box%lower(axis) + disk%radius, sense > 0)
+      if (sense*(line - side) >= 0) then
+        t_k = side_time(box, disk, -face)
       else if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
         .and. sense*box%gravity(axis) < 0) then
         cycle                                      ! flies away from this face, ever faster
       else
         t_k = max(now, disk%clock &
-          + time_to_line(sense*(face - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
+          + time_to_line(sense*(line - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
       end if
       if (t_k < t) then
         t = t_k
-        code = merge(0, first_crossing, sense*(face - side) >= 0) - 2*(axis - 1) - k
+        code = merge(0, first_crossing, sense*(line - side) >= 0) - face
       end if
     end do
   end subroutine next_face_falling
 
   !> Whether the cells around lie partly beyond a periodic side.
-  pure function at_periodic_edge(self, box, cell) result(yes)
+  pure function at_periodic_edge(self, cell) result(yes)
     class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
     integer(int16), intent(in) :: cell(2)
     logical :: yes
-    yes = .false.
-    if (self%periodic) yes = any(box%periodic .and. (cell == 1 .or. cell == self%n))
+    yes = any(.not. self%walled > 0 .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
   !> Contacts with the chained disks of the nine cells around c.
@@ -421,7 +466,7 @@ contains
       n = 0
       do while (j > 0 .and. n < list_capacity)
         n = n + 1
-        list(n) = j
+        list(n) = j - 1
         j = self%cells%next(j)
       end do
       call earliest_contact(disk, i, n, list, .false., .true., shift, gravity, t, code)

@@ -4,7 +4,7 @@ module cells
   use kinds, only: int32
   implicit none
   private
-  public :: cells_t, gather, list_capacity
+  public :: cell_t, cells_t, gather, list_capacity
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
@@ -12,7 +12,7 @@ module cells
   integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
   integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
 
-  !> The last slot counts the disks: those in the slots in its two lowest bits and, if the cell is crowded,
+  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks: those in the slots in its two lowest bits and, if the cell is crowded,
   !> those chained behind the last one in the bits above.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
@@ -54,11 +54,11 @@ contains
       n = slot(count_slot)
       if (n < cell_capacity) then
         self%next(i) = 0
-        slot(n + 1) = i
+        slot(n + 1) = i - 1
         slot(count_slot) = n + 1
       else                                         ! becomes the head of the chain
-        self%next(i) = slot(cell_capacity)
-        slot(cell_capacity) = i
+        self%next(i) = slot(cell_capacity) + 1
+        slot(cell_capacity) = i - 1
         slot(count_slot) = n + chained
       end if
     end associate
@@ -72,17 +72,17 @@ contains
     associate (slot => self%cell(c)%slot)
       n = slot(count_slot)
       do k = 1, iand(n, listed)
-        if (slot(k) == i) exit
+        if (slot(k) == i - 1) exit
       end do
       if (n <= listed) then
         slot(k) = slot(n)
         slot(count_slot) = n - 1
         return
       end if
-      link = slot(cell_capacity)
+      link = slot(cell_capacity) + 1
       if (k <= cell_capacity) then                 ! the head of the chain takes the free place
-        slot(k) = link
-        slot(cell_capacity) = self%next(link)
+        slot(k) = link - 1
+        slot(cell_capacity) = self%next(link) - 1
         self%next(link) = 0
       else
         do while (self%next(link) /= i)
@@ -108,7 +108,7 @@ contains
     integer(int32), intent(in) :: c
     integer(int32) :: i
     i = 0
-    if (self%cell(c)%slot(count_slot) > listed) i = self%next(self%cell(c)%slot(cell_capacity))
+    if (self%cell(c)%slot(count_slot) > listed) i = self%next(self%cell(c)%slot(cell_capacity) + 1)
   end function chain
 
   !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they

@@ -82,12 +82,13 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: t, t_limit
-    integer(int64) :: turn
+    integer(int64) :: turn, look
     integer(int32) :: i, code
     logical :: met
     if (reached(self, sim, limits)) return
     if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
     t_limit = min(limits%time - sim%epoch, last_time)
+    look = next_look(self, sim, limits)
     do turn = 1, limits%turns
       call self%queue%first(sim%disk, sim%tag, i)
       t = sim%disk(i)%event_time
@@ -100,14 +101,15 @@ contains
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
       code = sim%disk(i)%partner
-      call react(self, sim, i, met)
-      if (.not. met) cycle
+      call react(self, sim, i, code, t, met)
+      if (.not. met .or. sim%events < look) cycle
       if (sim%events - self%last_events > patience) call watch(self, sim, i, code, error)
       if (allocated(error) .or. reached(self, sim, limits)) return
       if (sim%events >= sim%next_epoch) then
         call move_epoch(self, sim)
         t_limit = min(limits%time - sim%epoch, last_time)
       end if
+      look = next_look(self, sim, limits)
     end do
   end subroutine advance
 
@@ -121,31 +123,49 @@ contains
       .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()
   end function reached
 
+  !> The number of events before which there is nothing to do but to go on.
+  pure function next_look(self, sim, limits) result(events)
+    class(event_driven_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    integer(int64) :: events
+    events = min(sim%next_epoch, self%last_events + patience + 1, limits%events, &
+      sim%events + min(limits%collisions - sim%collisions, patience))
+    if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on()) events = sim%events + 1
+  end function next_look
+
   !> Executes what disk i expects, now.
-  subroutine react(self, sim, i, met)
+  subroutine react(self, sim, i, code, t, met)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: i, code          !! the disk and whom it expects
+    real(real64), intent(in) :: t
     logical, intent(out) :: met                    !! it was a collision, not a mere passage or stale
-    integer(int32) :: code, k
-    code = sim%disk(i)%partner
+    integer(int32) :: k
     met = .false.
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        call collide(sim, i, code, sim%disk(i)%event_time, self%log)
+        call collide(sim, i, code, t, self%log)
         met = .true.
-        call predict(self, sim, code)
+        call self%search%predict(sim, code)
+        call self%search%predict(sim, i)
+        call self%queue%schedule(sim%disk, sim%tag, code)
+        call self%queue%schedule(sim%disk, sim%tag, i)
+      else
+        call predict(self, sim, i)
       end if
     else if (code <= first_crossing) then
       call self%search%cross(sim, i, code)
+      call predict(self, sim, i)
     else if (passes(sim, code)) then
       call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
+      call predict(self, sim, i)
     else
-      call collide(sim, i, code, sim%disk(i)%event_time, self%log)
+      call collide(sim, i, code, t, self%log)
       met = .true.
+      call predict(self, sim, i)
     end if
-    call predict(self, sim, i)
     if (self%search%everyone .and. met) then
       do k = 1, sim%n_disks()
         call predict(self, sim, k)

@@ -30,6 +30,7 @@ module event_queue
     type(event_heap_t) :: heap
     type(event_t) :: list(list_capacity)           !! (n_list) latest first
     integer(int32) :: n_list = 0
+    logical :: list_is_open = .false.              !! it takes events; else the heap does
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
     integer(int32), allocatable :: far(:)          !! (n_far) disks whose event lies beyond the ring
     integer(int32) :: n_far = 0
@@ -46,6 +47,9 @@ module event_queue
     procedure :: schedule
     procedure :: first
     procedure :: drop_first
+    procedure, private :: insert_far
+    procedure, private :: insert_into_heap
+    procedure, private :: open_next_window
   end type event_queue_t
 
 contains
@@ -60,6 +64,7 @@ contains
     integer(int32) :: n, i, length
     n = size(disk, kind=int32)
     self%n_list = 0
+    self%list_is_open = .false.
     self%n_far = 0
     call self%heap%initialise(n)
     tag%bucket = nowhere
@@ -82,6 +87,7 @@ contains
       self%window = int(now*self%per_time, int32)
       self%window_end = self%width*(self%window + 1)
       self%half_turn = self%window + length/2
+      self%list_is_open = .true.
     else
       self%window_end = huge(now)
     end if
@@ -118,34 +124,44 @@ contains
   end function window_width
 
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
-  recursive subroutine schedule(self, disk, tag, i)
+  subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
-    integer(int32) :: window, k, n
     if (disk(i)%event_time < self%window_end) then
       tag(i)%bucket = in_window
       call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
-      return
+    else
+      if (self%heap%n > 0) call self%heap%remove(i)
+      call file(self, self%bucket, disk, tag, i)
     end if
-    if (self%heap%n > 0) call self%heap%remove(i)
+  end subroutine schedule
+
+  !> Into the bucket of its window, which is not the current one.
+  subroutine file(self, bucket, disk, tag, i)
+    class(event_queue_t), intent(inout) :: self
+    type(bucket_t), intent(inout) :: bucket(0:*)
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    integer(int32), intent(in) :: i
+    integer(int32) :: window, k, n
     window = window_number(self, disk(i)%event_time)
     if (window == tag(i)%bucket) return
-    if (window > self%window .and. window - self%window < self%length) then
-      k = iand(window, self%length - 1)
-      n = self%bucket(k)%n
-      if (n < bucket_capacity) then
-        self%bucket(k)%disk(n + 1) = i
-        self%bucket(k)%n = n + 1
+    k = iand(window, self%length - 1)
+    if (window - self%window < self%length) then
+      n = bucket(k)%n + 1
+      if (n <= bucket_capacity) then
+        bucket(k)%disk(n) = i
+        bucket(k)%n = n
         tag(i)%bucket = window
         return
       end if
     end if
-    call insert_far(self, disk, tag, i, window)
-  end subroutine schedule
+    call self%insert_far(disk, tag, i, window)
+  end subroutine file
 
-  !> The window that holds the time t.
+  !> The window that holds the time t, later than the current one.
   pure function window_number(self, t) result(window)
     class(event_queue_t), intent(in) :: self
     real(real64), intent(in) :: t
@@ -153,6 +169,7 @@ contains
     real(real64) :: number
     number = t*self%per_time
     window = int(merge(number, last_window, number < last_window), int32)
+    window = merge(window, self%window + 1, window > self%window)    ! it may round down
   end function window_number
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
@@ -161,15 +178,7 @@ contains
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
     integer(int32) :: k
-    if (self%n_list == list_capacity .or. .not. self%calendar) then
-      do k = 1, self%n_list
-        if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
-      end do
-      self%n_list = 0
-      call self%heap%update(event)
-    else if (self%heap%n > 0) then
-      call self%heap%update(event)
-    else
+    if (self%list_is_open) then
       k = self%n_list
       do while (k > 0)
         if (precedes(event, self%list(k))) exit
@@ -178,8 +187,24 @@ contains
       end do
       self%list(k + 1) = event
       self%n_list = self%n_list + 1
+      self%list_is_open = self%n_list < list_capacity
+    else
+      call self%insert_into_heap(disk, event)
     end if
   end subroutine insert_near
+
+  !> Where the list is full, it moves into the heap first.
+  subroutine insert_into_heap(self, disk, event)
+    class(event_queue_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(*)
+    type(event_t), intent(in) :: event
+    integer(int32) :: k
+    do k = 1, self%n_list
+      if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
+    end do
+    self%n_list = 0
+    call self%heap%update(event)
+  end subroutine insert_into_heap
 
   !> Where there is no room in the right bucket: into an earlier one, as opened too soon does no harm; or into
   !> the far list, if the window lies beyond the ring.
@@ -251,7 +276,7 @@ contains
         i = event%disk
         if (event%time < self%window_end) return
       end if
-      call open_next_window(self, disk, tag)
+      call self%open_next_window(disk, tag)
     end do
   end subroutine first
 
@@ -286,6 +311,7 @@ contains
     integer(int32) :: k, i
     self%window = self%window + 1
     self%window_end = self%width*(self%window + 1)
+    self%list_is_open = self%heap%n == 0
     if (self%window == self%half_turn) then
       if (ill_fitting(self)) then
         k = size(self%far, kind=int32)

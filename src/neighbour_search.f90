@@ -56,40 +56,39 @@ contains
   !> Most candidates fail one combined test: the root is not before the best so far (it needs
   !> c < -2 b (t - late), with a margin above rounding) or not real.
   pure subroutine earliest_contact(disk, i, n, list, fresh, bent, shift, gravity, t, partner)
-    type(disk_t), intent(in) :: disk(*)       !! all disks
+    type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: n           !! number of candidates
-    integer(int32), intent(in) :: list(*)     !! (n) candidates; i itself is harmless
+    integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
     logical, intent(in) :: fresh              !! nobody has a later clock than i
     logical, intent(in) :: bent               !! `shift` or `gravity` is not zero
     real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
-    real(real64) :: xi, yi, ui, vi, clock, ri, clock_j, late, si, sj, dx, dy, du, dv, sigma2, b, c, disc
-    real(real64) :: t_j, gate, in_time
-    integer(int32) :: k, j
-    xi = disk(i)%x(1); yi = disk(i)%x(2)
-    ui = disk(i)%v(1); vi = disk(i)%v(2)
-    clock = disk(i)%clock; ri = disk(i)%radius
+    real(real64) :: x, y, u, v, radius, xi, yi, ui, vi, clock, ri, clock_j, late, si, sj, dx, dy, du, dv, sigma2, b, c, disc
+    real(real64) :: t_j, gate, in_time, reach
+    integer(int32) :: k, j, m
+    call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
+    reach = 2*(clock - above(t))
     gate = above(t)
     si = 0
     do k = 1, n
       j = list(k)
-      clock_j = disk(j)%clock
-      du = disk(j)%v(1) - ui
-      dv = disk(j)%v(2) - vi
+      call read_state(disk(j), x, y, u, v, clock_j, radius)
+      du = u - ui
+      dv = v - vi
       if (fresh) then                         ! the same numbers as below, with si = 0
         late = clock
         sj = late - clock_j
-        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - xi
-        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - yi
+        dx = (x + u*sj) - xi
+        dy = (y + v*sj) - yi
       else
         late = merge(clock, clock_j, clock > clock_j)
         si = late - clock
         sj = late - clock_j
-        dx = (disk(j)%x(1) + disk(j)%v(1)*sj) - (xi + ui*si)
-        dy = (disk(j)%x(2) + disk(j)%v(2)*sj) - (yi + vi*si)
+        dx = (x + u*sj) - (xi + ui*si)
+        dy = (y + v*sj) - (yi + vi*si)
       end if
       if (bent) then
         dx = dx + (shift(1) + 0.5_real64*gravity(1)*(sj*sj - si*si))
@@ -97,22 +96,36 @@ contains
         du = du + gravity(1)*(sj - si)
         dv = dv + gravity(2)*(sj - si)
       end if
-      sigma2 = (ri + disk(j)%radius)**2
+      sigma2 = (ri + radius)**2
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2
       disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
-      in_time = 2*(late - gate)*b - c
+      if (fresh) then
+        in_time = reach*b - c
+      else
+        in_time = 2*(late - gate)*b - c
+      end if
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
         if (t_j > t .or. b >= 0) cycle
-        if (t_j == t .and. .not. before(i, j, partner)) cycle
+        if (t_j == t .and. .not. before(i, j + 1, partner)) cycle
         t = t_j
-        partner = j
+        partner = j + 1
         gate = above(t)
+        reach = 2*(clock - gate)
       end if
     end do
   end subroutine earliest_contact
+
+  !> The state of a disk, in numbers.
+  pure subroutine read_state(d, x, y, u, v, clock, radius)
+    type(disk_t), intent(in) :: d
+    real(real64), intent(out) :: x, y, u, v, clock, radius
+    x = d%x(1); y = d%x(2)
+    u = d%v(1); v = d%v(2)
+    clock = d%clock; radius = d%radius
+  end subroutine read_state
 
   !> A time just above t by more than the rounding of the test that it guards.
   elemental function above(t) result(gate)
