@@ -98,7 +98,7 @@ contains
         if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
         return
       end if
-      call self%queue%drop_first(sim%tag, i)
+      call self%queue%drop_first(i)
       sim%now = max(sim%now, t)
       code = sim%disk(i)%partner
       call react(self, sim, i, code, t, met)

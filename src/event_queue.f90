@@ -2,8 +2,9 @@
 !>
 !> The near future, one window of time, is a short sorted list; if it grows long, the heap takes over until
 !> the window is done. Later events lie in append-only buckets of one cache line, one bucket per window;
-!> those beyond the last bucket in an unordered far list. Nothing is searched or unlinked: an entry
-!> counts only if it still is what its disk expects. Without buckets all events are in the heap.
+!> those beyond the last bucket in an unordered far list; those that find their bucket full in the heap.
+!> Nothing is searched or unlinked: an entry counts only if it still is what its disk expects. Without
+!> buckets all events are in the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use disks, only: disk_t, tag_t
@@ -14,7 +15,7 @@ module event_queue
 
   integer(int32), parameter :: list_capacity = 64
   integer(int32), parameter :: bucket_capacity = 15
-  integer(int32), parameter :: in_window = -1, nowhere = -2, in_far_list = -3   !! values of tag%bucket
+  integer(int32), parameter :: nowhere = -1, in_far_list = -2   !! values of tag%bucket
   real(real64), parameter :: last_window = 2.0e9_real64
   real(real64), parameter :: events_per_window = 4.0_real64
   integer, parameter :: sample_size = 100
@@ -28,18 +29,18 @@ module event_queue
     private
     logical :: calendar = .true.
     type(event_heap_t) :: heap
-    type(event_t) :: list(list_capacity)           !! (n_list) latest first
+    type(event_t) :: list(0:list_capacity)         !! (n_list) latest first, after one that is never due
     integer(int32) :: n_list = 0
     logical :: list_is_open = .false.              !! it takes events; else the heap does
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
     integer(int32), allocatable :: far(:)          !! (n_far) disks whose event lies beyond the ring
     integer(int32) :: n_far = 0
-    integer(int32) :: length = 0                   !! number of buckets
+    integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
     integer(int32) :: window = 0                   !! number of the current window since the epoch
     integer(int32) :: half_turn = 0                !! window at which the far list is filed again
     real(real64) :: width = never                  !! of a window [time]
     real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
-    real(real64) :: window_end = never             !! since the epoch [time]
+    real(real64) :: next_window = 1.0_real64       !! window + 1
     integer(int64) :: n_taken = 0                  !! events since the last filling
     real(real64) :: filled_at = 0.0_real64         !! moment of the last filling [time]
   contains
@@ -47,9 +48,14 @@ module event_queue
     procedure :: schedule
     procedure :: first
     procedure :: drop_first
+    ! Bound to the type so that these rare parts stay out of the frequent ones.
+    procedure, private :: insert_near
     procedure, private :: insert_far
     procedure, private :: insert_into_heap
+    procedure, private :: first_in_heap
     procedure, private :: open_next_window
+    procedure, private :: take_from_heap
+    procedure, private :: turn_ring
   end type event_queue_t
 
 contains
@@ -64,16 +70,18 @@ contains
     integer(int32) :: n, i, length
     n = size(disk, kind=int32)
     self%n_list = 0
-    self%list_is_open = .false.
+    self%list(0)%time = huge(now)
     self%n_far = 0
     call self%heap%initialise(n)
     tag%bucket = nowhere
     self%width = max(window_width(self, disk, now), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
-    self%per_time = 1/self%width
     self%calendar = calendar .and. self%width < never
+    self%list_is_open = self%calendar
     self%n_taken = 0
     self%filled_at = now
+    self%per_time = 0                              ! one window without end
     if (self%calendar) then
+      self%per_time = 1/self%width
       length = 16
       do while (length < n/2)
         length = 2*length
@@ -83,14 +91,11 @@ contains
       end if
       if (.not. allocated(self%bucket)) allocate (self%bucket(0:length - 1), self%far(n))
       self%bucket%n = 0
-      self%length = length
-      self%window = int(now*self%per_time, int32)
-      self%window_end = self%width*(self%window + 1)
-      self%half_turn = self%window + length/2
-      self%list_is_open = .true.
-    else
-      self%window_end = huge(now)
+      self%last_bucket = length - 1
+      self%half_turn = int(now*self%per_time, int32) + length/2
     end if
+    self%window = int(now*self%per_time, int32)
+    self%next_window = self%window + 1
     do i = 1, n
       call schedule(self, disk, tag, i)
     end do
@@ -106,7 +111,7 @@ contains
     integer :: i, k, n_waits
     width = never
     if (self%n_taken > sample_size .and. self%calendar) then
-      width = events_per_window*(self%window_end - self%filled_at)/self%n_taken
+      width = events_per_window*(self%width*self%next_window - self%filled_at)/self%n_taken
       return
     end if
     n_waits = 0
@@ -129,11 +134,10 @@ contains
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
-    if (disk(i)%event_time < self%window_end) then
-      tag(i)%bucket = in_window
-      call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
+    if (.not. disk(i)%event_time*self%per_time >= self%next_window) then       ! NaN as well, to be found
+      tag(i)%bucket = nowhere
+      call self%insert_near(disk, i)
     else
-      if (self%heap%n > 0) call self%heap%remove(i)
       call file(self, self%bucket, disk, tag, i)
     end if
   end subroutine schedule
@@ -146,92 +150,85 @@ contains
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
     integer(int32) :: window, k, n
-    window = window_number(self, disk(i)%event_time)
+    real(real64) :: number
+    number = disk(i)%event_time*self%per_time
+    window = int(merge(number, last_window, number < last_window), int32)
     if (window == tag(i)%bucket) return
-    k = iand(window, self%length - 1)
-    if (window - self%window < self%length) then
-      n = bucket(k)%n + 1
-      if (n <= bucket_capacity) then
-        bucket(k)%disk(n) = i
-        bucket(k)%n = n
-        tag(i)%bucket = window
-        return
-      end if
+    if (window - self%window > self%last_bucket) then
+      call self%insert_far(disk, tag, i)
+      return
     end if
-    call self%insert_far(disk, tag, i, window)
+    k = iand(window, self%last_bucket)
+    n = bucket(k)%n + 1
+    if (n > bucket_capacity) then
+      tag(i)%bucket = nowhere
+      call self%insert_into_heap(disk, i)
+      return
+    end if
+    bucket(k)%disk(n) = i
+    bucket(k)%n = n
+    tag(i)%bucket = window
   end subroutine file
 
-  !> The window that holds the time t, later than the current one.
-  pure function window_number(self, t) result(window)
-    class(event_queue_t), intent(in) :: self
-    real(real64), intent(in) :: t
-    integer(int32) :: window
-    real(real64) :: number
-    number = t*self%per_time
-    window = int(merge(number, last_window, number < last_window), int32)
-    window = merge(window, self%window + 1, window > self%window)    ! it may round down
-  end function window_number
-
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
-  subroutine insert_near(self, disk, event)
+  subroutine insert_near(self, disk, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
-    type(event_t), intent(in) :: event
+    integer(int32), intent(in) :: i
     integer(int32) :: k
     if (self%list_is_open) then
-      k = self%n_list
-      do while (k > 0)
-        if (precedes(event, self%list(k))) exit
-        self%list(k + 1) = self%list(k)
-        k = k - 1
-      end do
-      self%list(k + 1) = event
+      call insert(self%list, self%n_list, event_of(disk, i))
       self%n_list = self%n_list + 1
       self%list_is_open = self%n_list < list_capacity
     else
-      call self%insert_into_heap(disk, event)
+      do k = 1, self%n_list
+        if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
+      end do
+      self%n_list = 0
+      call self%insert_into_heap(disk, i)
     end if
   end subroutine insert_near
 
-  !> Where the list is full, it moves into the heap first.
-  subroutine insert_into_heap(self, disk, event)
+  subroutine insert_into_heap(self, disk, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
-    type(event_t), intent(in) :: event
-    integer(int32) :: k
-    do k = 1, self%n_list
-      if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
-    end do
-    self%n_list = 0
-    call self%heap%update(event)
+    integer(int32), intent(in) :: i
+    call self%heap%update(event_of(disk, i))
   end subroutine insert_into_heap
 
-  !> Where there is no room in the right bucket: into an earlier one, as opened too soon does no harm; or into
-  !> the far list, if the window lies beyond the ring.
-  recursive subroutine insert_far(self, disk, tag, i, window)
+  !> Puts an event into its place in a sorted list of n. Times decide nearly always: of events at the same
+  !> moment most are one collision that both disks expect, and these need no order.
+  pure subroutine insert(list, n, event)
+    type(event_t), intent(inout) :: list(0:*)
+    integer(int32), intent(in) :: n
+    type(event_t), intent(in) :: event
+    integer(int32) :: k
+    k = n
+    do while (list(k)%time < event%time)
+      list(k + 1) = list(k)
+      k = k - 1
+    end do
+    if (merge(ior(ieor(list(k)%disk, event%partner), ieor(list(k)%partner, event%disk)), 0, &
+      list(k)%time <= event%time) /= 0) then
+      do while (precedes(list(k), event))
+        list(k + 1) = list(k)
+        k = k - 1
+      end do
+    end if
+    list(k + 1) = event
+  end subroutine insert
+
+  !> Beyond the ring.
+  recursive subroutine insert_far(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i, window
-    integer(int32) :: earlier, k
-    if (window - self%window >= self%length) then
-      if (tag(i)%bucket == in_far_list) return
-      if (self%n_far == size(self%far)) call sweep_far_list(self, disk, tag)
-      self%n_far = self%n_far + 1
-      self%far(self%n_far) = i
-      tag(i)%bucket = in_far_list
-      return
-    end if
-    do earlier = window - 1, self%window + 1, -1
-      k = iand(earlier, self%length - 1)
-      if (self%bucket(k)%n == bucket_capacity) cycle
-      self%bucket(k)%n = self%bucket(k)%n + 1
-      self%bucket(k)%disk(self%bucket(k)%n) = i
-      tag(i)%bucket = earlier
-      return
-    end do
-    tag(i)%bucket = in_window
-    call insert_near(self, disk, event_t(disk(i)%event_time, i, disk(i)%partner))
+    integer(int32), intent(in) :: i
+    if (tag(i)%bucket == in_far_list) return
+    if (self%n_far == size(self%far)) call sweep_far_list(self, disk, tag)
+    self%n_far = self%n_far + 1
+    self%far(self%n_far) = i
+    tag(i)%bucket = in_far_list
   end subroutine insert_far
 
   !> Drops void entries of the far list and files those that have come near.
@@ -261,84 +258,140 @@ contains
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(out) :: i
-    type(event_t) :: event
     do
-      if (self%n_list > 0) then
-        event = self%list(self%n_list)
-        if (event%time < self%window_end) then
-          i = event%disk
-          if (expected(disk, event)) return
-          self%n_list = self%n_list - 1
-          cycle
-        end if
-      else if (self%heap%n > 0) then
-        event = self%heap%first()
-        i = event%disk
-        if (event%time < self%window_end) return
+      do while (self%n_list > 0)
+        i = self%list(self%n_list)%disk
+        if (expected(disk, self%list(self%n_list))) return
+        self%n_list = self%n_list - 1
+      end do
+      if (self%heap%n > 0) then
+        call self%first_in_heap(disk, i)
+        if (i > 0) return
       end if
       call self%open_next_window(disk, tag)
     end do
   end subroutine first
 
-  !> Takes the event that `first` found out of the queue.
-  subroutine drop_first(self, tag, i)
+  !> The disk whose event comes first of those in the heap; 0: none is due in this window.
+  subroutine first_in_heap(self, disk, i)
     class(event_queue_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag(*)
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32), intent(out) :: i
+    type(event_t) :: event
+    do while (self%heap%n > 0)
+      event = self%heap%first()
+      i = event%disk
+      if (expected(disk, event)) then
+        if (.not. event%time*self%per_time < self%next_window) exit
+        return
+      end if
+      call self%heap%remove(i)
+    end do
+    i = 0
+  end subroutine first_in_heap
+
+  !> Takes the event that `first` found out of the queue.
+  subroutine drop_first(self, i)
+    class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i                !! as given by `first`
     if (self%n_list > 0) then
       self%n_list = self%n_list - 1
     else
       call self%heap%remove(i)
     end if
-    tag(i)%bucket = nowhere
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
+
+  !> What disk i expects.
+  pure function event_of(disk, i) result(event)
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32), intent(in) :: i
+    type(event_t) :: event
+    event = event_t(disk(i)%event_time, i, disk(i)%partner)
+  end function event_of
 
   !> Whether an entry still is what its disk expects.
   pure function expected(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
     logical :: yes
-    yes = disk(event%disk)%event_time == event%time .and. disk(event%disk)%partner == event%partner
+    associate (t => disk(event%disk)%event_time)
+      yes = .not. (t < event%time .or. t > event%time) .and. disk(event%disk)%partner == event%partner
+    end associate
   end function expected
 
-  !> Moves on by one window and sorts its bucket into the list.
+  !> Moves on by one window and sorts what is due in it into the list, which is empty.
   subroutine open_next_window(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    type(bucket_t) :: opened
-    integer(int32) :: k, i
     self%window = self%window + 1
-    self%window_end = self%width*(self%window + 1)
-    self%list_is_open = self%heap%n == 0
-    if (self%window == self%half_turn) then
-      if (ill_fitting(self)) then
-        k = size(self%far, kind=int32)
-        call fill(self, disk(1:k), tag(1:k), self%width*self%window, calendar=.true.)
-        return
-      end if
-      self%half_turn = self%window + self%length/2
+    self%next_window = self%window + 1
+    self%list_is_open = .true.
+    call take_bucket(self%bucket(iand(self%window, self%last_bucket)), disk, self%per_time, self%next_window, &
+      self%list, self%n_list)
+    if (self%heap%n > 0) call self%take_from_heap(disk)
+    if (self%window == self%half_turn) call self%turn_ring(disk, tag)
+  end subroutine open_next_window
+
+  !> Empties a bucket into a sorted list: what its disks expect before the next window. Whatever else it
+  !> holds is void.
+  pure subroutine take_bucket(bucket, disk, per_time, next_window, list, n)
+    type(bucket_t), intent(inout) :: bucket
+    type(disk_t), intent(in) :: disk(*)
+    real(real64), intent(in) :: per_time, next_window
+    type(event_t), intent(inout) :: list(0:*)
+    integer(int32), intent(out) :: n
+    type(event_t) :: event
+    integer(int32) :: k, m
+    m = 0
+    do k = 1, bucket%n
+      event = event_of(disk, bucket%disk(k))
+      list(m + 1) = event
+      m = m + merge(1, 0, event%time*per_time < next_window)
+    end do
+    bucket%n = 0
+    do k = 2, m
+      event = list(k)
+      call insert(list, k - 1, event)
+    end do
+    n = m
+  end subroutine take_bucket
+
+  !> Moves what is due in this window from the heap into the list, as far as it takes it.
+  subroutine take_from_heap(self, disk)
+    class(event_queue_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32) :: i
+    do while (self%list_is_open)
+      call self%first_in_heap(disk, i)
+      if (i == 0) exit
+      call self%heap%remove(i)
+      call self%insert_near(disk, i)
+    end do
+  end subroutine take_from_heap
+
+  !> Half a turn later: looks through the far list or, if the windows do not fit, files everything anew.
+  subroutine turn_ring(self, disk, tag)
+    class(event_queue_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    integer(int32) :: n
+    if (ill_fitting(self)) then
+      n = size(self%far, kind=int32)
+      call fill(self, disk(1:n), tag(1:n), self%width*self%window, calendar=.true.)
+    else
+      self%half_turn = self%window + size(self%bucket, kind=int32)/2
       call sweep_far_list(self, disk, tag)
     end if
-    k = iand(self%window, self%length - 1)
-    opened%n = self%bucket(k)%n
-    opened%disk = self%bucket(k)%disk
-    self%bucket(k)%n = 0
-    do k = 1, opened%n
-      i = opened%disk(k)
-      if (tag(i)%bucket /= self%window) cycle
-      tag(i)%bucket = nowhere
-      call schedule(self, disk, tag, i)
-    end do
-  end subroutine open_next_window
+  end subroutine turn_ring
 
   !> Whether windows turned out far too narrow or too wide since the last filling.
   pure function ill_fitting(self) result(yes)
     class(event_queue_t), intent(in) :: self
     logical :: yes
     real(real64) :: per_window
-    per_window = max(self%n_taken, 1_int64)*self%width/(self%window_end - self%filled_at)
+    per_window = max(self%n_taken, 1_int64)*self%width/(self%width*self%next_window - self%filled_at)
     yes = abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0
   end function ill_fitting
 
