@@ -21,7 +21,8 @@ module event_driven
   !> Pair collisions per disk after which the origin of time moves, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 20
   integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
-  integer(int64), parameter :: patience = 20000    !! events between two looks at the clock
+  !> Events between two looks at the clock: at least these, and these per disk.
+  integer(int64), parameter :: patience = 20000, patience_per_disk = 20
   real(real64), parameter :: last_time = 0.5_real64*never
   character(len=6), parameter :: side_name(4) = ["left  ", "right ", "bottom", "top   "]
 
@@ -32,10 +33,12 @@ module event_driven
     ! Watch over the clock: a collapse is an endless series of events in no time.
     real(real64), private :: blink = 0.0_real64    !! a time in which nothing can move visibly [time]
     real(real64), private :: last_look = 0.0_real64  !! when we looked at the clock [time]
-    integer(int64), private :: last_events = 0       !! events at that look
+    integer(int64), private :: next_watch = 0        !! number of events at which to look again
   contains
     procedure :: start
     procedure :: advance
+    procedure, private :: go_on
+    procedure, private :: expect_anew
   end type event_driven_t
 
 contains
@@ -52,7 +55,7 @@ contains
     end do
     self%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
     self%last_look = sim%now
-    self%last_events = sim%events
+    self%next_watch = sim%events + events_per_watch(sim)
     self%idle = .false.
     if (sim%next_epoch == 0) sim%next_epoch = events_per_epoch(sim)
   end subroutine start
@@ -76,42 +79,64 @@ contains
     n = epoch_length*sim%n_disks()/2 + 100
   end function events_per_epoch
 
+  !> Events of any kind between two looks at the clock.
+  pure function events_per_watch(sim) result(n)
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: n
+    n = max(patience, patience_per_disk*sim%n_disks())
+  end function events_per_watch
+
   subroutine advance(self, sim, limits, error)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: t, t_limit
-    integer(int64) :: turn, look
+    integer(int64) :: turns, look
     integer(int32) :: i, code
-    logical :: met
-    if (reached(self, sim, limits)) return
-    if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
-    t_limit = min(limits%time - sim%epoch, last_time)
-    look = next_look(self, sim, limits)
-    do turn = 1, limits%turns
-      call self%queue%first(sim%disk, sim%tag, i)
-      t = sim%disk(i)%event_time
+    turns = limits%turns
+    do while (turns > 0)
+      if (reached(self, sim, limits)) return
+      if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
+      t_limit = min(limits%time - sim%epoch, last_time)
+      look = next_look(self, sim, limits)
+      call self%go_on(sim, t_limit, look, turns, i, code, t)
       if (.not. t <= t_limit) then
-        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i, sim%disk(i)%partner))
+        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i, code))
         self%idle = t > last_time
         if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
         return
       end if
-      call self%queue%drop_first(i)
-      sim%now = max(sim%now, t)
-      code = sim%disk(i)%partner
-      call react(self, sim, i, code, t, met)
-      if (.not. met .or. sim%events < look) cycle
-      if (sim%events - self%last_events > patience) call watch(self, sim, i, code, error)
-      if (allocated(error) .or. reached(self, sim, limits)) return
-      if (sim%events >= sim%next_epoch) then
-        call move_epoch(self, sim)
-        t_limit = min(limits%time - sim%epoch, last_time)
-      end if
-      look = next_look(self, sim, limits)
+      if (sim%events >= self%next_watch) call watch(self, sim, i, code, error)
+      if (allocated(error)) return
     end do
   end subroutine advance
+
+  !> The loop: event after event, up to the number `look` of collisions, to the limit of time, or as long as
+  !> there are turns. Nothing else is done here, and what is rare elsewhere, so that it stays fast.
+  subroutine go_on(self, sim, t_limit, look, turns, i, code, t)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: t_limit            !! since the epoch [time]
+    integer(int64), intent(in) :: look
+    integer(int64), intent(inout) :: turns         !! that are left
+    integer(int32), intent(out) :: i, code         !! of the last event: the disk and whom it expected
+    real(real64), intent(out) :: t                 !! its time; beyond the limit: it still is to come
+    integer(int64) :: collisions
+    do while (turns > 0)
+      turns = turns - 1
+      call self%queue%first(sim%disk, sim%tag, i)
+      t = sim%disk(i)%event_time
+      code = sim%disk(i)%partner
+      if (.not. t <= t_limit) exit
+      call self%queue%drop_first(i)
+      sim%now = max(sim%now, t)
+      collisions = sim%events
+      call react(self, sim, i, code, t)
+      if (self%search%everyone .and. sim%events > collisions) call self%expect_anew(sim)
+      if (sim%events >= look) exit
+    end do
+  end subroutine go_on
 
   !> Whether the run is to pause here, time aside.
   pure function reached(self, sim, limits) result(yes)
@@ -129,48 +154,32 @@ contains
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
     integer(int64) :: events
-    events = min(sim%next_epoch, self%last_events + patience + 1, limits%events, &
+    events = min(sim%next_epoch, self%next_watch, limits%events, &
       sim%events + min(limits%collisions - sim%collisions, patience))
     if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on()) events = sim%events + 1
   end function next_look
 
-  !> Executes what disk i expects, now.
-  subroutine react(self, sim, i, code, t, met)
+  !> Executes what disk i expects, now, and predicts what those concerned expect next.
+  subroutine react(self, sim, i, code, t)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code          !! the disk and whom it expects
     real(real64), intent(in) :: t
-    logical, intent(out) :: met                    !! it was a collision, not a mere passage or stale
-    integer(int32) :: k
-    met = .false.
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         call collide(sim, i, code, t, self%log)
-        met = .true.
-        call self%search%predict(sim, code)
-        call self%search%predict(sim, i)
-        call self%queue%schedule(sim%disk, sim%tag, code)
-        call self%queue%schedule(sim%disk, sim%tag, i)
-      else
-        call predict(self, sim, i)
+        call self%queue%forget(code)
+        call predict(self, sim, code)
       end if
     else if (code <= first_crossing) then
       call self%search%cross(sim, i, code)
-      call predict(self, sim, i)
     else if (passes(sim, code)) then
       call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
-      call predict(self, sim, i)
     else
       call collide(sim, i, code, t, self%log)
-      met = .true.
-      call predict(self, sim, i)
     end if
-    if (self%search%everyone .and. met) then
-      do k = 1, sim%n_disks()
-        call predict(self, sim, k)
-      end do
-    end if
+    call predict(self, sim, i)
   end subroutine react
 
   subroutine predict(self, sim, i)
@@ -181,17 +190,26 @@ contains
     call self%queue%schedule(sim%disk, sim%tag, i)
   end subroutine predict
 
+  !> Predicts all disks anew, not just those involved.
+  subroutine expect_anew(self, sim)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32) :: i
+    do i = 1, sim%n_disks()
+      call predict(self, sim, i)
+    end do
+  end subroutine expect_anew
+
   !> Ends the run if a long series of events has brought the clock no further. The last of them names whom.
   subroutine watch(self, sim, i, code, error)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code          !! the disk that just collided, and with whom
     type(error_t), allocatable, intent(inout) :: error
-    if (sim%events - self%last_events < 20*int(sim%n_disks(), int64)) return
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
       "inelastic collapse, the clock stands still: "//moment(sim, i, code)//"; set contact.contact_time " &
       //"(TC model), well below the mean time between collisions, or raise contact.restitution")
-    self%last_events = sim%events
+    self%next_watch = sim%events + events_per_watch(sim)
     self%last_look = sim%now
   end subroutine watch
 
