@@ -54,12 +54,13 @@ contains
     if (code > 0) sim%tag(i)%partner_stamp = sim%disk(code)%stamp
   end subroutine predict
 
-  !> There are no cells to cross.
+  !> There are no cells to cross: the disk has only passed a periodic side.
   subroutine cross(self, sim, i, code)
     class(all_pairs_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
+    call self%predict(sim, i)
   end subroutine cross
 
 end module all_pairs

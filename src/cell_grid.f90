@@ -15,11 +15,21 @@ module cell_grid
   public :: cell_grid_t
 
   real(real64), parameter :: no_shift(2) = 0.0_real64
-  real(real64), parameter :: disks_per_cell = 0.5_real64    !! wanted when dilute
+  real(real64), parameter :: disks_per_cell = 0.8_real64    !! wanted when dilute
+  real(real64), parameter :: dilute = 1.6_real64            !! side of such cells in diameters, at least
   real(real64), parameter :: slowest = 1/never              !! a disk slower than this is at rest
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
+
+  !> The first contact of a disk with those in the cells around, beyond the end of its cell too.
+  type :: contact_t
+    real(real64) :: time = never
+    integer(int32) :: partner = 0                  !! 0: none
+    integer(int32) :: stamp = 0                    !! the partner's when this was predicted
+  end type contact_t
+
+  integer(int32), parameter :: unknown = -1        !! as partner of a contact
 
   type, extends(neighbour_search_t) :: cell_grid_t
     private
@@ -33,6 +43,8 @@ module cell_grid
     logical :: special = .false.                   !! more than small disks and walls on straight lines
     logical :: falling = .false.                   !! disks fly on parabolas
     logical :: obstructed = .false.                !! there are obstacles
+    logical :: keeps_contacts = .false.            !! over the ends of cells: of use where disks are few
+    type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
@@ -44,6 +56,7 @@ module cell_grid
     procedure :: predict
     procedure :: cross
     procedure, private :: predict_special
+    procedure, private :: predict_contact
     procedure, private :: scan_crowd
   end type cell_grid_t
 
@@ -57,7 +70,9 @@ contains
     integer(int32) :: i, n_cells
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
-    width = max(reach, sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()))
+    width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
+    self%keeps_contacts = width > dilute*reach
+    if (.not. self%keeps_contacts) width = reach
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%stride = self%n(1) + 2
     self%width = sim%box%edges()/self%n*(1 + 4*epsilon(width))   ! the last face is not before the side
@@ -79,6 +94,8 @@ contains
     if (self%obstructed .and. .not. lists_hold(self, sim%box, small)) &
       call list_obstacles(self, sim%box, small)
     call self%big%start(sim, small, self%n, self%width)
+    if (allocated(self%contact)) deallocate (self%contact)
+    allocate (self%contact(merge(sim%n_disks(), 1, self%keeps_contacts)))
     self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
   end subroutine build
 
@@ -199,27 +216,38 @@ contains
     c = cell(1) + self%stride*cell(2)
   end function cell_number
 
-  !> Moves disk i into the cell beyond the face; over a periodic side into the first one behind it.
+  !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
+  !> predicts what it meets there.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: face, axis, there
+    integer(int32) :: face, axis, there, way
     if (self%big%count > 0) then
       if (sim%disk(i)%radius > self%big%small) then
         call self%big%register(sim, self%big%number_of(i))
+        call self%predict(sim, i)
         return
       end if
     end if
     face = -merge(code - first_crossing, code, code <= first_crossing)
     axis = 1 + face/2
+    way = 2*modulo(face, 2) - 1
     call self%cells%remove(cell_number(self, sim%tag(i)%cell), i)
-    there = sim%tag(i)%cell(axis) + 2*modulo(face, 2) - 1
+    there = sim%tag(i)%cell(axis) + way
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
     call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
+    if (self%keeps_contacts .and. .not. is_special(self, sim, i)) then
+      if (self%contact(i)%partner /= unknown) then
+        call predict_ahead(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, i, &
+          merge(way, self%stride*way, axis == 1), merge(self%stride, 1, axis == 1))
+        return
+      end if
+    end if
+    call self%predict(sim, i)
   end subroutine cross
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -230,10 +258,15 @@ contains
     if (self%special) then
       if (is_special(self, sim, i)) then
         call self%predict_special(sim, i)      ! by dispatch, which keeps it out of the way of the bulk
+        if (self%keeps_contacts) self%contact(i)%partner = unknown
         return
       end if
     end if
-    call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, i)
+    if (self%keeps_contacts) then
+      call self%predict_contact(sim, i)
+    else
+      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, i)
+    end if
   end subroutine predict
 
   !> Whether disk i may meet anything but small disks and walls on straight lines.
@@ -265,6 +298,71 @@ contains
     disk(i)%partner = code
     tag(i)%partner_stamp = disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
   end subroutine predict_in_bulk
+
+  !> The same where contacts are kept.
+  subroutine predict_contact(self, sim, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64) :: t
+    integer(int32) :: code, c, n, list(list_capacity)
+    logical :: crowded
+    t = never
+    code = 0
+    c = cell_number(self, sim%tag(i)%cell)
+    call gather(self%cells%cell, c, self%stride, list, n, crowded)
+    if (crowded) call self%scan_crowd(sim%disk, i, c, no_shift, t, code)
+    call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, .false., no_shift, no_shift, t, code)
+    self%contact(i) = contact_t(t, code, sim%disk(max(code, 1))%stamp)
+    call expect_face_or_contact(self, self%contact(i), sim%disk(i), sim%tag(i), i)
+  end subroutine predict_contact
+
+  !> Behind the face just crossed: the contact found before stays, three cells come into reach.
+  subroutine predict_ahead(self, cell, contact, disk, tag, now, i, ahead, along)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(contact_t), intent(inout) :: contact(*)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    real(real64), intent(in) :: now
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
+    integer(int32), intent(in) :: along            !! from this one to the next
+    real(real64) :: t
+    integer(int32) :: code, c, k, n, list(list_capacity)
+    t = contact(i)%time
+    code = contact(i)%partner
+    c = cell_number(self, tag(i)%cell) + ahead
+    n = 0
+    do k = c - along, c + along, along
+      list(n + 1:n + size(cell(k)%slot)) = cell(k)%slot
+      n = n + cell(k)%in_slots()
+      if (cell(k)%is_crowded()) call scan_chain(self, disk, i, k, no_shift, no_shift, t, code)
+    end do
+    call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
+    if (t < contact(i)%time .or. code /= contact(i)%partner) contact(i) = contact_t(t, code, disk(code)%stamp)
+    call expect_face_or_contact(self, contact(i), disk(i), tag(i), i)
+  end subroutine predict_ahead
+
+  !> Disk i expects the end of its cell or its first contact. At the same moment the lower disk has its way, as
+  !> in the kernel.
+  pure subroutine expect_face_or_contact(self, contact, disk, tag, i)
+    class(cell_grid_t), intent(in) :: self
+    type(contact_t), intent(in) :: contact
+    type(disk_t), intent(inout) :: disk
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
+    real(real64) :: t
+    integer(int32) :: code
+    call next_face(self, disk, tag%cell, t, code)
+    if (contact%time < t .or. (contact%time == t .and. contact%partner < i)) then
+      t = contact%time
+      code = contact%partner
+    end if
+    disk%event_time = t
+    disk%partner = code
+    tag%partner_stamp = contact%stamp
+  end subroutine expect_face_or_contact
 
   !> Everywhere else.
   subroutine predict_special(self, sim, i)
@@ -502,7 +600,7 @@ contains
     real(real64), intent(in) :: shift(2)           !! [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    call earliest_contact(sim%disk, i, self%cells%in_slots(c), self%cells%cell(c)%slot, .false., &
+    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, .false., &
       .true., shift, sim%box%gravity, t, code)
     call scan_chain(self, sim%disk, i, c, shift, sim%box%gravity, t, code)
   end subroutine scan_cell

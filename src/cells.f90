@@ -16,6 +16,9 @@ module cells
   !> those chained behind the last one in the bits above.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
+  contains
+    procedure :: in_slots
+    procedure :: is_crowded
   end type cell_t
 
   type :: cells_t
@@ -25,7 +28,6 @@ module cells
     procedure :: empty
     procedure :: insert
     procedure :: remove
-    procedure :: in_slots
     procedure :: chain
   end type cells_t
 
@@ -94,13 +96,19 @@ contains
     end associate
   end subroutine remove
 
-  !> Number of disks in the slots of cell c.
-  pure function in_slots(self, c) result(n)
-    class(cells_t), intent(in) :: self
-    integer(int32), intent(in) :: c
+  !> Number of disks in the slots.
+  elemental function in_slots(self) result(n)
+    class(cell_t), intent(in) :: self
     integer(int32) :: n
-    n = iand(self%cell(c)%slot(count_slot), listed)
+    n = iand(self%slot(count_slot), listed)
   end function in_slots
+
+  !> Whether more disks are chained behind the last one.
+  elemental function is_crowded(self) result(yes)
+    class(cell_t), intent(in) :: self
+    logical :: yes
+    yes = self%slot(count_slot) > listed
+  end function is_crowded
 
   !> The first disk in the chain of cell c; 0 if there is none.
   pure function chain(self, c) result(i)
@@ -108,7 +116,7 @@ contains
     integer(int32), intent(in) :: c
     integer(int32) :: i
     i = 0
-    if (self%cell(c)%slot(count_slot) > listed) i = self%next(self%cell(c)%slot(cell_capacity) + 1)
+    if (self%cell(c)%is_crowded()) i = self%next(self%cell(c)%slot(cell_capacity) + 1)
   end function chain
 
   !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they

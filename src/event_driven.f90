@@ -173,9 +173,13 @@ contains
       end if
     else if (code <= first_crossing) then
       call self%search%cross(sim, i, code)
+      call self%queue%schedule(sim%disk, sim%tag, i)
+      return
     else if (passes(sim, code)) then
       call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
+      call self%queue%schedule(sim%disk, sim%tag, i)
+      return
     else
       call collide(sim, i, code, t, self%log)
     end if

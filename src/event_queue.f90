@@ -131,7 +131,7 @@ contains
   end function window_width
 
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
-  subroutine schedule(self, disk, tag, i)
+  recursive subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
@@ -145,7 +145,7 @@ contains
   end subroutine schedule
 
   !> Into the bucket of its window, which is not the current one.
-  subroutine file(self, bucket, disk, tag, i)
+  recursive subroutine file(self, bucket, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(bucket_t), intent(inout) :: bucket(0:*)
     type(disk_t), intent(in) :: disk(*)

@@ -34,7 +34,7 @@ module neighbour_search
       integer(int32), intent(in) :: i
     end subroutine predict_event
 
-    !> Moves disk i over the face that its event names: a crossing, or a periodic side.
+    !> Moves disk i over the face that its event names, a crossing or a periodic side, and predicts.
     subroutine cross_cells(self, sim, i, code)
       import :: int32, neighbour_search_t, simulation_t
       class(neighbour_search_t), intent(inout) :: self
