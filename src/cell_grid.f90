@@ -4,11 +4,12 @@
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius
-  use box_geometry, only: box_t, nearest_image, next_obstacle, next_side, obstacle_t, side_time
+  use box_geometry, only: box_t, next_obstacle, next_side, side_time
   use cells, only: cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle, time_to_line
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
+  use obstacle_lists, only: obstacle_lists_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -47,10 +48,7 @@ module cell_grid
     type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
-    integer(int32), allocatable :: obstacle_start(:)   !! (cells+1) first entry of a cell in `obstacle_list`
-    integer(int32), allocatable :: obstacle_list(:)    !! obstacles that reach into the cell, ascending
-    type(obstacle_t), allocatable :: listed(:)     !! what these lists were made for,
-    real(real64) :: listed_radius = 0.0_real64     !! and for disks of which size [length]
+    type(obstacle_lists_t) :: obstacles            !! that reach into the cells
   contains
     procedure :: build
     procedure :: predict
@@ -91,122 +89,12 @@ contains
     end do
     self%obstructed = .false.
     if (allocated(sim%box%obstacle)) self%obstructed = size(sim%box%obstacle) > 0
-    if (self%obstructed .and. .not. lists_hold(self, sim%box, small)) &
-      call list_obstacles(self, sim%box, small)
+    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%width)
     call self%big%start(sim, small, self%n, self%width)
     if (allocated(self%contact)) deallocate (self%contact)
     allocate (self%contact(merge(sim%n_disks(), 1, self%keeps_contacts)))
     self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
   end subroutine build
-
-  !> Whether the lists of obstacles are up to date.
-  pure function lists_hold(self, box, radius) result(yes)
-    class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: radius
-    logical :: yes
-    integer :: m
-    yes = .false.
-    if (.not. allocated(self%listed)) return
-    if (size(self%listed) /= size(box%obstacle) .or. self%listed_radius /= radius &
-      .or. size(self%obstacle_start) /= size(self%cells%cell) + 1) return
-    do m = 1, size(box%obstacle)
-      associate (a => self%listed(m), b => box%obstacle(m))
-        if (any(a%centre /= b%centre) .or. a%radius /= b%radius .or. (a%inside .neqv. b%inside)) return
-      end associate
-    end do
-    yes = .true.
-  end function lists_hold
-
-  !> Which obstacles a disk of at most `radius` can touch with its centre in each cell.
-  subroutine list_obstacles(self, box, radius)
-    class(cell_grid_t), intent(inout) :: self
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: radius
-    integer(int32) :: c, m, n, count_c
-    if (allocated(self%obstacle_start)) deallocate (self%obstacle_start, self%obstacle_list)
-    self%listed = box%obstacle
-    self%listed_radius = radius
-    allocate (self%obstacle_start(0:size(self%cells%cell)), self%obstacle_list(0))
-    self%obstacle_start = 0
-    do m = 1, size(box%obstacle, kind=int32)       ! count,
-      call enter_obstacle(self, box, m, counting=.true.)
-    end do
-    n = 1
-    do c = 0, size(self%cells%cell, kind=int32)    ! make room,
-      count_c = self%obstacle_start(c)
-      self%obstacle_start(c) = n
-      n = n + count_c
-    end do
-    deallocate (self%obstacle_list)
-    allocate (self%obstacle_list(n - 1))
-    do m = 1, size(box%obstacle, kind=int32)       ! fill: each cell's entries move its start to its end
-      call enter_obstacle(self, box, m, counting=.false.)
-    end do
-    self%obstacle_start = eoshift(self%obstacle_start, -1, boundary=1_int32)
-  end subroutine list_obstacles
-
-  !> Counts obstacle m in every cell that it reaches into, or puts it into their lists.
-  subroutine enter_obstacle(self, box, m, counting)
-    class(cell_grid_t), intent(inout) :: self
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: m
-    logical, intent(in) :: counting
-    logical :: column(self%n(1)), row(self%n(2))
-    integer(int32) :: ix, iy, c
-    column = slices_near(self, box, m, 1)
-    row = slices_near(self, box, m, 2)
-    do iy = 1, self%n(2)
-      if (.not. row(iy)) cycle
-      do ix = 1, self%n(1)
-        if (.not. column(ix)) cycle
-        if (.not. in_reach(self, box, box%obstacle(m), self%listed_radius, ix, iy)) cycle
-        c = ix + self%stride*iy
-        if (.not. counting) self%obstacle_list(self%obstacle_start(c)) = m
-        self%obstacle_start(c) = self%obstacle_start(c) + 1
-      end do
-    end do
-  end subroutine enter_obstacle
-
-  !> Columns (axis 1) or rows in which a disk may touch obstacle m, of others it is certain that it cannot;
-  !> for a container all.
-  pure function slices_near(self, box, m, axis) result(near)
-    class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: m
-    integer, intent(in) :: axis
-    logical :: near(self%n(axis))
-    real(real64) :: middle(2)
-    integer(int32) :: k
-    do k = 1, self%n(axis)
-      middle = box%lower + (k - 0.5_real64)*self%width - box%obstacle(m)%centre
-      middle = middle - nearest_image(box, middle)
-      near(k) = box%obstacle(m)%inside .or. abs(middle(axis)) &
-        <= (0.5_real64*self%width(axis) + box%obstacle(m)%radius + self%listed_radius)*(1 + 2*spare_width)
-    end do
-  end function slices_near
-
-  !> Whether a disk whose centre is in the cell can touch the obstacle.
-  pure function in_reach(self, box, obstacle, radius, ix, iy) result(yes)
-    class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
-    type(obstacle_t), intent(in) :: obstacle
-    real(real64), intent(in) :: radius
-    integer(int32), intent(in) :: ix, iy
-    logical :: yes
-    real(real64) :: middle(2), half(2), gap(2), far(2), spare
-    middle = box%lower + ([ix, iy] - 0.5_real64)*self%width - obstacle%centre
-    if (.not. obstacle%inside) middle = middle - nearest_image(box, middle)
-    half = 0.5_real64*self%width
-    spare = 1 + spare_width
-    gap = max(abs(middle) - half*spare, 0.0_real64)
-    far = abs(middle) + half*spare
-    if (obstacle%inside) then
-      yes = norm2(far) >= (obstacle%radius - radius)/spare
-    else
-      yes = norm2(gap) <= (obstacle%radius + radius)*spare
-    end if
-  end function in_reach
 
   !> Number of the cell in column cell(1) and row cell(2), both from 1.
   pure function cell_number(self, cell) result(c)
@@ -384,8 +272,7 @@ contains
       call next_face(self, sim%disk(i), sim%tag(i)%cell, t, code)
     end if
     c = cell_number(self, sim%tag(i)%cell)
-    if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
-      self%obstacle_list(self%obstacle_start(c):self%obstacle_start(c + 1) - 1), t, code)
+    if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
     if (at_periodic_edge(self, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else

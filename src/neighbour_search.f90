@@ -66,29 +66,30 @@ contains
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
-    real(real64) :: x, y, u, v, radius, xi, yi, ui, vi, clock, ri, clock_j, late, si, sj, dx, dy, du, dv, sigma2, b, c, disc
-    real(real64) :: t_j, gate, in_time, reach
-    integer(int32) :: k, j, m
+    real(real64) :: xi, yi, ui, vi, clock, ri, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
+    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time
+    integer(int32) :: k, j
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
-    reach = 2*(clock - above(t))
     gate = above(t)
+    reach = 2*(clock - gate)
     si = 0
     do k = 1, n
       j = list(k)
-      call read_state(disk(j), x, y, u, v, clock_j, radius)
-      du = u - ui
-      dv = v - vi
+      call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
+      du = uj - ui
+      dv = vj - vi
       if (fresh) then                         ! the same numbers as below, with si = 0
         late = clock
         sj = late - clock_j
-        dx = (x + u*sj) - xi
-        dy = (y + v*sj) - yi
+        dx = (xj + uj*sj) - xi
+        dy = (yj + vj*sj) - yi
       else
         late = merge(clock, clock_j, clock > clock_j)
         si = late - clock
         sj = late - clock_j
-        dx = (x + u*sj) - (xi + ui*si)
-        dy = (y + v*sj) - (yi + vi*si)
+        dx = (xj + uj*sj) - (xi + ui*si)
+        dy = (yj + vj*sj) - (yi + vi*si)
+        reach = 2*(late - gate)
       end if
       if (bent) then
         dx = dx + (shift(1) + 0.5_real64*gravity(1)*(sj*sj - si*si))
@@ -96,15 +97,11 @@ contains
         du = du + gravity(1)*(sj - si)
         dv = dv + gravity(2)*(sj - si)
       end if
-      sigma2 = (ri + radius)**2
+      sigma2 = (ri + rj)**2
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2
       disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
-      if (fresh) then
-        in_time = reach*b - c
-      else
-        in_time = 2*(late - gate)*b - c
-      end if
+      in_time = reach*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
