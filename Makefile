@@ -15,7 +15,7 @@ BUILD ?= build$(if $(DEBUG),/debug)
 ARCH ?= native
 OPT ?= $(if $(DEBUG),-O0,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
-hot := -flto -flto-partition=none -finline-limit=2000 -funswitch-loops --param=max-unswitch-insns=300 \
+hot := -flto -flto-partition=none -finline-limit=600 -funswitch-loops --param=max-unswitch-insns=300 \
   -fno-trapping-math -fno-tree-vectorize
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument $(OPT)

@@ -6,7 +6,7 @@
 module event_driven
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: first_obstacle
-  use encounters, only: collide, pass_side, passes
+  use encounters, only: collide, collide_pair, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
@@ -167,21 +167,21 @@ contains
     real(real64), intent(in) :: t
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        call collide(sim, i, code, t, self%log)
+        if (self%log%is_on()) then
+          call collide(sim, i, code, t, self%log)
+        else
+          call collide_pair(sim, min(i, code), max(i, code), t)
+        end if
         call self%queue%forget(code)
         call predict(self, sim, code)
       end if
-    else if (code <= first_crossing) then
-      call self%search%cross(sim, i, code)
-      call self%queue%schedule(sim%disk, sim%tag, i)
-      return
-    else if (passes(sim, code)) then
-      call pass_side(sim, i, code)
-      call self%search%cross(sim, i, code)
-      call self%queue%schedule(sim%disk, sim%tag, i)
-      return
-    else
+    else if (code > first_crossing .and. .not. passes(sim, code)) then
       call collide(sim, i, code, t, self%log)
+    else
+      if (code > first_crossing) call pass_side(sim, i, code)
+      call self%search%cross(sim, i, code)
+      call self%queue%schedule(sim%disk, sim%tag, i)
+      return
     end if
     call predict(self, sim, i)
   end subroutine react
