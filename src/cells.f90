@@ -12,8 +12,9 @@ module cells
   integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
   integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
 
-  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks: those in the slots in its two lowest bits and, if the cell is crowded,
-  !> those chained behind the last one in the bits above.
+  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks: those in
+  !> the slots in its two lowest bits and, if the cell is crowded, those chained behind the last one in the
+  !> bits above.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
   contains
