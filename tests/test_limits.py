@@ -93,7 +93,7 @@ def test_a_million_disks_need_no_stack(limited, words):
     stopped = limited(1_000_000, *options, "--set", "stop.wall_clock=1e-3", **small)
     assert stopped.returncode == 75, stopped.stderr
     resumed = limited(1_000_000, *options, "--resume", **small)
-    assert resumed.returncode == 2 and "wall_clock" in resumed.stderr
+    assert resumed.returncode == 0, resumed.stderr
 
 
 @pytest.mark.parametrize(("search", "queue"), [("cells", "calendar"), ("pairs", "heap")])
