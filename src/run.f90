@@ -97,7 +97,9 @@ contains
     type(limits_t) :: limits
     integer(int64) :: turns
     real(real64) :: now, looked, next_checkpoint      ! [s]
+    real(real64) :: begun                             ! by the clock of the simulation [time]
     turns = 1
+    begun = sim%time()
     looked = seconds()
     next_checkpoint = looked + settings%output%checkpoint_every
     call line%start(sim, stop_rule, started, command%quiet)
@@ -113,7 +115,8 @@ contains
       if (.not. allocated(error)) call output%write_events(evolution%log, error)
       if (allocated(error)) exit
       now = seconds()
-      if (stop_requested() .or. now - started > stop_rule%wall_clock) then
+      ! However short the wall clock, each part of a run gets somewhere.
+      if (stop_requested() .or. (sim%time() > begun .and. now - started > stop_rule%wall_clock)) then
         call write_checkpoint(command%output, settings, groups, sim, output, error)
         if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
           //written(sim%time())//", after a checkpoint: the same command with --resume goes on")

@@ -150,6 +150,16 @@ def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_p
     assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == changed
 
 
+def test_every_part_of_a_run_gets_somewhere(ricochet, stopped):
+    """Also when its wall clock stops it at once, before a disk comes to the next cell."""
+    times = []
+    for _ in range(12):
+        run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9")
+        assert run.returncode == STOPPED
+        times.append(float(re.search("stopped at time ([^,]+),", one_line(run))[1]))
+    assert times == sorted(set(times))
+
+
 def test_how_a_run_is_done_may_change_when_it_goes_on(ricochet, tmp_path, stopped):
     fewer = [*stopped[:-1], "stop.time=40"]
     assert ricochet(*fewer, "--set", "stop.wall_clock=1e-9", "--force").returncode == STOPPED
