@@ -19,6 +19,31 @@ direct simulation of the Boltzmann equation, KR Kolafa and Rottner (2006).
 """
 
 
+NOTES = """
+## References that needed a second look
+
+- **P11-10**: the share of collisions that time steps miss is P(q) with q = g Δt / s, not
+  g Δt / 2s. Two disks overlap on a chord of length 2l, but are treated only while they approach,
+  on its first half: a contact is seen for the time l / g, not 2l / g (`post/missed.py`). The share
+  is then about four times that of the table: at Δt = .001 still within 2 %, at .004 not.
+- **P6-03**: R finds 1.39(1) between walls at packing .154 after 2 collisions per disk. The program
+  gives 1.468(6), by time steps 1.485(11), in the dilute limit 1.449(8), the Boltzmann equation
+  1.455. After 4 and 6 it gives 1.149(6) and 1.055(6), R 1.14(1) and 1.03(1).
+- **P9-07**: the fractions hold to .01 up to packing .1. Beyond, disks that have met meet again and
+  the intervals scatter more: at packing .2 and .4 the fraction is .850 and .846 for w t_c = 1
+  (table .86), .612 and .608 for .5 (.62).
+- **P10-04**: not every bed collapses before a tenth of the energy is left; of 18 tried 14 did.
+- **P7-07**: the contact values of section 7 are approximate. To first order in the density they are
+  1 + sum over k of n_k times the area where circles of radii s_ik and s_jk about the two centres
+  overlap. For radii 1 : 2 that is +.26, +.16, -.29 % (11, 12, 22) at packing .1, beside -.2 %
+  of like pairs for N_i - 1 partners: what is measured, +.11(5), +.14(7), -.45(6) %.
+- **P8-05**: the formula of the crystal is good to .2 %: the program finds -.15, -.21, -.15, -.07,
+  -.01 % at packing .74, .77, .80, .83, .86 (errors .03 to .01), and 0 close to .9069.
+- **P8-03** is a remark, not a case. What the program gives up to packing .70 agrees with Li et al.
+  (2022) within its errors of .03 to .2 %.
+"""
+
+
 def number(value: float, digits: int = 9) -> str:
     """A number for people."""
     return "-" if np.isnan(value) else f"{value:.{digits}g}"
@@ -65,7 +90,7 @@ def markdown(verdicts: list[Verdict], origin: str, seconds: float) -> str:
         f"{HEAD}{summary(verdicts, seconds)}. Program: {origin}.\n\n"
         f"| {' | '.join(columns)} | verdict |\n|{'---|' * (len(columns) + 1)}\n"
         + "\n".join(map(row, verdicts))
-        + "\n"
+        + f"\n{NOTES}"
     )
 
 
