@@ -212,7 +212,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
       "inelastic collapse, the clock stands still: "//moment(sim, i, code)//"; set contact.contact_time " &
-      //"(TC model), well below the mean time between collisions, or raise contact.restitution")
+      //"(TC model), well below the mean time between collisions, or raise " &
+      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0)))
     self%next_watch = sim%events + events_per_watch(sim)
     self%last_look = sim%now
   end subroutine watch
