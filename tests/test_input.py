@@ -281,7 +281,7 @@ def test_dense_placement_is_only_advised_where_it_helps(checked, radius):
     run = checked(pin + "&species count = 200 radius = 0.01 /\n&stop time = 1 /\n")
     assert ("no more room" in run.stderr) == (radius == 0.8)
     assert "dense" not in run.stderr
-    crowd = "&species count = 174 radius = 0.0315 /\n&stop time = 1 /\n"
+    crowd = "&species count = 20000 radius = 0.002947 /\n&stop time = 1 /\n"
     assert "use placement = 'dense'" in checked(crowd).stderr
 
 

@@ -239,7 +239,7 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 @pytest.mark.parametrize("sizes", [6, pytest.param(40, marks=pytest.mark.check)])
 def test_a_full_disk_costs_no_earlier_sample(ricochet, tmp_path, small_disk, sizes):
     """From 64 kB, no room for the layout, to 4 MB; with more room the run goes on."""
-    write_input(tmp_path, BUSY.replace("every = 0.05", "every = 0.01"))
+    write_input(tmp_path, BUSY.replace("every = 0.05", "every = 0.001"))
     run = ricochet("gas.nml", "-o", "whole.h5", "--set", "output.checkpoint_every=")
     assert run.returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
