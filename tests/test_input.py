@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -300,6 +301,6 @@ def test_damaged_files_never_harm(program):
 
 @pytest.mark.check
 def test_ten_thousand_damaged_files_never_harm(program):
-    command = ["python3", fuzz_input.__file__, "--program", program, "--count", "10000"]
+    command = [sys.executable, fuzz_input.__file__, "--program", program, "--count", "10000"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr[-5000:]
