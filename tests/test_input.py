@@ -282,7 +282,8 @@ def test_dense_placement_is_only_advised_where_it_helps(checked, radius):
     run = checked(pin + "&species count = 200 radius = 0.01 /\n&stop time = 1 /\n")
     assert ("no more room" in run.stderr) == (radius == 0.8)
     assert "dense" not in run.stderr
-    crowd = "&obstacle centre = 0.5, 0.5 radius = 0.2 /\n&species count = 2000 radius = 0.009 /\n&stop time = 1 /\n"
+    pin = "&obstacle centre = 0.5, 0.5 radius = 0.2 /\n"
+    crowd = pin + "&species count = 2000 radius = 0.009 /\n&stop time = 1 /\n"
     assert "use placement = 'dense'" in checked(crowd).stderr
 
 
