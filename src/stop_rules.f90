@@ -103,9 +103,10 @@ contains
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: elapsed      !! by the wall clock [s]
     real(real64) :: done
-    done = max(sim%time()/self%limits%time, real(sim%collisions, real64)/self%limits%collisions, &
-      real(sim%events, real64)/self%limits%events, sim%dissipated/max(self%limits%dissipated, tiny(done)), &
-      elapsed/max(self%wall_clock, tiny(done)))
+    real(real64), parameter :: least = 1/never     ! a limit may be 0
+    done = max(sim%time()/max(self%limits%time, least), real(sim%collisions, real64)/max(self%limits%collisions, 1_int64), &
+      real(sim%events, real64)/max(self%limits%events, 1_int64), sim%dissipated/max(self%limits%dissipated, least), &
+      elapsed/max(self%wall_clock, least))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share
 
