@@ -31,6 +31,7 @@ module box_geometry
   contains
     procedure :: edges
     procedure :: falling
+    procedure :: obstructed
   end type box_t
 
 contains
@@ -48,6 +49,14 @@ contains
     logical :: yes
     yes = any(abs(self%gravity) > 0)
   end function falling
+
+  !> Whether there are obstacles.
+  pure function obstructed(self) result(yes)
+    class(box_t), intent(in) :: self
+    logical :: yes
+    yes = .false.
+    if (allocated(self%obstacle)) yes = size(self%obstacle) > 0
+  end function obstructed
 
   !> When the disk's rim meets a wall, or its centre a periodic side. A gap that rounding made negative
   !> counts as zero: a disk that has arrived and moves on outwards turns now and never leaks.

@@ -87,12 +87,11 @@ contains
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
       call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
     end do
-    self%obstructed = .false.
-    if (allocated(sim%box%obstacle)) self%obstructed = size(sim%box%obstacle) > 0
+    self%obstructed = sim%box%obstructed()
     if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%width)
     call self%big%start(sim, small, self%n, self%width)
     if (allocated(self%contact)) deallocate (self%contact)
-    allocate (self%contact(merge(sim%n_disks(), 1, self%keeps_contacts)))
+    if (self%keeps_contacts) allocate (self%contact(sim%n_disks()))
     self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
   end subroutine build
 

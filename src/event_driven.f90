@@ -122,7 +122,7 @@ contains
     integer(int64), intent(inout) :: turns         !! that are left
     integer(int32), intent(out) :: i, code         !! of the last event: the disk and whom it expected
     real(real64), intent(out) :: t                 !! its time; beyond the limit: it still is to come
-    integer(int64) :: collisions
+    integer(int64) :: events                       !! before this one
     do while (turns > 0)
       turns = turns - 1
       call self%queue%first(sim%disk, sim%tag, i)
@@ -131,9 +131,9 @@ contains
       if (.not. t <= t_limit) exit
       call self%queue%drop_first(i)
       sim%now = max(sim%now, t)
-      collisions = sim%events
+      events = sim%events
       call react(self, sim, i, code, t)
-      if (self%search%everyone .and. sim%events > collisions) call self%expect_anew(sim)
+      if (self%search%everyone .and. sim%events > events) call self%expect_anew(sim)
       if (sim%events >= look) exit
     end do
   end subroutine go_on
@@ -167,7 +167,7 @@ contains
     real(real64), intent(in) :: t
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        if (self%log%is_on()) then
+        if (self%log%is_on()) then                 ! apart, as the log is rare and costs registers
           call collide(sim, i, code, t, self%log)
         else
           call collide_pair(sim, min(i, code), max(i, code), t)

@@ -85,7 +85,7 @@ contains
     type(random_stream_t) :: stream
     logical :: balanced
     integer :: s, first
-    balanced = all(sim%box%periodic) .and. size(sim%box%obstacle) == 0 .and. .not. sim%box%falling()
+    balanced = all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. .not. sim%box%falling()
     first = 1
     do s = 1, size(settings%species)
       associate (species => settings%species(s))

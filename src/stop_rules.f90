@@ -48,7 +48,7 @@ contains
       min(rule%limits%collisions, ceiling(collisions, int64))
     if (settings%energy_fraction > 0) rule%limits%dissipated = &
       (1 - settings%energy_fraction)*sim%start_energy
-    if (all(sim%box%periodic) .and. size(sim%box%obstacle) == 0 .and. any(sim%law%restitution < 1)) &
+    if (all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. any(sim%law%restitution < 1)) &
       rule%look_every = look_interval*int(sim%n_disks(), int64)
   end function new_stop_rule
 
