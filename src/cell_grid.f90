@@ -4,10 +4,11 @@
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius
-  use box_geometry, only: box_t, next_obstacle, next_side, side_time
-  use cells, only: cell_t, cells_t, gather, list_capacity
+  use box_geometry, only: next_obstacle, next_side
+  use cell_faces, only: cell_faces_t
+  use cells, only: cell_t, cells_t, gather, list_capacity, sum_around
   use disks, only: disk_t, tag_t
-  use free_flight, only: time_to_circle, time_to_line
+  use free_flight, only: time_to_circle
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use obstacle_lists, only: obstacle_lists_t
   use simulation_state, only: simulation_t
@@ -18,7 +19,6 @@ module cell_grid
   real(real64), parameter :: no_shift(2) = 0.0_real64
   real(real64), parameter :: disks_per_cell = 0.8_real64    !! wanted when dilute
   real(real64), parameter :: dilute = 1.6_real64            !! side of such cells in diameters, at least
-  real(real64), parameter :: slowest = 1/never              !! a disk slower than this is at rest
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
@@ -36,16 +36,13 @@ module cell_grid
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
     integer(int32) :: stride = 0                   !! from row to row
-    real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
-    real(real64) :: lower(2) = 0.0_real64          !! sides of the box [length]
-    real(real64) :: upper(2) = 0.0_real64          !! [length]
-    real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
-    integer(int32) :: last(0:3) = 0                !! column or row beyond which a face is a side: left, right, ...
+    type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
     logical :: special = .false.                   !! more than small disks and walls on straight lines
     logical :: falling = .false.                   !! disks fly on parabolas
     logical :: obstructed = .false.                !! there are obstacles
     logical :: keeps_contacts = .false.            !! over the ends of cells: of use where disks are few
     type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
+    real(real64) :: last_read = 0.0_real64         !! by `read_ahead`
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
@@ -53,6 +50,7 @@ module cell_grid
     procedure :: build
     procedure :: predict
     procedure :: cross
+    procedure :: read_ahead
     procedure, private :: predict_special
     procedure, private :: predict_contact
     procedure, private :: scan_crowd
@@ -73,23 +71,19 @@ contains
     if (.not. self%keeps_contacts) width = reach
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%stride = self%n(1) + 2
-    self%width = sim%box%edges()/self%n*(1 + 4*epsilon(width))   ! the last face is not before the side
-    self%lower = sim%box%lower
-    self%upper = sim%box%upper
-    self%last = [1, self%n(1), 1, self%n(2)]
-    self%walled = merge(0, 1, sim%box%periodic)
+    call self%faces%set(sim%box, self%n)
     self%falling = sim%box%falling()
     n_cells = self%stride*(self%n(2) + 2)
     call self%cells%empty(n_cells, sim%n_disks())
     do i = 1, sim%n_disks()
       if (sim%disk(i)%radius > small) cycle
-      x = (sim%position(i) - sim%box%lower)/self%width
+      x = (sim%position(i) - sim%box%lower)/self%faces%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
       call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
     end do
     self%obstructed = sim%box%obstructed()
-    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%width)
-    call self%big%start(sim, small, self%n, self%width)
+    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width)
+    call self%big%start(sim, small, self%n, self%faces%width)
     if (allocated(self%contact)) deallocate (self%contact)
     if (self%keeps_contacts) allocate (self%contact(sim%n_disks()))
     self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
@@ -156,6 +150,20 @@ contains
     end if
   end subroutine predict
 
+  !> The reads do not wait for each other, as they would when the events come. Their sum is of no use but to
+  !> keep the compiler from leaving them out.
+  subroutine read_ahead(self, sim, disks)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: disks(:)
+    integer(int32) :: k
+    self%last_read = 0
+    do k = 1, size(disks)
+      self%last_read = self%last_read + sim%disk(disks(k))%event_time &
+        + sum_around(self%cells%cell, cell_number(self, sim%tag(disks(k))%cell), self%stride, sim%disk)
+    end do
+  end subroutine read_ahead
+
   !> Whether disk i may meet anything but small disks and walls on straight lines.
   pure function is_special(self, sim, i) result(yes)
     class(cell_grid_t), intent(in) :: self
@@ -176,7 +184,7 @@ contains
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
     logical :: crowded
-    call next_face(self, disk(i), tag(i)%cell, t, code)
+    call self%faces%next(disk(i), tag(i)%cell, t, code)
     c = cell_number(self, tag(i)%cell)
     call gather(cell, c, self%stride, list, n, crowded)
     if (crowded) call self%scan_crowd(disk, i, c, no_shift, t, code)
@@ -241,7 +249,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code
-    call next_face(self, disk, tag%cell, t, code)
+    call self%faces%next(disk, tag%cell, t, code)
     if (contact%time < t .or. (contact%time == t .and. contact%partner < i)) then
       t = contact%time
       code = contact%partner
@@ -266,9 +274,9 @@ contains
       end if
     end if
     if (self%falling) then
-      call next_face_falling(self, sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
+      call self%faces%next_falling(sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
     else
-      call next_face(self, sim%disk(i), sim%tag(i)%cell, t, code)
+      call self%faces%next(sim%disk(i), sim%tag(i)%cell, t, code)
     end if
     c = cell_number(self, sim%tag(i)%cell)
     if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
@@ -337,87 +345,12 @@ contains
     sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
   end subroutine predict_big
 
-  !> When and how the disk leaves its cell on a straight line, or meets a side within it; which axis and
-  !> which way are toss-ups: no branch on them.
-  pure subroutine next_face(self, disk, cell, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
-    real(real64) :: t_x, t_y
-    integer(int32) :: face, up_x, up_y
-    t_x = face_time(disk%x(1), disk%v(1), disk%clock, self%walled(1)*disk%radius, cell(1), self%width(1), &
-      self%lower(1), self%upper(1))
-    t_y = face_time(disk%x(2), disk%v(2), disk%clock, self%walled(2)*disk%radius, cell(2), self%width(2), &
-      self%lower(2), self%upper(2))
-    up_x = merge(1, 0, disk%v(1) > 0)
-    up_y = merge(1, 0, disk%v(2) > 0)
-    face = up_x + merge(1, 0, t_y < t_x)*(2 + up_y - up_x)
-    code = merge(0, first_crossing, cell(1 + face/2) == self%last(face)) - face
-    t = merge(t_y, t_x, t_y < t_x)
-  end subroutine next_face
-
-  !> The same along one axis. Contact with a side comes out as `side_time` has it: it is one event, whoever
-  !> predicts it.
-  pure function face_time(x, v, clock, inset, cell, width, lower, upper) result(t)
-    real(real64), intent(in) :: x, v, clock
-    real(real64), intent(in) :: inset             !! of the side: the disk's radius, or 0 if periodic [length]
-    integer(int16), intent(in) :: cell
-    real(real64), intent(in) :: width, lower, upper
-    real(real64) :: t, line, first, last, speed
-    line = lower + width*((cell - 0.5_real64) + sign(0.5_real64, v))
-    first = lower + inset
-    last = upper - inset
-    line = merge(line, first, line > first)
-    line = merge(line, last, line < last)
-    speed = abs(v)
-    t = (line - x)/sign(merge(speed, slowest, speed > slowest), v)
-    t = clock + merge(t, 0.0_real64, t > 0)
-    t = merge(t, never, speed > slowest)
-  end function face_time
-
-  !> The same on a parabola: each of the two faces along an axis can be the one, and the root before `now`, where
-  !> the disk came in, is not.
-  pure subroutine next_face_falling(self, box, disk, cell, now, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(box_t), intent(in) :: box
-    type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)
-    real(real64), intent(in) :: now
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
-    real(real64) :: line, side, t_k, sense
-    integer(int32) :: face, axis
-    t = never
-    code = 0
-    do face = 0, 3
-      axis = 1 + face/2
-      sense = 2*modulo(face, 2) - 1
-      line = box%lower(axis) + self%width(axis)*(cell(axis) + min(sense, 0.0_real64))
-      side = merge(box%upper(axis) - disk%radius, box%lower(axis) + disk%radius, sense > 0)
-      if (sense*(line - side) >= 0) then
-        t_k = side_time(box, disk, -face)
-      else if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
-        .and. sense*box%gravity(axis) < 0) then
-        cycle                                      ! flies away from this face, ever faster
-      else
-        t_k = max(now, disk%clock &
-          + time_to_line(sense*(line - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
-      end if
-      if (t_k < t) then
-        t = t_k
-        code = merge(0, first_crossing, sense*(line - side) >= 0) - face
-      end if
-    end do
-  end subroutine next_face_falling
-
   !> Whether the cells around lie partly beyond a periodic side.
   pure function at_periodic_edge(self, cell) result(yes)
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
-    yes = any(.not. self%walled > 0 .and. (cell == 1 .or. cell == self%n))
+    yes = any(.not. self%faces%walled > 0 .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
   !> Contacts with the chained disks of the nine cells around c.

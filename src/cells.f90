@@ -1,10 +1,11 @@
 !> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
 !> A cell with more of them chains the surplus behind its last disk.
 module cells
-  use kinds, only: int32
+  use kinds, only: int32, real64
+  use disks, only: disk_t
   implicit none
   private
-  public :: cell_t, cells_t, gather, list_capacity
+  public :: cell_t, cells_t, gather, list_capacity, sum_around
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
@@ -146,5 +147,18 @@ contains
     n = m
     crowded = counts > listed
   end subroutine gather
+
+  !> A sum over the first disks of the nine cells around c, which are in the cache thereafter.
+  pure function sum_around(cell, c, stride, disk) result(total)
+    type(cell_t), intent(in) :: cell(0:*)
+    integer(int32), intent(in) :: c, stride
+    type(disk_t), intent(in) :: disk(0:*)
+    real(real64) :: total
+    integer(int32) :: k
+    total = 0
+    do k = c - stride, c + stride, stride
+      total = total + disk(cell(k - 1)%slot(1))%x(1) + disk(cell(k)%slot(1))%x(1) + disk(cell(k + 1)%slot(1))%x(1)
+    end do
+  end function sum_around
 
 end module cells

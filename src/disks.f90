@@ -27,7 +27,7 @@ module disks
     integer(int32) :: image(2) = 0              !! periods travelled: true position = x + image*edges
     ! Bookkeeping of the search and the queue: derived, like the expected event.
     integer(int16) :: cell(2) = 0_int16         !! column and row of the cell grid
-    integer(int32) :: bucket = 0                !! where the queue filed the expected event
+    integer(int32) :: window = 0                !! of time in which the queue filed the expected event
     integer(int32) :: partner_stamp = 0         !! the partner's stamp when the event was predicted
   end type tag_t
 

@@ -8,7 +8,7 @@ module event_driven
   use box_geometry, only: first_obstacle
   use encounters, only: collide, collide_pair, pass_side, passes
   use errors, only: error_t, exit_broken, fail
-  use event_queue, only: event_queue_t
+  use event_queue, only: event_queue_t, most_coming
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: first_crossing, neighbour_search_t
   use renumbering, only: renumber
@@ -23,6 +23,8 @@ module event_driven
   integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
   !> Events between two looks at the clock: at least these, and these per disk.
   integer(int64), parameter :: patience = 20000, patience_per_disk = 20
+  integer(int32), parameter :: many = 20000        !! disks that do not fit into a second-level cache
+  integer(int64), parameter :: events_ahead = 8    !! after which to read ahead again
   real(real64), parameter :: last_time = 0.5_real64*never
   character(len=6), parameter :: side_name(4) = ["left  ", "right ", "bottom", "top   "]
 
@@ -100,6 +102,7 @@ contains
       if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       t_limit = min(limits%time - sim%epoch, last_time)
       look = next_look(self, sim, limits)
+      if (sim%n_disks() >= many) call read_ahead(self, sim, look)
       call self%go_on(sim, t_limit, look, turns, i, code, t)
       if (.not. t <= t_limit) then
         if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i, code))
@@ -158,6 +161,17 @@ contains
       sim%events + min(limits%collisions - sim%collisions, patience))
     if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on()) events = sim%events + 1
   end function next_look
+
+  !> Brings into the cache what the next events need, and looks again soon.
+  subroutine read_ahead(self, sim, look)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int64), intent(inout) :: look
+    integer(int32) :: n, disks(most_coming)
+    call self%queue%coming(n, disks)
+    call self%search%read_ahead(sim, disks(:n))
+    look = min(look, sim%events + events_ahead)
+  end subroutine read_ahead
 
   !> Executes what disk i expects, now, and predicts what those concerned expect next.
   subroutine react(self, sim, i, code, t)

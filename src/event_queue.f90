@@ -1,21 +1,25 @@
 !> What happens next: a calendar over the heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
 !>
 !> The near future, one window of time, is a short sorted list; if it grows long, the heap takes over until
-!> the window is done. Later events lie in append-only buckets of one cache line, one bucket per window;
-!> those beyond the last bucket in an unordered far list; those that find their bucket full in the heap.
-!> Nothing is searched or unlinked: an entry counts only if it still is what its disk expects. Without
-!> buckets all events are in the heap.
+!> the window is done. Events of the next windows lie in append-only buckets of one cache line, one bucket per
+!> window; later ones in unordered lists, one per span of many windows, so that those who append, at any
+!> distance, write to few places; those that find their bucket full in the heap. Nothing is searched or
+!> unlinked: an entry counts only if it still is what its disk expects. Without buckets all events are in the
+!> heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use disks, only: disk_t, tag_t
   use event_heap, only: event_heap_t, event_t, precedes
   implicit none
   private
-  public :: event_queue_t
+  public :: event_queue_t, most_coming
 
   integer(int32), parameter :: list_capacity = 64
   integer(int32), parameter :: bucket_capacity = 15
-  integer(int32), parameter :: nowhere = -1, in_far_list = -2   !! values of tag%bucket
+  integer(int32), parameter :: longest_ring = 512  !! buckets
+  integer(int32), parameter :: windows_ahead = 16  !! to announce
+  integer(int32), parameter :: most_coming = windows_ahead*bucket_capacity   !! disks announced at once
+  integer(int32), parameter :: nowhere = -1        !! as tag%window
   real(real64), parameter :: last_window = 2.0e9_real64
   real(real64), parameter :: events_per_window = 4.0_real64
   integer, parameter :: sample_size = 100
@@ -25,6 +29,17 @@ module event_queue
     integer(int32) :: disk(bucket_capacity)
   end type bucket_t
 
+  type :: entry_t
+    integer(int32) :: disk
+    integer(int32) :: window                       !! in which it expects its event
+  end type entry_t
+
+  !> Events of one span, and of any later one in the last.
+  type :: span_t
+    integer(int32) :: n = 0
+    type(entry_t), allocatable :: entry(:)         !! (n)
+  end type span_t
+
   type :: event_queue_t
     private
     logical :: calendar = .true.
@@ -33,11 +48,14 @@ module event_queue
     integer(int32) :: n_list = 0
     logical :: list_is_open = .false.              !! it takes events; else the heap does
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
-    integer(int32), allocatable :: far(:)          !! (n_far) disks whose event lies beyond the ring
-    integer(int32) :: n_far = 0
+    type(span_t), allocatable :: span(:)           !! (0:) a ring as well; a span is half a turn of the other
     integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
+    integer(int32) :: last_span = 0                !! likewise, of spans
+    integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
     integer(int32) :: window = 0                   !! number of the current window since the epoch
-    integer(int32) :: half_turn = 0                !! window at which the far list is filed again
+    integer(int32) :: ring_end = 0                 !! the first window that has no bucket yet
+    integer(int32) :: n_disks = 0
+    integer(int32) :: announced = 0                !! the last window that was announced
     real(real64) :: width = never                  !! of a window [time]
     real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
@@ -49,15 +67,16 @@ module event_queue
     procedure :: first
     procedure :: drop_first
     procedure :: forget
+    procedure :: coming
     ! Bound to the type so that these rare parts stay out of the frequent ones.
     procedure, private :: insert_near
-    procedure, private :: insert_far
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
     procedure, private :: drop_from_heap
     procedure, private :: open_next_window
     procedure, private :: take_from_heap
-    procedure, private :: turn_ring
+    procedure, private :: open_next_span
+    procedure, private :: lengthen
   end type event_queue_t
 
 contains
@@ -69,13 +88,12 @@ contains
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! since the epoch [time]
     logical, intent(in) :: calendar                !! .false.: everything into the heap
-    integer(int32) :: n, i, length
-    n = size(disk, kind=int32)
+    integer(int32) :: i
+    self%n_disks = size(disk, kind=int32)
     self%n_list = 0
     self%list(0)%time = huge(now)
-    self%n_far = 0
-    call self%heap%initialise(n)
-    tag%bucket = nowhere
+    call self%heap%initialise(self%n_disks)
+    tag%window = nowhere
     self%width = max(window_width(self, disk, now), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
     self%calendar = calendar .and. self%width < never
     self%list_is_open = self%calendar
@@ -84,24 +102,43 @@ contains
     self%per_time = 0                              ! one window without end
     if (self%calendar) then
       self%per_time = 1/self%width
-      length = 16
-      do while (length < n/2)
-        length = 2*length
-      end do
-      if (allocated(self%bucket)) then
-        if (size(self%bucket) /= length) deallocate (self%bucket, self%far)
-      end if
-      if (.not. allocated(self%bucket)) allocate (self%bucket(0:length - 1), self%far(n))
-      self%bucket%n = 0
-      self%last_bucket = length - 1
-      self%half_turn = int(now*self%per_time, int32) + length/2
+      call make_rings(self)
     end if
     self%window = int(now*self%per_time, int32)
+    self%ring_end = shiftl(shiftr(self%window, self%log_span) + 2, self%log_span)
+    self%announced = self%window
     self%next_window = self%window + 1
-    do i = 1, n
+    do i = 1, self%n_disks
       call schedule(self, disk, tag, i)
     end do
   end subroutine fill
+
+  !> Empty buckets and spans, enough to hold most events: twice as many as there are disks.
+  subroutine make_rings(self)
+    class(event_queue_t), intent(inout) :: self
+    integer(int32) :: s
+    self%log_span = 3
+    do while (shiftl(4_int32, self%log_span) < min(self%n_disks, 2*longest_ring))
+      self%log_span = self%log_span + 1
+    end do
+    self%last_bucket = shiftl(2_int32, self%log_span) - 1
+    self%last_span = 3
+    do while (events_per_window*shiftl(self%last_span, self%log_span) < 2.0_real64*self%n_disks)
+      self%last_span = 2*self%last_span + 1
+    end do
+    if (allocated(self%bucket)) then
+      if (size(self%bucket) /= self%last_bucket + 1 .or. size(self%span) /= self%last_span + 1) &
+        deallocate (self%bucket, self%span)
+    end if
+    if (.not. allocated(self%bucket)) then
+      allocate (self%bucket(0:self%last_bucket), self%span(0:self%last_span))
+      do s = 0, self%last_span
+        allocate (self%span(s)%entry(16))
+      end do
+    end if
+    self%bucket%n = 0
+    self%span%n = 0
+  end subroutine make_rings
 
   !> The width of a window that holds a few events: by the rate since the last filling or, at first, by the
   !> median wait of a sample of disks. `never` if nothing is expected at all.
@@ -131,46 +168,74 @@ contains
   end function window_width
 
   !> Files what disk i expects. Its former entry, if any, turns void by itself.
-  recursive subroutine schedule(self, disk, tag, i)
+  subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i
-    if (.not. disk(i)%event_time*self%per_time >= self%next_window) then       ! NaN as well, to be found
-      tag(i)%bucket = nowhere
+    integer(int32) :: window
+    real(real64) :: number
+    number = disk(i)%event_time*self%per_time
+    if (.not. number >= self%next_window) then     ! NaN as well, to be found
+      tag(i)%window = nowhere
       call self%insert_near(disk, i)
     else
-      call file(self, self%bucket, disk, tag, i)
+      window = int(merge(number, last_window, number < last_window), int32)
+      if (window == tag(i)%window) return
+      tag(i)%window = window
+      if (window < self%ring_end) then
+        call file(self, self%bucket, disk, tag, i, window)
+      else
+        call file_far(self, self%span, i, window)
+      end if
     end if
   end subroutine schedule
 
   !> Into the bucket of its window, which is not the current one.
-  recursive subroutine file(self, bucket, disk, tag, i)
+  subroutine file(self, bucket, disk, tag, i, window)
     class(event_queue_t), intent(inout) :: self
     type(bucket_t), intent(inout) :: bucket(0:*)
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i
-    integer(int32) :: window, k, n
-    real(real64) :: number
-    number = disk(i)%event_time*self%per_time
-    window = int(merge(number, last_window, number < last_window), int32)
-    if (window == tag(i)%bucket) return
-    if (window - self%window > self%last_bucket) then
-      call self%insert_far(disk, tag, i)
-      return
-    end if
+    integer(int32), intent(in) :: i, window
+    integer(int32) :: k, n
     k = iand(window, self%last_bucket)
     n = bucket(k)%n + 1
     if (n > bucket_capacity) then
-      tag(i)%bucket = nowhere
+      tag(i)%window = nowhere
       call self%insert_into_heap(disk, i)
       return
     end if
     bucket(k)%disk(n) = i
     bucket(k)%n = n
-    tag(i)%bucket = window
   end subroutine file
+
+  !> Into the list of the span of its window or, if that is too far, into the last one.
+  subroutine file_far(self, span, i, window)
+    class(event_queue_t), intent(inout) :: self
+    type(span_t), intent(inout) :: span(0:*)
+    integer(int32), intent(in) :: i, window
+    integer(int32) :: s, n
+    s = min(shiftr(window, self%log_span), shiftr(self%ring_end, self%log_span) + self%last_span - 1)
+    s = iand(s, self%last_span)
+    n = span(s)%n + 1
+    if (n > size(span(s)%entry)) call self%lengthen(s)
+    span(s)%entry(n)%disk = i
+    span(s)%entry(n)%window = window
+    span(s)%n = n
+  end subroutine file_far
+
+  !> Makes room for more entries of a span.
+  subroutine lengthen(self, s)
+    class(event_queue_t), intent(inout) :: self
+    integer(int32), intent(in) :: s
+    type(entry_t), allocatable :: longer(:)
+    associate (span => self%span(s))
+      allocate (longer(2*size(span%entry)))
+      longer(:span%n) = span%entry(:span%n)
+      call move_alloc(longer, span%entry)
+    end associate
+  end subroutine lengthen
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
   subroutine insert_near(self, disk, i)
@@ -219,40 +284,6 @@ contains
     end if
     list(k + 1) = event
   end subroutine insert
-
-  !> Beyond the ring.
-  recursive subroutine insert_far(self, disk, tag, i)
-    class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(*)
-    type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i
-    if (tag(i)%bucket == in_far_list) return
-    if (self%n_far == size(self%far)) call sweep_far_list(self, disk, tag)
-    self%n_far = self%n_far + 1
-    self%far(self%n_far) = i
-    tag(i)%bucket = in_far_list
-  end subroutine insert_far
-
-  !> Drops void entries of the far list and files those that have come near.
-  recursive subroutine sweep_far_list(self, disk, tag)
-    class(event_queue_t), intent(inout) :: self
-    type(disk_t), intent(in) :: disk(*)
-    type(tag_t), intent(inout) :: tag(*)
-    integer(int32) :: k, i, n
-    n = 0
-    do k = 1, self%n_far                           ! a disk that came and went may be entered twice
-      i = self%far(k)
-      if (tag(i)%bucket /= in_far_list) cycle
-      tag(i)%bucket = nowhere
-      n = n + 1
-      self%far(n) = i
-    end do
-    self%n_far = 0
-    do k = 1, n                                    ! refiling appends at most where it has read
-      i = self%far(k)
-      call schedule(self, disk, tag, i)
-    end do
-  end subroutine sweep_far_list
 
   !> The disk whose event comes first; the event stays in the queue.
   subroutine first(self, disk, tag, i)
@@ -318,6 +349,24 @@ contains
     self%n_list = self%n_list - merge(1, 0, self%list(self%n_list)%disk == i)
   end subroutine forget
 
+  !> Announces disks that probably have events in the next windows, each window once.
+  subroutine coming(self, n, disks)
+    class(event_queue_t), intent(inout) :: self
+    integer(int32), intent(out) :: n
+    integer(int32), intent(out) :: disks(most_coming)    !! (n)
+    integer(int32) :: window, last
+    n = 0
+    if (.not. self%calendar) return
+    last = min(self%window + windows_ahead, self%ring_end - 1)
+    do window = max(self%announced, self%window) + 1, last
+      associate (bucket => self%bucket(iand(window, self%last_bucket)))
+        disks(n + 1:n + bucket%n) = bucket%disk(:bucket%n)
+        n = n + bucket%n
+      end associate
+    end do
+    self%announced = last
+  end subroutine coming
+
   !> What disk i expects.
   pure function event_of(disk, i) result(event)
     type(disk_t), intent(in) :: disk(*)
@@ -347,7 +396,7 @@ contains
     call take_bucket(self%bucket(iand(self%window, self%last_bucket)), disk, self%per_time, self%next_window, &
       self%list, self%n_list)
     if (self%heap%n > 0) call self%take_from_heap(disk)
-    if (self%window == self%half_turn) call self%turn_ring(disk, tag)
+    if (iand(self%window, shiftl(1_int32, self%log_span) - 1) == 0) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
   !> Empties a bucket into a sorted list: what its disks expect before the next window. Whatever else it
@@ -387,20 +436,31 @@ contains
     end do
   end subroutine take_from_heap
 
-  !> Half a turn later: looks through the far list or, if the windows do not fit, files everything anew.
-  subroutine turn_ring(self, disk, tag)
+  !> Files the events of the span that now is the next one into their buckets; or, if the windows do not fit,
+  !> all events anew.
+  subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    integer(int32) :: n
+    type(entry_t) :: entry
+    integer(int32) :: s, k, n
     if (ill_fitting(self)) then
-      n = size(self%far, kind=int32)
-      call fill(self, disk(1:n), tag(1:n), self%width*self%window, calendar=.true.)
-    else
-      self%half_turn = self%window + size(self%bucket, kind=int32)/2
-      call sweep_far_list(self, disk, tag)
+      call fill(self, disk(1:self%n_disks), tag(1:self%n_disks), self%width*self%window, calendar=.true.)
+      return
     end if
-  end subroutine turn_ring
+    s = iand(shiftr(self%ring_end, self%log_span), self%last_span)
+    self%ring_end = self%ring_end + shiftl(1_int32, self%log_span)
+    n = self%span(s)%n
+    self%span(s)%n = 0
+    do k = 1, n
+      entry = self%span(s)%entry(k)
+      if (entry%window < self%ring_end) then
+        call file(self, self%bucket, disk, tag, entry%disk, entry%window)
+      else if (tag(entry%disk)%window == entry%window) then
+        call file_far(self, self%span, entry%disk, entry%window)
+      end if
+    end do
+  end subroutine open_next_span
 
   !> Whether windows turned out far too narrow or too wide since the last filling.
   pure function ill_fitting(self) result(yes)
@@ -408,7 +468,8 @@ contains
     logical :: yes
     real(real64) :: per_window
     per_window = max(self%n_taken, 1_int64)*self%width/(self%width*self%next_window - self%filled_at)
-    yes = abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0
+    yes = (abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0) &
+      .and. 4*(self%window - self%filled_at*self%per_time) > self%n_disks
   end function ill_fitting
 
 end module event_queue

@@ -16,6 +16,7 @@ module neighbour_search
     procedure(build_search), deferred :: build
     procedure(predict_event), deferred :: predict
     procedure(cross_cells), deferred :: cross
+    procedure :: read_ahead
   end type neighbour_search_t
 
   abstract interface
@@ -45,6 +46,13 @@ module neighbour_search
   end interface
 
 contains
+
+  !> Reads what the next predictions for some disks will need, so that it is in the cache by then.
+  subroutine read_ahead(self, sim, disks)
+    class(neighbour_search_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: disks(:)
+  end subroutine read_ahead
 
   !> The earliest contact of disk i with the disks listed, if it comes before the event known already.
   !>

@@ -7,20 +7,24 @@ module renumbering
   private
   public :: renumber
 
+  integer(int32), parameter :: tile = 8           !! cells along the side of a tile, whose disks fill a page
+
 contains
 
-  !> Sorts the disks row by row of a grid with about one disk per cell. The order follows from the state
-  !> alone, so that it is the same for every search and queue; `tag%id` keeps the names.
+  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
+  !> few pages hold a neighbourhood. The order follows from the state alone and is the same for every search
+  !> and queue; `tag%id` keeps the names.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:)
     integer(int32) :: n(2), c(2), i, k
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
+    n = tile*((n + tile - 1)/tile)
     allocate (first(0:product(n)), place(sim%n_disks()), cell(sim%n_disks()))
     first = 0
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*n, 0.0_real64), n - 1.0_real64), int32)
-      cell(i) = c(1) + n(1)*c(2)
+      cell(i) = tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
       first(cell(i) + 1) = first(cell(i) + 1) + 1
     end do
     do k = 1, product(n)
