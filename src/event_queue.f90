@@ -34,7 +34,7 @@ module event_queue
     integer(int32) :: window                       !! in which it expects its event
   end type entry_t
 
-  !> Events of one span, and of any later one in the last.
+  !> Events of one span, this turn of the ring or later.
   type :: span_t
     integer(int32) :: n = 0
     type(entry_t), allocatable :: entry(:)         !! (n)
@@ -210,14 +210,13 @@ contains
     bucket(k)%n = n
   end subroutine file
 
-  !> Into the list of the span of its window or, if that is too far, into the last one.
+  !> Into the list of the span of its window.
   subroutine file_far(self, span, i, window)
     class(event_queue_t), intent(inout) :: self
     type(span_t), intent(inout) :: span(0:*)
     integer(int32), intent(in) :: i, window
     integer(int32) :: s, n
-    s = min(shiftr(window, self%log_span), shiftr(self%ring_end, self%log_span) + self%last_span - 1)
-    s = iand(s, self%last_span)
+    s = iand(shiftr(window, self%log_span), self%last_span)
     n = span(s)%n + 1
     if (n > size(span(s)%entry)) call self%lengthen(s)
     span(s)%entry(n)%disk = i
@@ -242,19 +241,26 @@ contains
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
-    integer(int32) :: k
     if (self%list_is_open) then
       call insert(self%list, self%n_list, event_of(disk, i))
       self%n_list = self%n_list + 1
       self%list_is_open = self%n_list < list_capacity
     else
-      do k = 1, self%n_list
-        if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
-      end do
-      self%n_list = 0
+      call hand_over(self, disk)
       call self%insert_into_heap(disk, i)
     end if
   end subroutine insert_near
+
+  !> Moves the list into the heap.
+  subroutine hand_over(self, disk)
+    class(event_queue_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32) :: k
+    do k = 1, self%n_list
+      if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
+    end do
+    self%n_list = 0
+  end subroutine hand_over
 
   subroutine insert_into_heap(self, disk, i)
     class(event_queue_t), intent(inout) :: self
@@ -423,21 +429,22 @@ contains
     n = m
   end subroutine take_bucket
 
-  !> Moves what is due in this window from the heap into the list, as far as it takes it.
+  !> Moves what is due in this window from the heap into the list; if that is too much, all into the heap.
   subroutine take_from_heap(self, disk)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32) :: i
     do while (self%list_is_open)
       call self%first_in_heap(disk, i)
-      if (i == 0) exit
+      if (i == 0) return
       call self%heap%remove(i)
       call self%insert_near(disk, i)
     end do
+    call hand_over(self, disk)
   end subroutine take_from_heap
 
-  !> Files the events of the span that now is the next one into their buckets; or, if the windows do not fit,
-  !> all events anew.
+  !> Files the events of the span that now is the next one into their buckets; those of a later turn stay, if they
+  !> still are what their disks expect. Or, if the windows do not fit, files all events anew.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -456,7 +463,7 @@ contains
       entry = self%span(s)%entry(k)
       if (entry%window < self%ring_end) then
         call file(self, self%bucket, disk, tag, entry%disk, entry%window)
-      else if (tag(entry%disk)%window == entry%window) then
+      else if (tag(entry%disk)%window == entry%window) then    ! appends at most where it has read
         call file_far(self, self%span, entry%disk, entry%window)
       end if
     end do
