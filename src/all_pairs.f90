@@ -27,7 +27,7 @@ contains
     integer(int32) :: k
     self%disk = [(k - 1, k=1, sim%n_disks())]
     self%obstacle = [integer(int32) ::]
-    if (allocated(sim%box%obstacle)) self%obstacle = [(k, k=1, size(sim%box%obstacle, kind=int32))]
+    if (sim%box%obstructed()) self%obstacle = [(k, k=1, size(sim%box%obstacle, kind=int32))]
   end subroutine build
 
   !> The earliest of: side, obstacle, any disk. All disks are inside the box until one passes a periodic

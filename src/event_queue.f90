@@ -469,7 +469,8 @@ contains
     end do
   end subroutine open_next_span
 
-  !> Whether windows turned out far too narrow or too wide since the last filling.
+  !> Whether windows turned out far too narrow or too wide since the last filling, which must be so long ago that
+  !> filing all disks anew pays.
   pure function ill_fitting(self) result(yes)
     class(event_queue_t), intent(in) :: self
     logical :: yes
