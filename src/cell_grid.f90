@@ -63,7 +63,7 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64) :: small, reach, width, x(2)
-    integer(int32) :: i, n_cells
+    integer(int32) :: i
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
     width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
@@ -73,8 +73,7 @@ contains
     self%stride = self%n(1) + 2
     call self%faces%set(sim%box, self%n)
     self%falling = sim%box%falling()
-    n_cells = self%stride*(self%n(2) + 2)
-    call self%cells%empty(n_cells, sim%n_disks())
+    call self%cells%empty(self%stride, self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       if (sim%disk(i)%radius > small) cycle
       x = (sim%position(i) - sim%box%lower)/self%faces%width
@@ -183,11 +182,10 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
-    logical :: crowded
     call self%faces%next(disk(i), tag(i)%cell, t, code)
     c = cell_number(self, tag(i)%cell)
-    call gather(cell, c, self%stride, list, n, crowded)
-    if (crowded) call self%scan_crowd(disk, i, c, no_shift, t, code)
+    call gather(cell, c, self%stride, i, list, n)
+    if (cell(c)%near_crowd()) call self%scan_crowd(disk, i, c, no_shift, t, code)
     call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
     disk(i)%event_time = t
     disk(i)%partner = code
@@ -201,12 +199,11 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
-    logical :: crowded
     t = never
     code = 0
     c = cell_number(self, sim%tag(i)%cell)
-    call gather(self%cells%cell, c, self%stride, list, n, crowded)
-    if (crowded) call self%scan_crowd(sim%disk, i, c, no_shift, t, code)
+    call gather(self%cells%cell, c, self%stride, i, list, n)
+    if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, no_shift, t, code)
     call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, .false., no_shift, no_shift, t, code)
     self%contact(i) = contact_t(t, code, sim%disk(max(code, 1))%stamp)
     call expect_face_or_contact(self, self%contact(i), sim%disk(i), sim%tag(i), i)
@@ -232,8 +229,12 @@ contains
     do k = c - along, c + along, along
       list(n + 1:n + size(cell(k)%slot)) = cell(k)%slot
       n = n + cell(k)%in_slots()
-      if (cell(k)%is_crowded()) call scan_chain(self, disk, i, k, no_shift, no_shift, t, code)
     end do
+    if (cell(c - ahead)%near_crowd() .or. cell(c)%near_crowd()) then
+      do k = c - along, c + along, along
+        call scan_chain(self, disk, i, k, no_shift, no_shift, t, code)
+      end do
+    end if
     call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
     if (t < contact(i)%time .or. code /= contact(i)%partner) contact(i) = contact_t(t, code, disk(code)%stamp)
     call expect_face_or_contact(self, contact(i), disk(i), tag(i), i)
@@ -266,7 +267,6 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
-    logical :: crowded
     if (self%big%count > 0) then
       if (sim%disk(i)%radius > self%big%small) then
         call predict_big(self, sim, i)
@@ -283,10 +283,10 @@ contains
     if (at_periodic_edge(self, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else
-      call gather(self%cells%cell, c, self%stride, list, n, crowded)
+      call gather(self%cells%cell, c, self%stride, i, list, n)
       call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
         no_shift, sim%box%gravity, t, code)
-      if (crowded) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
+      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
     end if
     if (self%big%count > 0) call scan_big_ones(self, sim, i, t, code)
     sim%disk(i)%event_time = t

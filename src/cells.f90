@@ -1,7 +1,7 @@
 !> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
 !> A cell with more of them chains the surplus behind its last disk.
 module cells
-  use kinds, only: int32, real64
+  use kinds, only: int32, int64, real64
   use disks, only: disk_t
   implicit none
   private
@@ -9,21 +9,21 @@ module cells
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
-  integer(int32), parameter :: listed = cell_capacity        !! mask of the disks in slots
-  integer(int32), parameter :: chained = cell_capacity + 1   !! unit of the disks in the chain
+  integer(int32), parameter :: counted = 65535               !! mask of the number of disks
+  integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
   integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
 
-  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks: those in
-  !> the slots in its two lowest bits and, if the cell is crowded, those chained behind the last one in the
-  !> bits above.
+  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
+  !> in its lower half, and in its upper half the crowded cells among the nine around this one.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
   contains
     procedure :: in_slots
-    procedure :: is_crowded
+    procedure :: near_crowd
   end type cell_t
 
   type :: cells_t
+    integer(int32) :: stride = 0                 !! from row to row
     type(cell_t), allocatable :: cell(:)         !! (0:)
     integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
   contains
@@ -31,20 +31,22 @@ module cells
     procedure :: insert
     procedure :: remove
     procedure :: chain
+    procedure, private :: count_crowd
   end type cells_t
 
 contains
 
-  !> Makes n_cells empty cells for n_disks disks.
-  subroutine empty(self, n_cells, n_disks)
+  !> Makes rows of `stride` empty cells for n_disks disks.
+  subroutine empty(self, stride, rows, n_disks)
     class(cells_t), intent(inout) :: self
-    integer(int32), intent(in) :: n_cells, n_disks
+    integer(int32), intent(in) :: stride, rows, n_disks
     integer(int32) :: c
+    self%stride = stride
     if (allocated(self%cell)) then
-      if (size(self%cell) /= n_cells .or. size(self%next) /= n_disks) deallocate (self%cell, self%next)
+      if (size(self%cell) /= stride*rows .or. size(self%next) /= n_disks) deallocate (self%cell, self%next)
     end if
-    if (.not. allocated(self%cell)) allocate (self%cell(0:n_cells - 1), self%next(n_disks))
-    do c = 0, n_cells - 1
+    if (.not. allocated(self%cell)) allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
+    do c = 0, stride*rows - 1
       self%cell(c)%slot = 0
     end do
   end subroutine empty
@@ -53,19 +55,20 @@ contains
   pure subroutine insert(self, c, i)
     class(cells_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
-    integer(int32) :: n
+    integer(int32) :: n, head
+    n = self%cell(c)%in_slots()
     associate (slot => self%cell(c)%slot)
-      n = slot(count_slot)
+      self%next(i) = 0
       if (n < cell_capacity) then
-        self%next(i) = 0
         slot(n + 1) = i - 1
-        slot(count_slot) = n + 1
-      else                                         ! becomes the head of the chain
-        self%next(i) = slot(cell_capacity) + 1
-        slot(cell_capacity) = i - 1
-        slot(count_slot) = n + chained
+        slot(count_slot) = slot(count_slot) + 1
+        return
       end if
+      head = slot(cell_capacity) + 1
+      self%next(i) = head                          ! becomes the head of the chain
+      slot(cell_capacity) = i - 1
     end associate
+    if (self%next(head) == 0) call self%count_crowd(c, 1)
   end subroutine insert
 
   !> Takes disk i out of cell c.
@@ -73,17 +76,17 @@ contains
     class(cells_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
     integer(int32) :: n, k, link
+    n = self%cell(c)%in_slots()
     associate (slot => self%cell(c)%slot)
-      n = slot(count_slot)
-      do k = 1, iand(n, listed)
+      do k = 1, n
         if (slot(k) == i - 1) exit
       end do
-      if (n <= listed) then
+      link = self%chain(c)
+      if (link == 0) then
         slot(k) = slot(n)
-        slot(count_slot) = n - 1
+        slot(count_slot) = slot(count_slot) - 1
         return
       end if
-      link = slot(cell_capacity) + 1
       if (k <= cell_capacity) then                 ! the head of the chain takes the free place
         slot(k) = link - 1
         slot(cell_capacity) = self%next(link) - 1
@@ -94,58 +97,78 @@ contains
         end do
         self%next(link) = self%next(i)
       end if
-      slot(count_slot) = n - chained
     end associate
+    if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
+
+  !> Tells the cells around that cell c became crowded (1), or no longer is (-1).
+  pure subroutine count_crowd(self, c, change)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, change
+    integer(int32) :: k, m
+    do k = c - self%stride, c + self%stride, self%stride
+      do m = k - 1, k + 1
+        self%cell(m)%slot(count_slot) = self%cell(m)%slot(count_slot) + change*crowd
+      end do
+    end do
+  end subroutine count_crowd
 
   !> Number of disks in the slots.
   elemental function in_slots(self) result(n)
     class(cell_t), intent(in) :: self
     integer(int32) :: n
-    n = iand(self%slot(count_slot), listed)
+    n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether more disks are chained behind the last one.
-  elemental function is_crowded(self) result(yes)
+  !> Whether one of the nine cells around is crowded.
+  elemental function near_crowd(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes
-    yes = self%slot(count_slot) > listed
-  end function is_crowded
+    yes = self%slot(count_slot) >= crowd
+  end function near_crowd
 
-  !> The first disk in the chain of cell c; 0 if there is none.
+  !> The first disk in the chain of cell c, which is the last one in its slots; 0 if the cell is not crowded.
   pure function chain(self, c) result(i)
     class(cells_t), intent(in) :: self
     integer(int32), intent(in) :: c
     integer(int32) :: i
     i = 0
-    if (self%cell(c)%is_crowded()) i = self%next(self%cell(c)%slot(cell_capacity) + 1)
+    if (self%cell(c)%in_slots() < cell_capacity) return
+    i = self%cell(c)%slot(cell_capacity) + 1
+    if (self%next(i) == 0) i = 0
   end function chain
 
-  !> Lists the disks in the nine cells around c. Whole cells are copied without a branch on how many they
-  !> hold; of a crowded one, only those in its slots.
-  pure subroutine gather(cell, c, stride, list, n, crowded)
+  !> Lists the disks in the slots of the nine cells around c, where disk i is, without i. Whole cells are copied
+  !> without a branch on how many they hold. If i is not in the slots of its crowded cell, the first disk of the
+  !> chain is left out.
+  subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
-    integer(int32), intent(in) :: c, stride
+    integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
-    logical, intent(out) :: crowded                !! one of the cells has a chain
-    integer(int32) :: k, row, m, counts
+    integer(int64) :: m, own
     m = 0
-    counts = 0
-    k = c - stride
-    do row = 1, 3
-      list(m + 1:m + count_slot) = cell(k - 1)%slot
-      m = m + iand(cell(k - 1)%slot(count_slot), listed)
-      list(m + 1:m + count_slot) = cell(k)%slot
-      m = m + iand(cell(k)%slot(count_slot), listed)
-      list(m + 1:m + count_slot) = cell(k + 1)%slot
-      m = m + iand(cell(k + 1)%slot(count_slot), listed)
-      counts = ior(counts, ior(cell(k - 1)%slot(count_slot), &
-        ior(cell(k)%slot(count_slot), cell(k + 1)%slot(count_slot))))
-      k = k + stride
-    end do
-    n = m
-    crowded = counts > listed
+    call append(cell(c - stride - 1))
+    call append(cell(c - stride))
+    call append(cell(c - stride + 1))
+    call append(cell(c - 1))
+    own = merge(m + 1, merge(m + 2, m + 3, cell(c)%slot(2) == i - 1), cell(c)%slot(1) == i - 1)
+    call append(cell(c))
+    list(own) = list(m)
+    m = m - 1
+    call append(cell(c + 1))
+    call append(cell(c + stride - 1))
+    call append(cell(c + stride))
+    call append(cell(c + stride + 1))
+    n = int(m, int32)
+  contains
+
+    subroutine append(this)
+      type(cell_t), intent(in) :: this
+      list(m + 1:m + count_slot) = this%slot
+      m = m + iand(this%slot(count_slot), counted)
+    end subroutine append
+
   end subroutine gather
 
   !> A sum over the first disks of the nine cells around c, which are in the cache thereafter.
