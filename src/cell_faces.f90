@@ -11,12 +11,18 @@ module cell_faces
 
   real(real64), parameter :: slowest = 1/never     !! a disk slower than this is at rest
 
+  !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
+  type :: line_t
+    real(real64) :: place = 0.0_real64             !! of the face or side [length]
+    real(real64) :: inset = 0.0_real64             !! in radii, from there to the line that the disk's centre reaches
+    integer(int32) :: kind = 0                     !! 0: a side, first_crossing: a face of a cell
+  end type line_t
+
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
-    real(real64) :: lower(2) = 0.0_real64          !! sides of the box [length]
-    real(real64) :: upper(2) = 0.0_real64          !! [length]
-    real(real64) :: walled(2) = 1.0_real64         !! 1 along an axis with walls, 0 if periodic
-    integer(int32) :: last(0:3) = 0                !! column or row beyond which a face is a side: left, right, ...
+    logical :: periodic(2) = .false.               !! by axis
+    type(line_t), allocatable :: column(:)         !! (0:columns) their left and right faces
+    type(line_t), allocatable :: row(:)            !! (0:rows)
   contains
     procedure :: set
     procedure :: next
@@ -31,11 +37,25 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
     self%width = box%edges()/n*(1 + 4*epsilon(self%width))       ! the last face is not before the side
-    self%lower = box%lower
-    self%upper = box%upper
-    self%last = [1, n(1), 1, n(2)]
-    self%walled = merge(0, 1, box%periodic)
+    self%periodic = box%periodic
+    call cut(self%column, n(1), box%lower(1), box%upper(1), self%width(1), box%periodic(1))
+    call cut(self%row, n(2), box%lower(2), box%upper(2), self%width(2), box%periodic(2))
   end subroutine set
+
+  !> The faces along one axis.
+  pure subroutine cut(line, n, lower, upper, width, periodic)
+    type(line_t), allocatable, intent(out) :: line(:)
+    integer(int32), intent(in) :: n
+    real(real64), intent(in) :: lower, upper, width
+    logical, intent(in) :: periodic
+    integer(int32) :: k
+    allocate (line(0:n))
+    do k = 1, n - 1
+      line(k) = line_t(lower + width*k, 0.0_real64, first_crossing)
+    end do
+    line(0) = line_t(lower, merge(0, 1, periodic), 0)
+    line(n) = line_t(upper, merge(0, -1, periodic), 0)
+  end subroutine cut
 
   !> When and how the disk leaves its cell on a straight line, or meets a side within it; which axis and
   !> which way are toss-ups: no branch on them.
@@ -45,37 +65,40 @@ contains
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: t_x, t_y
-    integer(int32) :: face, up_x, up_y
-    t_x = face_time(disk%x(1), disk%v(1), disk%clock, self%walled(1)*disk%radius, cell(1), self%width(1), &
-      self%lower(1), self%upper(1))
-    t_y = face_time(disk%x(2), disk%v(2), disk%clock, self%walled(2)*disk%radius, cell(2), self%width(2), &
-      self%lower(2), self%upper(2))
-    up_x = merge(1, 0, disk%v(1) > 0)
-    up_y = merge(1, 0, disk%v(2) > 0)
-    face = up_x + merge(1, 0, t_y < t_x)*(2 + up_y - up_x)
-    code = merge(0, first_crossing, cell(1 + face/2) == self%last(face)) - face
-    t = merge(t_y, t_x, t_y < t_x)
+    call next_of(self%column, self%row, disk%x, disk%v, disk%clock, disk%radius, cell, t, code)
   end subroutine next
 
-  !> The same along one axis. Contact with a side comes out as `side_time` has it: it is one event, whoever
-  !> predicts it.
-  pure function face_time(x, v, clock, inset, cell, width, lower, upper) result(t)
-    real(real64), intent(in) :: x, v, clock
-    real(real64), intent(in) :: inset             !! of the side: the disk's radius, or 0 if periodic [length]
-    integer(int16), intent(in) :: cell
-    real(real64), intent(in) :: width, lower, upper
-    real(real64) :: t, line, first, last, speed
-    line = lower + width*((cell - 0.5_real64) + sign(0.5_real64, v))
-    first = lower + inset
-    last = upper - inset
-    line = merge(line, first, line > first)
-    line = merge(line, last, line < last)
+  pure subroutine next_of(column, row, x, v, clock, radius, cell, t, code)
+    type(line_t), intent(in) :: column(0:*), row(0:*)
+    real(real64), intent(in) :: x(2), v(2), clock, radius
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_x, t_y
+    integer(int32) :: up_x, up_y, k_x, k_y, code_x, code_y
+    up_x = merge(1, 0, v(1) > 0)
+    up_y = merge(1, 0, v(2) > 0)
+    k_x = cell(1) - 1 + up_x
+    k_y = cell(2) - 1 + up_y
+    t_x = line_time(column(k_x), x(1), v(1), clock, radius)
+    t_y = line_time(row(k_y), x(2), v(2), clock, radius)
+    code_x = column(k_x)%kind - up_x
+    code_y = row(k_y)%kind - 2 - up_y
+    code = ieor(code_x, iand(-merge(1, 0, t_y < t_x), ieor(code_x, code_y)))
+    t = merge(t_y, t_x, t_y < t_x)
+  end subroutine next_of
+
+  !> When a disk on its way to a line reaches it. Contact with a side comes out as `side_time` has it: it is one
+  !> event, whoever predicts it.
+  pure function line_time(line, x, v, clock, radius) result(t)
+    type(line_t), intent(in) :: line
+    real(real64), intent(in) :: x, v, clock, radius
+    real(real64) :: t, speed
     speed = abs(v)
-    t = (line - x)/sign(merge(speed, slowest, speed > slowest), v)
+    t = ((line%place + line%inset*radius) - x)/sign(merge(speed, slowest, speed > slowest), v)
     t = clock + merge(t, 0.0_real64, t > 0)
     t = merge(t, never, speed > slowest)
-  end function face_time
+  end function line_time
 
   !> The same on a parabola: each of the two faces along an axis can be the one, and the root before `now`, where
   !> the disk came in, is not.

@@ -350,7 +350,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
-    yes = any(.not. self%faces%walled > 0 .and. (cell == 1 .or. cell == self%n))
+    yes = any(self%faces%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
   !> Contacts with the chained disks of the nine cells around c.

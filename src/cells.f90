@@ -152,7 +152,7 @@ contains
     call append(cell(c - stride))
     call append(cell(c - stride + 1))
     call append(cell(c - 1))
-    own = merge(m + 1, merge(m + 2, m + 3, cell(c)%slot(2) == i - 1), cell(c)%slot(1) == i - 1)
+    own = m + 1 + merge(0, 1, cell(c)%slot(1) == i - 1)*(1 + merge(0, 1, cell(c)%slot(2) == i - 1))
     call append(cell(c))
     list(own) = list(m)
     m = m - 1
