@@ -49,6 +49,7 @@ module cell_grid
   contains
     procedure :: build
     procedure :: predict
+    procedure :: predict_both
     procedure :: cross
     procedure :: read_ahead
     procedure, private :: predict_special
@@ -172,6 +173,37 @@ contains
     yes = self%falling .or. self%obstructed .or. self%big%count > 0 .or. at_periodic_edge(self, sim%tag(i)%cell)
   end function is_special
 
+  !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
+  !> first: it need not wait for those.
+  subroutine predict_both(self, sim, i, j)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    logical :: bulk
+    bulk = .not. self%keeps_contacts
+    if (self%special) bulk = bulk .and. .not. (is_special(self, sim, i) .or. is_special(self, sim, j))
+    if (bulk) then
+      call predict_two(self, self%cells%cell, sim%disk, sim%tag, i, j)
+    else
+      call self%predict(sim, i)
+      call self%predict(sim, j)
+    end if
+  end subroutine predict_both
+
+  subroutine predict_two(self, cell, disk, tag, i, j)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    integer(int32), intent(in) :: i, j
+    real(real64) :: t, t_j
+    integer(int32) :: code, n, list(list_capacity), code_j, n_j, list_j(list_capacity)
+    call look_around(self, cell, disk, tag(i), i, t, code, list, n)
+    call look_around(self, cell, disk, tag(j), j, t_j, code_j, list_j, n_j)
+    call expect_first(disk, tag(i), i, n, list, .true., t, code)
+    call expect_first(disk, tag(j), j, n_j, list_j, .true., t_j, code_j)
+  end subroutine predict_two
+
   !> Where there are but small disks and walls on straight lines.
   subroutine predict_in_bulk(self, cell, disk, tag, now, i)
     class(cell_grid_t), intent(in) :: self
@@ -181,16 +213,40 @@ contains
     real(real64), intent(in) :: now
     integer(int32), intent(in) :: i
     real(real64) :: t
-    integer(int32) :: code, c, n, list(list_capacity)
-    call self%faces%next(disk(i), tag(i)%cell, t, code)
-    c = cell_number(self, tag(i)%cell)
+    integer(int32) :: code, n, list(list_capacity)
+    call look_around(self, cell, disk, tag(i), i, t, code, list, n)
+    call expect_first(disk, tag(i), i, n, list, disk(i)%clock >= now, t, code)
+  end subroutine predict_in_bulk
+
+  !> When disk i meets a face or side, and whom it may meet before.
+  subroutine look_around(self, cell, disk, tag, i, t, code, list, n)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(in) :: tag
+    integer(int32), intent(in) :: i
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code, list(list_capacity), n
+    integer(int32) :: c
+    call self%faces%next(disk(i), tag%cell, t, code)
+    c = cell_number(self, tag%cell)
     call gather(cell, c, self%stride, i, list, n)
     if (cell(c)%near_crowd()) call self%scan_crowd(disk, i, c, no_shift, t, code)
-    call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
+  end subroutine look_around
+
+  !> Writes into disk i the first of what it can expect.
+  subroutine expect_first(disk, tag, i, n, list, fresh, t, code)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i, n, list(list_capacity)
+    logical, intent(in) :: fresh
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    call earliest_contact(disk, i, n, list, fresh, .false., no_shift, no_shift, t, code)
     disk(i)%event_time = t
     disk(i)%partner = code
-    tag(i)%partner_stamp = disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
-  end subroutine predict_in_bulk
+    tag%partner_stamp = disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
+  end subroutine expect_first
 
   !> The same where contacts are kept.
   subroutine predict_contact(self, sim, i)

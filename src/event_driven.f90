@@ -187,7 +187,10 @@ contains
           call collide_pair(sim, min(i, code), max(i, code), t)
         end if
         call self%queue%forget(code)
-        call predict(self, sim, code)
+        call self%search%predict_both(sim, i, code)
+        call self%queue%schedule(sim%disk, sim%tag, code)
+        call self%queue%schedule(sim%disk, sim%tag, i)
+        return
       end if
     else if (code > first_crossing .and. .not. passes(sim, code)) then
       call collide(sim, i, code, t, self%log)

@@ -16,6 +16,7 @@ module neighbour_search
     procedure(build_search), deferred :: build
     procedure(predict_event), deferred :: predict
     procedure(cross_cells), deferred :: cross
+    procedure :: predict_both
     procedure :: read_ahead
   end type neighbour_search_t
 
@@ -46,6 +47,15 @@ module neighbour_search
   end interface
 
 contains
+
+  !> Writes into the disks i and j, which have just collided, what they can expect.
+  subroutine predict_both(self, sim, i, j)
+    class(neighbour_search_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    call self%predict(sim, i)
+    call self%predict(sim, j)
+  end subroutine predict_both
 
   !> Reads what the next predictions for some disks will need, so that it is in the cache by then.
   subroutine read_ahead(self, sim, disks)
