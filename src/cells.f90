@@ -147,12 +147,14 @@ contains
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
     integer(int64) :: m, own
+    integer(int32) :: first
     m = 0
     call append(cell(c - stride - 1))
     call append(cell(c - stride))
     call append(cell(c - stride + 1))
     call append(cell(c - 1))
-    own = m + 1 + merge(0, 1, cell(c)%slot(1) == i - 1)*(1 + merge(0, 1, cell(c)%slot(2) == i - 1))
+    first = merge(0, 1, cell(c)%slot(1) == i - 1)
+    own = m + 1 + first + iand(first, merge(0, 1, cell(c)%slot(2) == i - 1))
     call append(cell(c))
     list(own) = list(m)
     m = m - 1
