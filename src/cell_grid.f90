@@ -17,8 +17,7 @@ module cell_grid
   public :: cell_grid_t
 
   real(real64), parameter :: no_shift(2) = 0.0_real64
-  real(real64), parameter :: disks_per_cell = 0.8_real64    !! wanted when dilute
-  real(real64), parameter :: dilute = 1.6_real64            !! side of such cells in diameters, at least
+  real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
 
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
@@ -32,10 +31,19 @@ module cell_grid
 
   integer(int32), parameter :: unknown = -1        !! as partner of a contact
 
+  !> What is around a disk. Not initialised: it is made for each prediction.
+  type :: outlook_t
+    real(real64) :: time                           !! when the disk leaves its cell or meets a side
+    integer(int32) :: code                         !! of the crossing or the side
+    integer(int32) :: cell                         !! its number
+    integer(int32) :: n                            !! number of disks around
+    integer(int32) :: list(list_capacity)          !! (n), counted from 0
+  end type outlook_t
+
   type, extends(neighbour_search_t) :: cell_grid_t
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
-    integer(int32) :: stride = 0                   !! from row to row
+    integer(int32) :: step(2) = 0                  !! from cell to cell: to the next column, to the next row
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
     logical :: special = .false.                   !! more than small disks and walls on straight lines
     logical :: falling = .false.                   !! disks fly on parabolas
@@ -53,7 +61,6 @@ module cell_grid
     procedure :: cross
     procedure :: read_ahead
     procedure, private :: predict_special
-    procedure, private :: predict_contact
     procedure, private :: scan_crowd
   end type cell_grid_t
 
@@ -68,13 +75,13 @@ contains
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
     width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
-    self%keeps_contacts = width > dilute*reach
-    if (.not. self%keeps_contacts) width = reach
+    self%keeps_contacts = width > reach
+    width = max(width, reach)
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
-    self%stride = self%n(1) + 2
+    self%step = [1, self%n(1) + 2]
     call self%faces%set(sim%box, self%n)
     self%falling = sim%box%falling()
-    call self%cells%empty(self%stride, self%n(2) + 2, sim%n_disks())
+    call self%cells%empty(self%step(2), self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       if (sim%disk(i)%radius > small) cycle
       x = (sim%position(i) - sim%box%lower)/self%faces%width
@@ -85,7 +92,7 @@ contains
     if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width)
     call self%big%start(sim, small, self%n, self%faces%width)
     if (allocated(self%contact)) deallocate (self%contact)
-    if (self%keeps_contacts) allocate (self%contact(sim%n_disks()))
+    allocate (self%contact(merge(sim%n_disks(), 0, self%keeps_contacts)))
     self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
   end subroutine build
 
@@ -94,7 +101,7 @@ contains
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32) :: c
-    c = cell(1) + self%stride*cell(2)
+    c = cell(1) + self%step(2)*cell(2)
   end function cell_number
 
   !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
@@ -105,6 +112,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
     integer(int32) :: face, axis, there, way
+    logical :: new
     if (self%big%count > 0) then
       if (sim%disk(i)%radius > self%big%small) then
         call self%big%register(sim, self%big%number_of(i))
@@ -121,14 +129,15 @@ contains
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
     call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
-    if (self%keeps_contacts .and. .not. is_special(self, sim, i)) then
-      if (self%contact(i)%partner /= unknown) then
-        call predict_ahead(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, i, &
-          merge(way, self%stride*way, axis == 1), merge(self%stride, 1, axis == 1))
-        return
-      end if
+    new = self%keeps_contacts
+    if (self%special) new = new .and. .not. is_special(self, sim, i)
+    if (new) new = self%contact(i)%partner /= unknown
+    if (new) then
+      call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, i, &
+        way*self%step(axis), self%step(3 - axis))
+    else
+      call self%predict(sim, i)
     end if
-    call self%predict(sim, i)
   end subroutine cross
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -143,11 +152,7 @@ contains
         return
       end if
     end if
-    if (self%keeps_contacts) then
-      call self%predict_contact(sim, i)
-    else
-      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, i)
-    end if
+    call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, i)
   end subroutine predict
 
   !> The reads do not wait for each other, as they would when the events come. Their sum is of no use but to
@@ -160,7 +165,7 @@ contains
     self%last_read = 0
     do k = 1, size(disks)
       self%last_read = self%last_read + sim%disk(disks(k))%event_time &
-        + sum_around(self%cells%cell, cell_number(self, sim%tag(disks(k))%cell), self%stride, sim%disk)
+        + sum_around(self%cells%cell, cell_number(self, sim%tag(disks(k))%cell), self%step(2), sim%disk)
     end do
   end subroutine read_ahead
 
@@ -179,94 +184,33 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    logical :: bulk
-    bulk = .not. self%keeps_contacts
-    if (self%special) bulk = bulk .and. .not. (is_special(self, sim, i) .or. is_special(self, sim, j))
-    if (bulk) then
-      call predict_two(self, self%cells%cell, sim%disk, sim%tag, i, j)
-    else
-      call self%predict(sim, i)
-      call self%predict(sim, j)
+    if (self%special) then
+      if (is_special(self, sim, i) .or. is_special(self, sim, j)) then
+        call self%predict(sim, i)
+        call self%predict(sim, j)
+        return
+      end if
     end if
+    call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, i, j)
   end subroutine predict_both
 
-  subroutine predict_two(self, cell, disk, tag, i, j)
+  !> Where there are but small disks and walls on straight lines.
+  subroutine predict_two(self, cell, contact, disk, tag, i, j)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
+    type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     integer(int32), intent(in) :: i, j
-    real(real64) :: t, t_j
-    integer(int32) :: code, n, list(list_capacity), code_j, n_j, list_j(list_capacity)
-    call look_around(self, cell, disk, tag(i), i, t, code, list, n)
-    call look_around(self, cell, disk, tag(j), j, t_j, code_j, list_j, n_j)
-    call expect_first(disk, tag(i), i, n, list, .true., t, code)
-    call expect_first(disk, tag(j), j, n_j, list_j, .true., t_j, code_j)
+    type(outlook_t) :: near_i, near_j
+    call look_around(self, cell, disk(i), tag(i), i, near_i)
+    call look_around(self, cell, disk(j), tag(j), j, near_j)
+    call expect_first(self, cell, contact, disk, tag(i), i, near_i, .true.)
+    call expect_first(self, cell, contact, disk, tag(j), j, near_j, .true.)
   end subroutine predict_two
 
-  !> Where there are but small disks and walls on straight lines.
-  subroutine predict_in_bulk(self, cell, disk, tag, now, i)
-    class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
-    type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(inout) :: tag(*)
-    real(real64), intent(in) :: now
-    integer(int32), intent(in) :: i
-    real(real64) :: t
-    integer(int32) :: code, n, list(list_capacity)
-    call look_around(self, cell, disk, tag(i), i, t, code, list, n)
-    call expect_first(disk, tag(i), i, n, list, disk(i)%clock >= now, t, code)
-  end subroutine predict_in_bulk
-
-  !> When disk i meets a face or side, and whom it may meet before.
-  subroutine look_around(self, cell, disk, tag, i, t, code, list, n)
-    class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
-    type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(in) :: tag
-    integer(int32), intent(in) :: i
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code, list(list_capacity), n
-    integer(int32) :: c
-    call self%faces%next(disk(i), tag%cell, t, code)
-    c = cell_number(self, tag%cell)
-    call gather(cell, c, self%stride, i, list, n)
-    if (cell(c)%near_crowd()) call self%scan_crowd(disk, i, c, no_shift, t, code)
-  end subroutine look_around
-
-  !> Writes into disk i the first of what it can expect.
-  subroutine expect_first(disk, tag, i, n, list, fresh, t, code)
-    type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(inout) :: tag
-    integer(int32), intent(in) :: i, n, list(list_capacity)
-    logical, intent(in) :: fresh
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    call earliest_contact(disk, i, n, list, fresh, .false., no_shift, no_shift, t, code)
-    disk(i)%event_time = t
-    disk(i)%partner = code
-    tag%partner_stamp = disk(max(code, 1))%stamp      ! without a branch; of use if code > 0
-  end subroutine expect_first
-
-  !> The same where contacts are kept.
-  subroutine predict_contact(self, sim, i)
-    class(cell_grid_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    real(real64) :: t
-    integer(int32) :: code, c, n, list(list_capacity)
-    t = never
-    code = 0
-    c = cell_number(self, sim%tag(i)%cell)
-    call gather(self%cells%cell, c, self%stride, i, list, n)
-    if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, no_shift, t, code)
-    call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, .false., no_shift, no_shift, t, code)
-    self%contact(i) = contact_t(t, code, sim%disk(max(code, 1))%stamp)
-    call expect_face_or_contact(self, self%contact(i), sim%disk(i), sim%tag(i), i)
-  end subroutine predict_contact
-
-  !> Behind the face just crossed: the contact found before stays, three cells come into reach.
-  subroutine predict_ahead(self, cell, contact, disk, tag, now, i, ahead, along)
+  !> Likewise for one disk.
+  subroutine predict_in_bulk(self, cell, contact, disk, tag, now, i)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(contact_t), intent(inout) :: contact(*)
@@ -274,47 +218,99 @@ contains
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
-    integer(int32), intent(in) :: along            !! from this one to the next
-    real(real64) :: t
-    integer(int32) :: code, c, k, n, list(list_capacity)
-    t = contact(i)%time
-    code = contact(i)%partner
-    c = cell_number(self, tag(i)%cell) + ahead
-    n = 0
-    do k = c - along, c + along, along
-      list(n + 1:n + size(cell(k)%slot)) = cell(k)%slot
-      n = n + cell(k)%in_slots()
-    end do
-    if (cell(c - ahead)%near_crowd() .or. cell(c)%near_crowd()) then
-      do k = c - along, c + along, along
-        call scan_chain(self, disk, i, k, no_shift, no_shift, t, code)
-      end do
-    end if
-    call earliest_contact(disk, i, n, list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
-    if (t < contact(i)%time .or. code /= contact(i)%partner) contact(i) = contact_t(t, code, disk(code)%stamp)
-    call expect_face_or_contact(self, contact(i), disk(i), tag(i), i)
-  end subroutine predict_ahead
+    type(outlook_t) :: near
+    call look_around(self, cell, disk(i), tag(i), i, near)
+    call expect_first(self, cell, contact, disk, tag(i), i, near, disk(i)%clock >= now)
+  end subroutine predict_in_bulk
 
-  !> Disk i expects the end of its cell or its first contact. At the same moment the lower disk has its way, as
-  !> in the kernel.
-  pure subroutine expect_face_or_contact(self, contact, disk, tag, i)
+  !> What is around disk i.
+  subroutine look_around(self, cell, disk, tag, i, near)
     class(cell_grid_t), intent(in) :: self
-    type(contact_t), intent(in) :: contact
-    type(disk_t), intent(inout) :: disk
+    type(cell_t), intent(in) :: cell(0:*)
+    type(disk_t), intent(in) :: disk
+    type(tag_t), intent(in) :: tag
+    integer(int32), intent(in) :: i
+    type(outlook_t), intent(out) :: near
+    call self%faces%next(disk, tag%cell, near%time, near%code)
+    near%cell = cell_number(self, tag%cell)
+    call gather(cell, near%cell, self%step(2), i, near%list, near%n)
+  end subroutine look_around
+
+  !> Writes into disk i the first of what it can expect.
+  subroutine expect_first(self, cell, contact, disk, tag, i, near, fresh)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(contact_t), intent(inout) :: contact(*)
+    type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
     integer(int32), intent(in) :: i
+    type(outlook_t), intent(in) :: near
+    logical, intent(in) :: fresh
     real(real64) :: t
-    integer(int32) :: code
-    call self%faces%next(disk, tag%cell, t, code)
-    if (contact%time < t .or. (contact%time == t .and. contact%partner < i)) then
-      t = contact%time
-      code = contact%partner
+    integer(int32) :: code, stamp
+    t = near%time
+    code = near%code
+    if (self%keeps_contacts) then
+      t = never
+      code = 0
     end if
-    disk%event_time = t
-    disk%partner = code
+    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, no_shift, t, code)
+    call earliest_contact(disk, i, near%n, near%list, fresh, .false., no_shift, no_shift, t, code)
+    stamp = disk(max(code, 1))%stamp               ! without a branch; of use if code > 0
+    if (self%keeps_contacts) then
+      contact(i) = contact_t(t, code, stamp)
+      call choose(near, i, t, code)
+    end if
+    disk(i)%event_time = t
+    disk(i)%partner = code
+    tag%partner_stamp = stamp
+  end subroutine expect_first
+
+  !> Behind the face just crossed: the contact found before stays, three cells come into reach.
+  subroutine predict_ahead(self, cell, contact, disk, tag, now, i, ahead, along)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(contact_t), intent(inout) :: contact
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag
+    real(real64), intent(in) :: now
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
+    integer(int32), intent(in) :: along            !! from this one to the next
+    type(outlook_t) :: near
+    real(real64) :: t
+    integer(int32) :: code, k
+    call self%faces%next(disk(i), tag%cell, near%time, near%code)
+    t = contact%time
+    code = contact%partner
+    near%cell = cell_number(self, tag%cell)
+    near%n = 0
+    do k = near%cell + ahead - along, near%cell + ahead + along, along
+      near%list(near%n + 1:near%n + size(cell(k)%slot)) = cell(k)%slot
+      near%n = near%n + cell(k)%in_slots()
+    end do
+    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, no_shift, t, code)
+    call earliest_contact(disk, i, near%n, near%list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
+    if (t < contact%time .or. code /= contact%partner) contact = contact_t(t, code, disk(code)%stamp)
+    call choose(near, i, t, code)
+    disk(i)%event_time = t
+    disk(i)%partner = code
     tag%partner_stamp = contact%stamp
-  end subroutine expect_face_or_contact
+  end subroutine predict_ahead
+
+  !> The end of the cell, unless the contact known is earlier. At the same moment the lower disk has its way, as in
+  !> the kernel.
+  pure subroutine choose(near, i, t, code)
+    type(outlook_t), intent(in) :: near
+    integer(int32), intent(in) :: i
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    integer(int32) :: crosses
+    crosses = merge(1, 0, near%time < t)           ! a toss-up: no branch on it
+    if (t == near%time) crosses = merge(1, 0, code > i)
+    t = merge(near%time, t, near%time < t)
+    code = ieor(code, iand(-crosses, ieor(code, near%code)))
+  end subroutine choose
 
   !> Everywhere else.
   subroutine predict_special(self, sim, i)
@@ -339,7 +335,7 @@ contains
     if (at_periodic_edge(self, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else
-      call gather(self%cells%cell, c, self%stride, i, list, n)
+      call gather(self%cells%cell, c, self%step(2), i, list, n)
       call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
         no_shift, sim%box%gravity, t, code)
       if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
@@ -392,7 +388,7 @@ contains
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
-        call scan_cell(self, sim, i, place%cell(1) + self%stride*place%cell(2), &
+        call scan_cell(self, sim, i, place%cell(1) + self%step(2)*place%cell(2), &
           -place%image*sim%box%edges(), t, code)
       end associate
     end do
@@ -418,7 +414,7 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: k, m
-    do k = c - self%stride, c + self%stride, self%stride
+    do k = c - self%step(2), c + self%step(2), self%step(2)
       do m = k - 1, k + 1
         call scan_chain(self, disk, i, m, no_shift, gravity, t, code)
       end do
@@ -462,7 +458,7 @@ contains
         image = merge(floor(real(there - 1)/self%n), 0, sim%box%periodic)
         there = there - image*self%n
         shift = image*sim%box%edges()
-        call scan_cell(self, sim, i, there(1) + self%stride*there(2), shift, t, code)
+        call scan_cell(self, sim, i, there(1) + self%step(2)*there(2), shift, t, code)
       end do
     end do
   end subroutine scan_around_edge

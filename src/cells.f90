@@ -76,18 +76,16 @@ contains
     class(cells_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
     integer(int32) :: n, k, link
-    n = self%cell(c)%in_slots()
+    link = self%chain(c)
     associate (slot => self%cell(c)%slot)
-      do k = 1, n
-        if (slot(k) == i - 1) exit
-      end do
-      link = self%chain(c)
+      k = 1 + slots_before(self%cell(c), i)
       if (link == 0) then
+        n = self%cell(c)%in_slots()
         slot(k) = slot(n)
         slot(count_slot) = slot(count_slot) - 1
         return
       end if
-      if (k <= cell_capacity) then                 ! the head of the chain takes the free place
+      if (slot(k) == i - 1) then                   ! the head of the chain takes the free place
         slot(k) = link - 1
         slot(cell_capacity) = self%next(link) - 1
         self%next(link) = 0
@@ -138,6 +136,15 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
+  !> How many slots lie before the one of disk i, which is in this cell; 2 if it is in the chain.
+  elemental function slots_before(self, i) result(n)
+    type(cell_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    integer(int32) :: n, first
+    first = merge(0, 1, self%slot(1) == i - 1)
+    n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
+  end function slots_before
+
   !> Lists the disks in the slots of the nine cells around c, where disk i is, without i. Whole cells are copied
   !> without a branch on how many they hold. If i is not in the slots of its crowded cell, the first disk of the
   !> chain is left out.
@@ -147,14 +154,12 @@ contains
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
     integer(int64) :: m, own
-    integer(int32) :: first
     m = 0
     call append(cell(c - stride - 1))
     call append(cell(c - stride))
     call append(cell(c - stride + 1))
     call append(cell(c - 1))
-    first = merge(0, 1, cell(c)%slot(1) == i - 1)
-    own = m + 1 + first + iand(first, merge(0, 1, cell(c)%slot(2) == i - 1))
+    own = m + 1 + slots_before(cell(c), i)
     call append(cell(c))
     list(own) = list(m)
     m = m - 1
