@@ -20,13 +20,14 @@ module cell_faces
 
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
-    logical :: periodic(2) = .false.               !! by axis
+    logical :: falling = .false.                   !! disks fly on parabolas
+    type(box_t) :: box
     type(line_t), allocatable :: column(:)         !! (0:columns) their left and right faces
     type(line_t), allocatable :: row(:)            !! (0:rows)
   contains
     procedure :: set
     procedure :: next
-    procedure :: next_falling
+    procedure, private :: next_falling
   end type cell_faces_t
 
 contains
@@ -37,7 +38,8 @@ contains
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
     self%width = box%edges()/n*(1 + 4*epsilon(self%width))       ! the last face is not before the side
-    self%periodic = box%periodic
+    self%falling = box%falling()
+    self%box = box
     call cut(self%column, n(1), box%lower(1), box%upper(1), self%width(1), box%periodic(1))
     call cut(self%row, n(2), box%lower(2), box%upper(2), self%width(2), box%periodic(2))
   end subroutine set
@@ -57,17 +59,23 @@ contains
     line(n) = line_t(upper, merge(0, -1, periodic), 0)
   end subroutine cut
 
-  !> When and how the disk leaves its cell on a straight line, or meets a side within it; which axis and
-  !> which way are toss-ups: no branch on them.
-  pure subroutine next(self, disk, cell, t, code)
+  !> When and how the disk leaves its cell, or meets a side within it.
+  pure subroutine next(self, disk, cell, now, falling, t, code)
     class(cell_faces_t), intent(in) :: self
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
+    real(real64), intent(in) :: now
+    logical, intent(in) :: falling
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    call next_of(self%column, self%row, disk%x, disk%v, disk%clock, disk%radius, cell, t, code)
+    if (falling) then
+      call self%next_falling(disk, cell, now, t, code)
+    else
+      call next_of(self%column, self%row, disk%x, disk%v, disk%clock, disk%radius, cell, t, code)
+    end if
   end subroutine next
 
+  !> On a straight line; which axis and which way are toss-ups: no branch on them.
   pure subroutine next_of(column, row, x, v, clock, radius, cell, t, code)
     type(line_t), intent(in) :: column(0:*), row(0:*)
     real(real64), intent(in) :: x(2), v(2), clock, radius
@@ -100,39 +108,78 @@ contains
     t = merge(t, never, speed > slowest)
   end function line_time
 
-  !> The same on a parabola: each of the two faces along an axis can be the one, and the root before `now`, where
-  !> the disk came in, is not.
-  pure subroutine next_falling(self, box, disk, cell, now, t, code)
+  !> On a parabola.
+  pure subroutine next_falling(self, disk, cell, now, t, code)
     class(cell_faces_t), intent(in) :: self
-    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: line, side, t_k, sense
-    integer(int32) :: face, axis
-    t = never
-    code = 0
-    do face = 0, 3
-      axis = 1 + face/2
-      sense = 2*modulo(face, 2) - 1
-      line = box%lower(axis) + self%width(axis)*(cell(axis) + min(sense, 0.0_real64))
-      side = merge(box%upper(axis) - disk%radius, box%lower(axis) + disk%radius, sense > 0)
-      if (sense*(line - side) >= 0) then
-        t_k = side_time(box, disk, -face)
-      else if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
-        .and. sense*box%gravity(axis) < 0) then
-        cycle                                      ! flies away from this face, ever faster
-      else
-        t_k = max(now, disk%clock &
-          + time_to_line(sense*(line - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
-      end if
-      if (t_k < t) then
-        t = t_k
-        code = merge(0, first_crossing, sense*(line - side) >= 0) - face
-      end if
-    end do
+    real(real64) :: t_y
+    integer(int32) :: code_y
+    call leave(self%column(cell(1) - 1:cell(1)), 1, self%box, disk, now, t, code)
+    call leave(self%row(cell(2) - 1:cell(2)), 2, self%box, disk, now, t_y, code_y)
+    code = ieor(code, iand(-merge(1, 0, t_y < t), ieor(code, code_y)))
+    t = merge(t_y, t, t_y < t)
   end subroutine next_falling
+
+  !> The same along one axis.
+  pure subroutine leave(line, axis, box, disk, now, t, code)
+    type(line_t), intent(in) :: line(0:1)          !! around the disk's cell
+    integer(int32), intent(in) :: axis
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: g, x, v, sense, forward, disc
+    integer(int32) :: up
+    g = box%gravity(axis)
+    up = merge(1, 0, disk%v(axis) > 0)
+    if (.not. abs(g) > 0) then
+      t = line_time(line(up), disk%x(axis), disk%v(axis), disk%clock, disk%radius)
+    else if (line(0)%kind == 0 .or. line(1)%kind == 0) then
+      t = falling_time(line(up), up, axis, box, disk, now)
+      x = falling_time(line(1 - up), 1 - up, axis, box, disk, now)
+      up = ieor(up, merge(1, 0, x < t))
+      t = min(t, x)
+    else                                           ! forward, or, if gravity turns the disk before, back
+      v = disk%v(axis) + g*(now - disk%clock)
+      x = disk%x(axis) + (disk%v(axis) + 0.5_real64*g*(now - disk%clock))*(now - disk%clock)
+      up = merge(1, 0, v > 0)
+      sense = 2*up - 1
+      forward = sense*g
+      disc = v*v + 2*forward*max(sense*(line(up)%place - x), 0.0_real64)
+      if (disc >= 0) then
+        t = now + 2*max(sense*(line(up)%place - x), 0.0_real64)/(abs(v) + sqrt(disc))
+      else
+        up = 1 - up
+        t = now + (abs(v) + sqrt(v*v - 2*forward*max(sense*(x - line(up)%place), 0.0_real64)))/(-forward)
+      end if
+    end if
+    code = line(up)%kind - 2*(axis - 1) - up
+  end subroutine leave
+
+  !> When a falling disk reaches a face or side. The root before `now`, where it came in, is not the one.
+  pure function falling_time(line, up, axis, box, disk, now) result(t)
+    type(line_t), intent(in) :: line
+    integer(int32), intent(in) :: up               !! 1: the upper one along the axis, 0: the lower
+    integer(int32), intent(in) :: axis
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64) :: t, sense
+    if (line%kind == 0) then
+      t = side_time(box, disk, 2 - 2*axis - up)
+      return
+    end if
+    t = never
+    sense = 2*up - 1
+    if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
+      .and. sense*box%gravity(axis) < 0) return    ! flies away from it, ever faster
+    t = max(now, disk%clock &
+      + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
+  end function falling_time
 
 end module cell_faces

@@ -45,8 +45,7 @@ module cell_grid
     integer(int32) :: n(2) = 0                     !! columns, rows
     integer(int32) :: step(2) = 0                  !! from cell to cell: to the next column, to the next row
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
-    logical :: special = .false.                   !! more than small disks and walls on straight lines
-    logical :: falling = .false.                   !! disks fly on parabolas
+    logical :: special = .false.                   !! more than small disks and walls
     logical :: obstructed = .false.                !! there are obstacles
     logical :: keeps_contacts = .false.            !! over the ends of cells: of use where disks are few
     type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
@@ -80,7 +79,6 @@ contains
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     self%step = [1, self%n(1) + 2]
     call self%faces%set(sim%box, self%n)
-    self%falling = sim%box%falling()
     call self%cells%empty(self%step(2), self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       if (sim%disk(i)%radius > small) cycle
@@ -93,7 +91,7 @@ contains
     call self%big%start(sim, small, self%n, self%faces%width)
     if (allocated(self%contact)) deallocate (self%contact)
     allocate (self%contact(merge(sim%n_disks(), 0, self%keeps_contacts)))
-    self%special = any(sim%box%periodic) .or. self%falling .or. self%obstructed .or. self%big%count > 0
+    self%special = any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0
   end subroutine build
 
   !> Number of the cell in column cell(1) and row cell(2), both from 1.
@@ -133,7 +131,7 @@ contains
     if (self%special) new = new .and. .not. is_special(self, sim, i)
     if (new) new = self%contact(i)%partner /= unknown
     if (new) then
-      call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, i, &
+      call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, self%faces%falling, i, &
         way*self%step(axis), self%step(3 - axis))
     else
       call self%predict(sim, i)
@@ -152,7 +150,7 @@ contains
         return
       end if
     end if
-    call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, i)
+    call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, self%faces%falling, i)
   end subroutine predict
 
   !> The reads do not wait for each other, as they would when the events come. Their sum is of no use but to
@@ -169,13 +167,13 @@ contains
     end do
   end subroutine read_ahead
 
-  !> Whether disk i may meet anything but small disks and walls on straight lines.
+  !> Whether disk i may meet anything but small disks and walls.
   pure function is_special(self, sim, i) result(yes)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     logical :: yes
-    yes = self%falling .or. self%obstructed .or. self%big%count > 0 .or. at_periodic_edge(self, sim%tag(i)%cell)
+    yes = self%obstructed .or. self%big%count > 0 .or. at_periodic_edge(self, sim%tag(i)%cell)
   end function is_special
 
   !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
@@ -191,58 +189,64 @@ contains
         return
       end if
     end if
-    call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, i, j)
+    call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, self%faces%falling, i, j)
   end subroutine predict_both
 
-  !> Where there are but small disks and walls on straight lines.
-  subroutine predict_two(self, cell, contact, disk, tag, i, j)
-    class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
-    type(contact_t), intent(inout) :: contact(*)
-    type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i, j
-    type(outlook_t) :: near_i, near_j
-    call look_around(self, cell, disk(i), tag(i), i, near_i)
-    call look_around(self, cell, disk(j), tag(j), j, near_j)
-    call expect_first(self, cell, contact, disk, tag(i), i, near_i, .true.)
-    call expect_first(self, cell, contact, disk, tag(j), j, near_j, .true.)
-  end subroutine predict_two
-
-  !> Likewise for one disk.
-  subroutine predict_in_bulk(self, cell, contact, disk, tag, now, i)
+  !> Where there are but small disks and walls.
+  subroutine predict_two(self, cell, contact, disk, tag, now, falling, i, j)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
+    logical, intent(in) :: falling
+    integer(int32), intent(in) :: i, j
+    type(outlook_t) :: near_i, near_j
+    call look_around(self, cell, disk(i), tag(i), now, falling, i, near_i)
+    call look_around(self, cell, disk(j), tag(j), now, falling, j, near_j)
+    call expect_first(self, cell, contact, disk, tag(i), falling, i, near_i, .true.)
+    call expect_first(self, cell, contact, disk, tag(j), falling, j, near_j, .true.)
+  end subroutine predict_two
+
+  !> Likewise for one disk.
+  subroutine predict_in_bulk(self, cell, contact, disk, tag, now, falling, i)
+    class(cell_grid_t), intent(in) :: self
+    type(cell_t), intent(in) :: cell(0:*)
+    type(contact_t), intent(inout) :: contact(*)
+    type(disk_t), intent(inout) :: disk(*)
+    type(tag_t), intent(inout) :: tag(*)
+    real(real64), intent(in) :: now
+    logical, intent(in) :: falling
     integer(int32), intent(in) :: i
     type(outlook_t) :: near
-    call look_around(self, cell, disk(i), tag(i), i, near)
-    call expect_first(self, cell, contact, disk, tag(i), i, near, disk(i)%clock >= now)
+    call look_around(self, cell, disk(i), tag(i), now, falling, i, near)
+    call expect_first(self, cell, contact, disk, tag(i), falling, i, near, disk(i)%clock >= now)
   end subroutine predict_in_bulk
 
   !> What is around disk i.
-  subroutine look_around(self, cell, disk, tag, i, near)
+  subroutine look_around(self, cell, disk, tag, now, falling, i, near)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(in) :: tag
+    real(real64), intent(in) :: now
+    logical, intent(in) :: falling
     integer(int32), intent(in) :: i
     type(outlook_t), intent(out) :: near
-    call self%faces%next(disk, tag%cell, near%time, near%code)
+    call self%faces%next(disk, tag%cell, now, falling, near%time, near%code)
     near%cell = cell_number(self, tag%cell)
     call gather(cell, near%cell, self%step(2), i, near%list, near%n)
   end subroutine look_around
 
   !> Writes into disk i the first of what it can expect.
-  subroutine expect_first(self, cell, contact, disk, tag, i, near, fresh)
+  subroutine expect_first(self, cell, contact, disk, tag, falling, i, near, fresh)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
+    logical, intent(in) :: falling
     integer(int32), intent(in) :: i
     type(outlook_t), intent(in) :: near
     logical, intent(in) :: fresh
@@ -254,8 +258,8 @@ contains
       t = never
       code = 0
     end if
-    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, no_shift, t, code)
-    call earliest_contact(disk, i, near%n, near%list, fresh, .false., no_shift, no_shift, t, code)
+    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
+    call earliest_contact(disk, i, near%n, near%list, fresh, falling, self%faces%box%gravity, .false., no_shift, t, code)
     stamp = disk(max(code, 1))%stamp               ! without a branch; of use if code > 0
     if (self%keeps_contacts) then
       contact(i) = contact_t(t, code, stamp)
@@ -267,20 +271,21 @@ contains
   end subroutine expect_first
 
   !> Behind the face just crossed: the contact found before stays, three cells come into reach.
-  subroutine predict_ahead(self, cell, contact, disk, tag, now, i, ahead, along)
+  subroutine predict_ahead(self, cell, contact, disk, tag, now, falling, i, ahead, along)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(contact_t), intent(inout) :: contact
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
     real(real64), intent(in) :: now
+    logical, intent(in) :: falling
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
     integer(int32), intent(in) :: along            !! from this one to the next
     type(outlook_t) :: near
     real(real64) :: t
     integer(int32) :: code, k
-    call self%faces%next(disk(i), tag%cell, near%time, near%code)
+    call self%faces%next(disk(i), tag%cell, now, falling, near%time, near%code)
     t = contact%time
     code = contact%partner
     near%cell = cell_number(self, tag%cell)
@@ -289,8 +294,9 @@ contains
       near%list(near%n + 1:near%n + size(cell(k)%slot)) = cell(k)%slot
       near%n = near%n + cell(k)%in_slots()
     end do
-    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, no_shift, t, code)
-    call earliest_contact(disk, i, near%n, near%list, disk(i)%clock >= now, .false., no_shift, no_shift, t, code)
+    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
+    call earliest_contact(disk, i, near%n, near%list, disk(i)%clock >= now, falling, &
+      self%faces%box%gravity, .false., no_shift, t, code)
     if (t < contact%time .or. code /= contact%partner) contact = contact_t(t, code, disk(code)%stamp)
     call choose(near, i, t, code)
     disk(i)%event_time = t
@@ -325,20 +331,16 @@ contains
         return
       end if
     end if
-    if (self%falling) then
-      call self%faces%next_falling(sim%box, sim%disk(i), sim%tag(i)%cell, sim%now, t, code)
-    else
-      call self%faces%next(sim%disk(i), sim%tag(i)%cell, t, code)
-    end if
+    call self%faces%next(sim%disk(i), sim%tag(i)%cell, sim%now, self%faces%falling, t, code)
     c = cell_number(self, sim%tag(i)%cell)
     if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
     if (at_periodic_edge(self, sim%tag(i)%cell)) then
       call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cells%cell, c, self%step(2), i, list, n)
-      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%falling, &
-        no_shift, sim%box%gravity, t, code)
-      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, sim%box%gravity, t, code)
+      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
+        self%faces%box%gravity, .false., no_shift, t, code)
+      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
     end if
     if (self%big%count > 0) call scan_big_ones(self, sim, i, t, code)
     sim%disk(i)%event_time = t
@@ -358,7 +360,7 @@ contains
     do while (e > 0)
       associate (entry => self%big%entry(e))
         call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .false., .true., &
-          entry%image*sim%box%edges(), sim%box%gravity, t, code)
+          self%faces%box%gravity, .true., entry%image*sim%box%edges(), t, code)
         e = entry%next
       end associate
     end do
@@ -383,7 +385,7 @@ contains
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
         call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .false., .true., &
-          [ix, iy]*sim%box%edges(), sim%box%gravity, t, code)
+          self%faces%box%gravity, .true., [ix, iy]*sim%box%edges(), t, code)
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
@@ -402,31 +404,30 @@ contains
     class(cell_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
-    yes = any(self%faces%periodic .and. (cell == 1 .or. cell == self%n))
+    yes = any(self%faces%box%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
 
   !> Contacts with the chained disks of the nine cells around c.
-  pure subroutine scan_crowd(self, disk, i, c, gravity, t, code)
+  pure subroutine scan_crowd(self, disk, i, c, t, code)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: k, m
     do k = c - self%step(2), c + self%step(2), self%step(2)
       do m = k - 1, k + 1
-        call scan_chain(self, disk, i, m, no_shift, gravity, t, code)
+        call scan_chain(self, disk, i, m, no_shift, t, code)
       end do
     end do
   end subroutine scan_crowd
 
   !> Contacts with the chained disks of the crowded cell c.
-  pure subroutine scan_chain(self, disk, i, c, shift, gravity, t, code)
+  pure subroutine scan_chain(self, disk, i, c, shift, t, code)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: shift(2), gravity(2)
+    real(real64), intent(in) :: shift(2)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: list(list_capacity), n, j
@@ -438,7 +439,7 @@ contains
         list(n) = j - 1
         j = self%cells%next(j)
       end do
-      call earliest_contact(disk, i, n, list, .false., .true., shift, gravity, t, code)
+      call earliest_contact(disk, i, n, list, .false., .true., self%faces%box%gravity, .true., shift, t, code)
     end do
   end subroutine scan_chain
 
@@ -472,8 +473,8 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, .false., &
-      .true., shift, sim%box%gravity, t, code)
-    call scan_chain(self, sim%disk, i, c, shift, sim%box%gravity, t, code)
+      .true., self%faces%box%gravity, .true., shift, t, code)
+    call scan_chain(self, sim%disk, i, c, shift, t, code)
   end subroutine scan_cell
 
 end module cell_grid

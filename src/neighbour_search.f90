@@ -73,47 +73,49 @@ contains
   !>
   !> Most candidates fail one combined test: the root is not before the best so far (it needs
   !> c < -2 b (t - late), with a margin above rounding) or not real.
-  pure subroutine earliest_contact(disk, i, n, list, fresh, bent, shift, gravity, t, partner)
+  pure subroutine earliest_contact(disk, i, n, list, fresh, falling, gravity, shifted, shift, t, partner)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: n           !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
     logical, intent(in) :: fresh              !! nobody has a later clock than i
-    logical, intent(in) :: bent               !! `shift` or `gravity` is not zero
-    real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
+    logical, intent(in) :: falling            !! `gravity` is not zero
     real(real64), intent(in) :: gravity(2)
+    logical, intent(in) :: shifted            !! `shift` is not zero
+    real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
     real(real64) :: xi, yi, ui, vi, clock, ri, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
-    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time
+    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time, gx, gy
     integer(int32) :: k, j
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
     gate = above(t)
     reach = 2*(clock - gate)
-    si = 0
+    gx = gravity(1)
+    gy = gravity(2)
     do k = 1, n
       j = list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      du = uj - ui
-      dv = vj - vi
       if (fresh) then                         ! the same numbers as below, with si = 0
         late = clock
         sj = late - clock_j
-        dx = (xj + uj*sj) - xi
-        dy = (yj + vj*sj) - yi
+        dx = moved(xj, uj, gx, sj, falling) - xi
+        dy = moved(yj, vj, gy, sj, falling) - yi
+        du = sped_up(uj, gx, sj, falling) - ui
+        dv = sped_up(vj, gy, sj, falling) - vi
       else
         late = merge(clock, clock_j, clock > clock_j)
         si = late - clock
         sj = late - clock_j
-        dx = (xj + uj*sj) - (xi + ui*si)
-        dy = (yj + vj*sj) - (yi + vi*si)
+        dx = moved(xj, uj, gx, sj, falling) - moved(xi, ui, gx, si, falling)
+        dy = moved(yj, vj, gy, sj, falling) - moved(yi, vi, gy, si, falling)
+        du = sped_up(uj, gx, sj, falling) - sped_up(ui, gx, si, falling)
+        dv = sped_up(vj, gy, sj, falling) - sped_up(vi, gy, si, falling)
         reach = 2*(late - gate)
       end if
-      if (bent) then
-        dx = dx + (shift(1) + 0.5_real64*gravity(1)*(sj*sj - si*si))
-        dy = dy + (shift(2) + 0.5_real64*gravity(2)*(sj*sj - si*si))
-        du = du + gravity(1)*(sj - si)
-        dv = dv + gravity(2)*(sj - si)
+      if (shifted) then
+        dx = dx + shift(1)
+        dy = dy + shift(2)
       end if
       sigma2 = (ri + rj)**2
       b = dx*du + dy*dv
@@ -141,6 +143,27 @@ contains
     u = d%v(1); v = d%v(2)
     clock = d%clock; radius = d%radius
   end subroutine read_state
+
+  !> A coordinate after the time s, as `flight` has it.
+  elemental function moved(x, v, g, s, falling) result(there)
+    real(real64), intent(in) :: x, v, g, s
+    logical, intent(in) :: falling            !! otherwise g is zero
+    real(real64) :: there
+    if (falling) then
+      there = x + (v + 0.5_real64*g*s)*s
+    else
+      there = x + v*s
+    end if
+  end function moved
+
+  !> A velocity after the time s, as `flight_velocity` has it.
+  elemental function sped_up(v, g, s, falling) result(then)
+    real(real64), intent(in) :: v, g, s
+    logical, intent(in) :: falling
+    real(real64) :: then
+    then = v
+    if (falling) then = v + g*s
+  end function sped_up
 
   !> A time just above t by more than the rounding of the test that it guards.
   elemental function above(t) result(gate)
