@@ -92,7 +92,22 @@ contains
     if (allocated(self%contact)) deallocate (self%contact)
     allocate (self%contact(merge(sim%n_disks(), 0, self%keeps_contacts)))
     self%special = any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0
+    if (self%special) call mark_special_cells(self)
   end subroutine build
+
+  !> Marks the cells where a disk may meet an obstacle or others beyond a periodic side.
+  subroutine mark_special_cells(self)
+    class(cell_grid_t), intent(inout) :: self
+    integer(int16) :: ix, iy
+    logical :: special
+    do iy = 1, int(self%n(2), int16)
+      do ix = 1, int(self%n(1), int16)
+        special = at_periodic_edge(self, [ix, iy])
+        if (self%obstructed) special = special .or. self%obstacles%reach_into([ix, iy])
+        if (special) call self%cells%mark(cell_number(self, [ix, iy]))
+      end do
+    end do
+  end subroutine mark_special_cells
 
   !> Number of the cell in column cell(1) and row cell(2), both from 1.
   pure function cell_number(self, cell) result(c)
@@ -110,7 +125,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
     integer(int32) :: face, axis, there, way
-    logical :: new
+    logical :: known                               !! the contact that i expects, over the face
     if (self%big%count > 0) then
       if (sim%disk(i)%radius > self%big%small) then
         call self%big%register(sim, self%big%number_of(i))
@@ -127,15 +142,12 @@ contains
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
     call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
-    new = self%keeps_contacts
-    if (self%special) new = new .and. .not. is_special(self, sim, i)
-    if (new) new = self%contact(i)%partner /= unknown
-    if (new) then
-      call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, self%faces%falling, i, &
-        way*self%step(axis), self%step(3 - axis))
-    else
-      call self%predict(sim, i)
-    end if
+    known = self%keeps_contacts
+    if (known .and. self%special) known = .not. is_special(self, sim, i)
+    if (known) known = self%contact(i)%partner /= unknown
+    if (known) call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, &
+      self%faces%falling, i, way*self%step(axis), self%step(3 - axis))
+    if (.not. known) call self%predict(sim, i)
   end subroutine cross
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -173,7 +185,8 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     logical :: yes
-    yes = self%obstructed .or. self%big%count > 0 .or. at_periodic_edge(self, sim%tag(i)%cell)
+    yes = self%big%count > 0
+    if (.not. yes) yes = self%cells%cell(cell_number(self, sim%tag(i)%cell))%is_marked()
   end function is_special
 
   !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
@@ -325,11 +338,9 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: t
     integer(int32) :: code, c, n, list(list_capacity)
-    if (self%big%count > 0) then
-      if (sim%disk(i)%radius > self%big%small) then
-        call predict_big(self, sim, i)
-        return
-      end if
+    if (self%big%count > 0 .and. sim%disk(i)%radius > self%big%small) then
+      call predict_big(self, sim, i)
+      return
     end if
     call self%faces%next(sim%disk(i), sim%tag(i)%cell, sim%now, self%faces%falling, t, code)
     c = cell_number(self, sim%tag(i)%cell)
@@ -443,25 +454,33 @@ contains
     end do
   end subroutine scan_chain
 
-  !> The same cell by cell where some of the nine are images beyond a periodic side. In a box of fewer than
-  !> three columns a cell stands for several of its images.
+  !> Contacts where some of the nine cells are images beyond a periodic side; these are scanned cell by cell. In a
+  !> box of fewer than three columns a cell stands for several of its images.
   subroutine scan_around_edge(self, sim, i, t, code)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    integer(int32) :: dx, dy, there(2), image(2)
-    real(real64) :: shift(2)
+    integer(int32) :: dx, dy, c, n, there(2), image(2), list(list_capacity)
+    n = 0
     do dy = -1, 1
       do dx = -1, 1
         there = sim%tag(i)%cell + [dx, dy]
-        image = merge(floor(real(there - 1)/self%n), 0, sim%box%periodic)
+        image = merge(merge(1, 0, there > self%n) - merge(1, 0, there < 1), 0, sim%box%periodic)
         there = there - image*self%n
-        shift = image*sim%box%edges()
-        call scan_cell(self, sim, i, there(1) + self%step(2)*there(2), shift, t, code)
+        c = there(1) + self%step(2)*there(2)
+        if (any(image /= 0)) then
+          call scan_cell(self, sim, i, c, image*sim%box%edges(), t, code)
+        else
+          list(n + 1:n + size(self%cells%cell(c)%slot)) = self%cells%cell(c)%slot
+          n = n + self%cells%cell(c)%in_slots()
+          call scan_chain(self, sim%disk, i, c, no_shift, t, code)
+        end if
       end do
     end do
+    call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
+      self%faces%box%gravity, .false., no_shift, t, code)
   end subroutine scan_around_edge
 
   !> Contacts with the disks of one cell, seen `shift` away.

@@ -11,15 +11,17 @@ module cells
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! mask of the number of disks
   integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! beyond nine crowded cells
   integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
 
   !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
-  !> in its lower half, and in its upper half the crowded cells among the nine around this one.
+  !> in its lower half, and in its upper half the crowded cells among the nine around this one; and it holds a mark.
   type :: cell_t
     integer(int32) :: slot(count_slot) = 0
   contains
     procedure :: in_slots
     procedure :: near_crowd
+    procedure :: is_marked
   end type cell_t
 
   type :: cells_t
@@ -28,6 +30,7 @@ module cells
     integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
   contains
     procedure :: empty
+    procedure :: mark
     procedure :: insert
     procedure :: remove
     procedure :: chain
@@ -50,6 +53,13 @@ contains
       self%cell(c)%slot = 0
     end do
   end subroutine empty
+
+  !> Marks cell c until all are emptied.
+  pure subroutine mark(self, c)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c
+    self%cell(c)%slot(count_slot) = ior(self%cell(c)%slot(count_slot), marked)
+  end subroutine mark
 
   !> Puts disk i into cell c.
   pure subroutine insert(self, c, i)
@@ -118,7 +128,14 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether one of the nine cells around is crowded.
+  !> Whether the cell was marked.
+  elemental function is_marked(self) result(yes)
+    class(cell_t), intent(in) :: self
+    logical :: yes
+    yes = self%slot(count_slot) >= marked
+  end function is_marked
+
+  !> Whether one of the nine cells around is crowded; true for marked cells.
   elemental function near_crowd(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes

@@ -4,7 +4,7 @@ module event_heap
   use kinds, only: int32, real64
   implicit none
   private
-  public :: event_t, event_heap_t, precedes
+  public :: event_t, event_heap_t, need_order, precedes
 
   integer(int32), parameter :: arity = 4         !! children per node: shallower than 2, same cache lines
 
@@ -49,6 +49,13 @@ contains
       end if
     end if
   end function precedes
+
+  !> Not zero if two events at the same moment need an order: most are one collision that both disks expect.
+  elemental function need_order(a, b) result(bits)
+    type(event_t), intent(in) :: a, b
+    integer(int32) :: bits
+    bits = iand(-merge(1, 0, a%time <= b%time), ior(ieor(a%disk, b%partner), ieor(a%partner, b%disk)))
+  end function need_order
 
   !> Empties the heap and makes room for the events of n disks.
   subroutine initialise(self, n)

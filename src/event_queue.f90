@@ -9,7 +9,7 @@
 module event_queue
   use kinds, only: int32, int64, never, real64
   use disks, only: disk_t, tag_t
-  use event_heap, only: event_heap_t, event_t, precedes
+  use event_heap, only: event_heap_t, event_t, need_order, precedes
   implicit none
   private
   public :: event_queue_t, most_coming
@@ -281,7 +281,7 @@ contains
       list(k + 1) = list(k)
       k = k - 1
     end do
-    if (out_of_order(list(k), event) /= 0) then
+    if (need_order(list(k), event) /= 0) then
       do while (precedes(list(k), event))
         list(k + 1) = list(k)
         k = k - 1
@@ -414,7 +414,7 @@ contains
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(out) :: n
     real(real64) :: time(bucket_capacity)
-    integer(int32) :: due(bucket_capacity), rank(bucket_capacity), k, m, place, later, odd
+    integer(int32) :: due(bucket_capacity), slot(bucket_capacity), k, m, place, later, odd
     n = 0
     do k = 1, bucket%n
       due(n + 1) = bucket%disk(k)
@@ -427,29 +427,22 @@ contains
       do m = 1, k - 1
         later = merge(1, 0, time(m) > time(k))
         place = place + later
-        rank(m) = rank(m) + 1 - later
+        slot(m) = slot(m) + 1 - later
       end do
-      rank(k) = place
+      slot(k) = place
     end do
     do k = 1, n
-      list(rank(k)) = event_of(disk, due(k))
+      list(slot(k)) = event_of(disk, due(k))
     end do
     odd = 0
     do k = 1, n - 1
-      odd = ior(odd, out_of_order(list(k), list(k + 1)))
+      odd = ior(odd, need_order(list(k), list(k + 1)))
     end do
     if (odd == 0) return
     do k = 1, n
       call insert(list, k - 1, event_of(disk, due(k)))
     end do
   end subroutine take_bucket
-
-  !> Not zero if two events at the same moment need an order: most are one collision that both disks expect.
-  elemental function out_of_order(a, b) result(odd)
-    type(event_t), intent(in) :: a, b
-    integer(int32) :: odd
-    odd = iand(-merge(1, 0, a%time <= b%time), ior(ieor(a%disk, b%partner), ieor(a%partner, b%disk)))
-  end function out_of_order
 
   !> Moves what is due in this window from the heap into the list; if that is too much, all into the heap.
   subroutine take_from_heap(self, disk)

@@ -86,31 +86,29 @@ contains
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
     real(real64) :: xi, yi, ui, vi, clock, ri, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
-    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time, gx, gy
+    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time
     integer(int32) :: k, j
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
     gate = above(t)
     reach = 2*(clock - gate)
-    gx = gravity(1)
-    gy = gravity(2)
     do k = 1, n
       j = list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
       if (fresh) then                         ! the same numbers as below, with si = 0
         late = clock
         sj = late - clock_j
-        dx = moved(xj, uj, gx, sj, falling) - xi
-        dy = moved(yj, vj, gy, sj, falling) - yi
-        du = sped_up(uj, gx, sj, falling) - ui
-        dv = sped_up(vj, gy, sj, falling) - vi
+        dx = moved(xj, uj, gravity(1), sj, falling) - xi
+        dy = moved(yj, vj, gravity(2), sj, falling) - yi
+        du = sped_up(uj, gravity(1), sj, falling) - ui
+        dv = sped_up(vj, gravity(2), sj, falling) - vi
       else
         late = merge(clock, clock_j, clock > clock_j)
         si = late - clock
         sj = late - clock_j
-        dx = moved(xj, uj, gx, sj, falling) - moved(xi, ui, gx, si, falling)
-        dy = moved(yj, vj, gy, sj, falling) - moved(yi, vi, gy, si, falling)
-        du = sped_up(uj, gx, sj, falling) - sped_up(ui, gx, si, falling)
-        dv = sped_up(vj, gy, sj, falling) - sped_up(vi, gy, si, falling)
+        dx = moved(xj, uj, gravity(1), sj, falling) - moved(xi, ui, gravity(1), si, falling)
+        dy = moved(yj, vj, gravity(2), sj, falling) - moved(yi, vi, gravity(2), si, falling)
+        du = sped_up(uj, gravity(1), sj, falling) - sped_up(ui, gravity(1), si, falling)
+        dv = sped_up(vj, gravity(2), sj, falling) - sped_up(vi, gravity(2), si, falling)
         reach = 2*(late - gate)
       end if
       if (shifted) then
@@ -157,12 +155,12 @@ contains
   end function moved
 
   !> A velocity after the time s, as `flight_velocity` has it.
-  elemental function sped_up(v, g, s, falling) result(then)
+  elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
-    real(real64) :: then
-    then = v
-    if (falling) then = v + g*s
+    real(real64) :: after
+    after = v
+    if (falling) after = v + g*s
   end function sped_up
 
   !> A time just above t by more than the rounding of the test that it guards.

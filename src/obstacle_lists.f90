@@ -20,6 +20,7 @@ module obstacle_lists
   contains
     procedure :: renew
     procedure :: next_contact
+    procedure :: reach_into
   end type obstacle_lists_t
 
 contains
@@ -36,6 +37,16 @@ contains
     c = cell(1) + self%n(1)*(cell(2) - 1)
     call next_obstacle(box, disk, self%list(self%start(c):self%start(c + 1) - 1), t, code)
   end subroutine next_contact
+
+  !> Whether there are obstacles in reach of a cell.
+  pure function reach_into(self, cell) result(yes)
+    class(obstacle_lists_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)          !! column and row, from 1
+    logical :: yes
+    integer(int32) :: c
+    c = cell(1) + self%n(1)*(cell(2) - 1)
+    yes = self%start(c + 1) > self%start(c)
+  end function reach_into
 
   !> Whether the lists of obstacles are up to date.
   pure function hold(self, box, radius, n) result(yes)
