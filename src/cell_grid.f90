@@ -185,7 +185,8 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     logical :: yes
-    yes = self%big%count > 0
+    yes = .false.
+    if (self%big%count > 0) yes = self%big%concern(sim%disk(i), sim%tag(i)%cell)
     if (.not. yes) yes = self%cells%cell(cell_number(self, sim%tag(i)%cell))%is_marked()
   end function is_special
 
