@@ -81,10 +81,9 @@ contains
     call self%faces%set(sim%box, self%n)
     call self%cells%empty(self%step(2), self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
-      if (sim%disk(i)%radius > small) cycle
       x = (sim%position(i) - sim%box%lower)/self%faces%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
+      if (.not. sim%disk(i)%radius > small) call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
     end do
     self%obstructed = sim%box%obstructed()
     if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width)
