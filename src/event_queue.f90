@@ -16,7 +16,8 @@ module event_queue
 
   integer(int32), parameter :: list_capacity = 64
   integer(int32), parameter :: bucket_capacity = 15
-  integer(int32), parameter :: longest_ring = 512  !! buckets
+  !> Buckets: most events of few disks, those of many should leave the cache to the disks.
+  integer(int32), parameter :: long_ring = 2048, short_ring = 512, few = 5000
   integer(int32), parameter :: windows_ahead = 16  !! to announce
   integer(int32), parameter :: most_coming = windows_ahead*bucket_capacity   !! disks announced at once
   integer(int32), parameter :: nowhere = -1        !! as tag%window
@@ -118,7 +119,7 @@ contains
     class(event_queue_t), intent(inout) :: self
     integer(int32) :: s
     self%log_span = 3
-    do while (shiftl(4_int32, self%log_span) < min(self%n_disks, 2*longest_ring))
+    do while (shiftl(2_int32, self%log_span) < min(2*self%n_disks, merge(long_ring, short_ring, self%n_disks <= few)))
       self%log_span = self%log_span + 1
     end do
     self%last_bucket = shiftl(2_int32, self%log_span) - 1
