@@ -24,7 +24,7 @@ contains
     real(real64), intent(in) :: mass_i, mass_j       !! [mass]
     real(real64), intent(in) :: restitution
     real(real64) :: q
-    q = (1 + restitution)*(mass_i*mass_j/(mass_i + mass_j))*(b/distance2)
+    q = (1 + restitution)*b/distance2*(mass_i*mass_j/(mass_i + mass_j))
   end function pair_impulse
 
   !> Velocity after contact with a fixed wall. The normal velocity points towards the disk's side whatever

@@ -88,8 +88,8 @@ contains
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
-    sim%disk(i)%v = sim%disk(i)%v + (q*(1/mass_i))*dx      ! the reciprocals need not wait for q
-    sim%disk(j)%v = sim%disk(j)%v - (q*(1/mass_j))*dx
+    sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
+    sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%events = sim%events + 1
