@@ -6,7 +6,7 @@ module encounters
   use collisions, only: pair_impulse, wall_rebound
   use disks, only: disk_t
   use event_log, only: event_log_t
-  use free_flight, only: flight_velocity
+  use free_flight, only: flight, flight_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -42,16 +42,14 @@ contains
     end associate
   end subroutine collide
 
-  !> Brings a disk's own state to the time t: `flight` and `flight_velocity`, in place.
+  !> Brings a disk's own state to the time t.
   pure subroutine land(disk, gravity, t)
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: gravity(2), t
     real(real64) :: s
     s = t - disk%clock
-    disk%x(1) = disk%x(1) + (disk%v(1) + 0.5_real64*gravity(1)*s)*s
-    disk%x(2) = disk%x(2) + (disk%v(2) + 0.5_real64*gravity(2)*s)*s
-    disk%v(1) = disk%v(1) + gravity(1)*s
-    disk%v(2) = disk%v(2) + gravity(2)*s
+    disk%x = flight(disk%x, disk%v, gravity, s)
+    disk%v = flight_velocity(disk%v, gravity, s)
     disk%clock = t
     disk%stamp = disk%stamp + 1
   end subroutine land

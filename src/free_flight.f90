@@ -8,21 +8,20 @@ module free_flight
 
 contains
 
-  !> Position after the time s on the parabola x + v s + g s**2/2.
-  pure function flight(x, v, g, s) result(there)
-    real(real64), intent(in) :: x(2)      !! [length]
-    real(real64), intent(in) :: v(2)      !! [length/time]
-    real(real64), intent(in) :: g(2)      !! acceleration [length/time**2]
+  !> Position after the time s on the parabola x + v s + g s**2/2; by coordinate.
+  elemental function flight(x, v, g, s) result(there)
+    real(real64), intent(in) :: x         !! [length]
+    real(real64), intent(in) :: v         !! [length/time]
+    real(real64), intent(in) :: g         !! acceleration [length/time**2]
     real(real64), intent(in) :: s         !! [time]
-    real(real64) :: there(2)
+    real(real64) :: there
     there = x + (v + 0.5_real64*g*s)*s
   end function flight
 
-  !> Velocity after the time s.
-  pure function flight_velocity(v, g, s) result(then)
-    real(real64), intent(in) :: v(2), g(2)
-    real(real64), intent(in) :: s
-    real(real64) :: then(2)
+  !> Velocity after the time s; by coordinate.
+  elemental function flight_velocity(v, g, s) result(then)
+    real(real64), intent(in) :: v, g, s
+    real(real64) :: then
     then = v + g*s
   end function flight_velocity
 

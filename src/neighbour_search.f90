@@ -2,6 +2,7 @@
 module neighbour_search
   use kinds, only: int32, never, real64
   use disks, only: disk_t
+  use free_flight, only: flight, flight_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -142,25 +143,25 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate after the time s, as `flight` has it.
+  !> A coordinate after the time s; on a straight line with fewer steps, to the same number.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
     logical, intent(in) :: falling            !! otherwise g is zero
     real(real64) :: there
     if (falling) then
-      there = x + (v + 0.5_real64*g*s)*s
+      there = flight(x, v, g, s)
     else
       there = x + v*s
     end if
   end function moved
 
-  !> A velocity after the time s, as `flight_velocity` has it.
+  !> A velocity after the time s, likewise.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
     real(real64) :: after
     after = v
-    if (falling) after = v + g*s
+    if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
   !> A time just above t by more than the rounding of the test that it guards.
