@@ -3,7 +3,7 @@ module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, side_time
   use disks, only: disk_t
-  use free_flight, only: time_to_line
+  use free_flight, only: flight, flight_velocity, time_to_line
   use neighbour_search, only: first_crossing
   implicit none
   private
@@ -133,7 +133,7 @@ contains
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: g, x, v, sense, forward, disc
+    real(real64) :: g, x, v, sense, gap, disc
     integer(int32) :: up
     g = box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
@@ -145,17 +145,18 @@ contains
       up = ieor(up, merge(1, 0, x < t))
       t = min(t, x)
     else                                           ! forward, or, if gravity turns the disk before, back
-      v = disk%v(axis) + g*(now - disk%clock)
-      x = disk%x(axis) + (disk%v(axis) + 0.5_real64*g*(now - disk%clock))*(now - disk%clock)
-      up = merge(1, 0, v > 0)
-      sense = 2*up - 1
-      forward = sense*g
-      disc = v*v + 2*forward*max(sense*(line(up)%place - x), 0.0_real64)
+      x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
+      v = flight_velocity(disk%v(axis), g, now - disk%clock)
+      up = merge(1, 0, v + g*moment(now) > 0)
+      sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
+      gap = max(sense*(line(up)%place - x), 0.0_real64)
+      disc = v*v + 2*sense*g*gap
       if (disc >= 0) then
-        t = now + 2*max(sense*(line(up)%place - x), 0.0_real64)/(abs(v) + sqrt(disc))
+        t = now + 2*gap/max(abs(v) + sqrt(disc), tiny(v))     ! at rest on the face: now
       else
         up = 1 - up
-        t = now + (abs(v) + sqrt(v*v - 2*forward*max(sense*(x - line(up)%place), 0.0_real64)))/(-forward)
+        gap = max(sense*(x - line(up)%place), 0.0_real64)
+        t = now + (abs(v) + sqrt(v*v - 2*sense*g*gap))/(-sense*g)
       end if
     end if
     code = line(up)%kind - 2*(axis - 1) - up
@@ -169,17 +170,25 @@ contains
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
-    real(real64) :: t, sense
+    real(real64) :: t, sense, g
     if (line%kind == 0) then
       t = side_time(box, disk, 2 - 2*axis - up)
       return
     end if
     t = never
     sense = 2*up - 1
-    if (sense*(disk%v(axis) + box%gravity(axis)*(now - disk%clock)) <= 0 &
-      .and. sense*box%gravity(axis) < 0) return    ! flies away from it, ever faster
-    t = max(now, disk%clock &
-      + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*box%gravity(axis)))
+    g = box%gravity(axis)
+    if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + moment(now)) <= 0 &
+      .and. sense*g < 0) return                    ! flies away from it, ever faster
+    t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
+
+  !> The least while after `now` that a time can tell. A disk that turns at a face within it would else go through
+  !> that face to and fro and come to no later time.
+  elemental function moment(now)
+    real(real64), intent(in) :: now
+    real(real64) :: moment
+    moment = 4*epsilon(now)*now + tiny(now)
+  end function moment
 
 end module cell_faces
