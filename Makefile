@@ -36,7 +36,7 @@ Q := $(if $(V),,@)
 
 sources := $(wildcard src/*.f90)
 modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
-objects := $(modules:%=$(BUILD)/%.o)
+objects := $(modules:%=$(BUILD)/%.o) $(BUILD)/memory_hints_c.o
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
@@ -53,6 +53,11 @@ $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 $(BUILD)/%.o: src/%.f90 $(BUILD)/flags
 	@echo "compile $<"
 	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+
+# The one thing that Fortran cannot say, by the same driver; link-time optimisation makes it an instruction.
+$(BUILD)/%_c.o: src/%.c $(BUILD)/flags
+	@echo "compile $<"
+	$(Q)$(FC) -Wall -Wextra $(filter -O% -g -march=% -flto%,$(flags)) -c -o $@ $<
 
 $(BUILD)/build_info.o: $(BUILD)/build_info.f90 $(BUILD)/flags
 	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<

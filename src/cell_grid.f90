@@ -6,7 +6,7 @@ module cell_grid
   use big_disks, only: big_disks_t, largest_small_radius
   use box_geometry, only: next_obstacle, next_side
   use cell_faces, only: cell_faces_t
-  use cells, only: cell_t, cells_t, gather, list_capacity, sum_around
+  use cells, only: cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
@@ -49,7 +49,6 @@ module cell_grid
     logical :: obstructed = .false.                !! there are obstacles
     logical :: keeps_contacts = .false.            !! over the ends of cells: of use where disks are few
     type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
-    real(real64) :: last_read = 0.0_real64         !! by `read_ahead`
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
@@ -164,18 +163,12 @@ contains
     call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, self%faces%falling, i)
   end subroutine predict
 
-  !> The reads do not wait for each other, as they would when the events come. Their sum is of no use but to
-  !> keep the compiler from leaving them out.
-  subroutine read_ahead(self, sim, disks)
-    class(cell_grid_t), intent(inout) :: self
+  subroutine read_ahead(self, sim, stage, disks)
+    class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: stage
     integer(int32), intent(in) :: disks(:)
-    integer(int32) :: k
-    self%last_read = 0
-    do k = 1, size(disks)
-      self%last_read = self%last_read + sim%disk(disks(k))%event_time &
-        + sum_around(self%cells%cell, cell_number(self, sim%tag(disks(k))%cell), self%step(2), sim%disk)
-    end do
+    call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
   end subroutine read_ahead
 
   !> Whether disk i may meet anything but small disks and walls.

@@ -1,11 +1,12 @@
 !> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
 !> A cell with more of them chains the surplus behind its last disk.
 module cells
-  use kinds, only: int32, int64, real64
-  use disks, only: disk_t
+  use kinds, only: int32, int64
+  use disks, only: disk_t, tag_t
+  use memory_hints, only: advise_huge_pages, prefetch
   implicit none
   private
-  public :: cell_t, cells_t, gather, list_capacity, sum_around
+  public :: cell_t, cells_t, gather, list_capacity
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
@@ -17,7 +18,7 @@ module cells
   !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
   !> in its lower half, and in its upper half the crowded cells among the nine around this one; and it holds a mark.
   type :: cell_t
-    integer(int32) :: slot(count_slot) = 0
+    integer(int32) :: slot(count_slot)
   contains
     procedure :: in_slots
     procedure :: near_crowd
@@ -34,6 +35,7 @@ module cells
     procedure :: insert
     procedure :: remove
     procedure :: chain
+    procedure :: read_ahead
     procedure, private :: count_crowd
   end type cells_t
 
@@ -48,7 +50,10 @@ contains
     if (allocated(self%cell)) then
       if (size(self%cell) /= stride*rows .or. size(self%next) /= n_disks) deallocate (self%cell, self%next)
     end if
-    if (.not. allocated(self%cell)) allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
+    if (.not. allocated(self%cell)) then
+      allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
+      call advise_huge_pages(self%cell(0)%slot(1), size(self%cell)*storage_size(self%cell, int64)/8)
+    end if
     do c = 0, stride*rows - 1
       self%cell(c)%slot = 0
     end do
@@ -195,17 +200,63 @@ contains
 
   end subroutine gather
 
-  !> A sum over the first disks of the nine cells around c, which are in the cache thereafter.
-  pure function sum_around(cell, c, stride, disk) result(total)
-    type(cell_t), intent(in) :: cell(0:*)
-    integer(int32), intent(in) :: c, stride
-    type(disk_t), intent(in) :: disk(0:*)
-    real(real64) :: total
-    integer(int32) :: k
-    total = 0
-    do k = c - stride, c + stride, stride
-      total = total + disk(cell(k - 1)%slot(1))%x(1) + disk(cell(k)%slot(1))%x(1) + disk(cell(k + 1)%slot(1))%x(1)
+  !> Asks for what predictions for some disks will need: what describes a disk, its cells, the disks in them; and of its
+  !> partner, one stage later, the same but for the disks, most of which are among the first ones.
+  subroutine read_ahead(self, disk, tag, stage, disks)
+    class(cells_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: stage
+    integer(int32), intent(in) :: disks(:)
+    integer(int32) :: k, partner
+    do k = 1, size(disks)
+      select case (stage)
+      case (1)
+        call fetch(disks(k))
+      case (2)
+        call fetch_cells(cell_of(disks(k)))
+        partner = disk(disks(k))%partner
+        if (partner > 0) call fetch(partner)
+      case default
+        call fetch_disks(cell_of(disks(k)))
+        partner = disk(disks(k))%partner
+        if (partner > 0) call fetch_cells(cell_of(partner))
+      end select
     end do
-  end function sum_around
+  contains
+
+    pure function cell_of(i) result(c)
+      integer(int32), intent(in) :: i
+      integer(int32) :: c
+      c = tag(i)%cell(1) + self%stride*tag(i)%cell(2)
+    end function cell_of
+
+    subroutine fetch(i)
+      integer(int32), intent(in) :: i
+      call prefetch(tag(i)%species)                ! a tag lies on one line or two
+      call prefetch(tag(i)%partner_stamp)
+      call prefetch(disk(i)%stamp)
+    end subroutine fetch
+
+    subroutine fetch_cells(c)
+      integer(int32), intent(in) :: c
+      integer(int32) :: m
+      do m = c - self%stride, c + self%stride, self%stride
+        call prefetch(self%cell(m - 1)%slot(1))    ! three cells lie on one line or two
+        call prefetch(self%cell(m + 1)%slot(count_slot))
+      end do
+    end subroutine fetch_cells
+
+    subroutine fetch_disks(c)
+      integer(int32), intent(in) :: c
+      integer(int32) :: m, l
+      do m = c - self%stride, c + self%stride, self%stride
+        do l = m - 1, m + 1
+          call prefetch(disk(self%cell(l)%slot(1) + 1)%x(1))
+        end do
+      end do
+    end subroutine fetch_disks
+
+  end subroutine read_ahead
 
 end module cells

@@ -239,8 +239,8 @@ contains
     integer(int32), allocatable :: numbers(:)
     integer :: n
     n = sum(sim%species%count)
-    if (allocated(sim%disk)) deallocate (sim%disk, sim%tag)
-    allocate (sim%disk(n), sim%tag(n), reals(n), numbers(n))
+    call sim%make_disks(n)
+    allocate (reals(n), numbers(n))
     reals = 0
     numbers = 1
     call file%fetch("disks/x1", n, reals)

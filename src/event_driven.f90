@@ -8,7 +8,7 @@ module event_driven
   use box_geometry, only: first_obstacle
   use encounters, only: collide, collide_pair, pass_side, passes
   use errors, only: error_t, exit_broken, fail
-  use event_queue, only: event_queue_t, most_coming
+  use event_queue, only: event_queue_t, most_coming, stages
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: first_crossing, neighbour_search_t
   use renumbering, only: renumber
@@ -167,9 +167,11 @@ contains
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(inout) :: look
-    integer(int32) :: n, disks(most_coming)
-    call self%queue%coming(n, disks)
-    call self%search%read_ahead(sim, disks(:n))
+    integer(int32) :: stage, n, disks(most_coming)
+    do stage = 1, stages
+      call self%queue%coming(sim%tag, stage, n, disks)
+      call self%search%read_ahead(sim, stage, disks(:n))
+    end do
     look = min(look, sim%events + events_ahead)
   end subroutine read_ahead
 

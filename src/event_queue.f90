@@ -12,14 +12,14 @@ module event_queue
   use event_heap, only: event_heap_t, event_t, need_order, precedes
   implicit none
   private
-  public :: event_queue_t, most_coming
+  public :: event_queue_t, most_coming, stages
 
   integer(int32), parameter :: list_capacity = 64
   integer(int32), parameter :: bucket_capacity = 15
-  !> Buckets: most events of few disks, those of many should leave the cache to the disks.
-  integer(int32), parameter :: long_ring = 2048, short_ring = 512, few = 5000
-  integer(int32), parameter :: windows_ahead = 16  !! to announce
-  integer(int32), parameter :: most_coming = windows_ahead*bucket_capacity   !! disks announced at once
+  integer(int32), parameter :: few = 5000          !! disks, nearly all of whose events may have buckets
+  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]               !! to announce, stage by stage
+  integer(int32), parameter :: stages = size(windows_ahead)
+  integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity  !! disks announced at once
   integer(int32), parameter :: nowhere = -1        !! as tag%window
   real(real64), parameter :: last_window = 2.0e9_real64
   real(real64), parameter :: events_per_window = 4.0_real64
@@ -56,7 +56,7 @@ module event_queue
     integer(int32) :: window = 0                   !! number of the current window since the epoch
     integer(int32) :: ring_end = 0                 !! the first window that has no bucket yet
     integer(int32) :: n_disks = 0
-    integer(int32) :: announced = 0                !! the last window that was announced
+    integer(int32) :: announced(stages) = 0        !! the last window that was announced
     real(real64) :: width = never                  !! of a window [time]
     real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
@@ -73,7 +73,6 @@ module event_queue
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
-    procedure, private :: drop_from_heap
     procedure, private :: open_next_window
     procedure, private :: take_from_heap
     procedure, private :: open_next_span
@@ -114,12 +113,14 @@ contains
     end do
   end subroutine fill
 
-  !> Empty buckets and spans, enough to hold most events: twice as many as there are disks.
+  !> Empty buckets and spans, enough to hold most events: twice as many as there are disks. Those of many disks should
+  !> leave the cache to the disks, and be about as many buckets as spans, as all are written to by turns.
   subroutine make_rings(self)
     class(event_queue_t), intent(inout) :: self
-    integer(int32) :: s
+    integer(int32) :: s, length
+    length = min(2*self%n_disks, merge(2048, max(512, 3*nint(sqrt(real(self%n_disks)))), self%n_disks <= few))
     self%log_span = 3
-    do while (shiftl(2_int32, self%log_span) < min(2*self%n_disks, merge(long_ring, short_ring, self%n_disks <= few)))
+    do while (shiftl(2_int32, self%log_span) < length)
       self%log_span = self%log_span + 1
     end do
     self%last_bucket = shiftl(2_int32, self%log_span) - 1
@@ -225,16 +226,11 @@ contains
     span(s)%n = n
   end subroutine file_far
 
-  !> Makes room for more entries of a span.
+  !> Makes room for as many entries of a span again.
   subroutine lengthen(self, s)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: s
-    type(entry_t), allocatable :: longer(:)
-    associate (span => self%span(s))
-      allocate (longer(2*size(span%entry)))
-      longer(:span%n) = span%entry(:span%n)
-      call move_alloc(longer, span%entry)
-    end associate
+    self%span(s)%entry = [self%span(s)%entry, self%span(s)%entry]
   end subroutine lengthen
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
@@ -336,16 +332,10 @@ contains
     if (self%n_list > 0) then
       self%n_list = self%n_list - 1
     else
-      call self%drop_from_heap(i)
+      call self%heap%remove(i)
     end if
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
-
-  subroutine drop_from_heap(self, i)
-    class(event_queue_t), intent(inout) :: self
-    integer(int32), intent(in) :: i
-    call self%heap%remove(i)
-  end subroutine drop_from_heap
 
   !> Tells that the event of disk i is void by now. Only saves time: of a collision that both disks expected
   !> the second entry comes right after the first.
@@ -355,22 +345,30 @@ contains
     self%n_list = self%n_list - merge(1, 0, self%list(self%n_list)%disk == i)
   end subroutine forget
 
-  !> Announces disks that probably have events in the next windows, each window once.
-  subroutine coming(self, n, disks)
+  !> Announces disks that probably have events in the next windows, each window once at each stage, the earlier the
+  !> lower. After the first stage only those whose entry is not void.
+  subroutine coming(self, tag, stage, n, disks)
     class(event_queue_t), intent(inout) :: self
+    type(tag_t), intent(in) :: tag(*)
+    integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
     integer(int32), intent(out) :: disks(most_coming)    !! (n)
-    integer(int32) :: window, last
+    integer(int32) :: window, last, k
+    logical :: expected
     n = 0
     if (.not. self%calendar) return
-    last = min(self%window + windows_ahead, self%ring_end - 1)
-    do window = max(self%announced, self%window) + 1, last
+    last = min(self%window + windows_ahead(stage), self%ring_end - 1)
+    do window = max(self%announced(stage), self%window) + 1, last
       associate (bucket => self%bucket(iand(window, self%last_bucket)))
-        disks(n + 1:n + bucket%n) = bucket%disk(:bucket%n)
-        n = n + bucket%n
+        do k = 1, bucket%n
+          disks(n + 1) = bucket%disk(k)
+          expected = stage == 1
+          if (.not. expected) expected = tag(bucket%disk(k))%window == window
+          n = n + merge(1, 0, expected)
+        end do
       end associate
     end do
-    self%announced = last
+    self%announced(stage) = last
   end subroutine coming
 
   !> What disk i expects.

@@ -62,11 +62,10 @@ contains
   end subroutine describe_system
 
   !> The disks with all that follows from their species, in the order of the input.
-  pure subroutine list_disks(sim)
+  subroutine list_disks(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: s, i, k
-    k = sum(sim%species%count)
-    allocate (sim%disk(k), sim%tag(k))
+    call sim%make_disks(sum(sim%species%count))
     k = 0
     do s = 1, size(sim%species, kind=int32)
       do i = 1, sim%species(s)%count

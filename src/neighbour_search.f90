@@ -58,10 +58,12 @@ contains
     call self%predict(sim, j)
   end subroutine predict_both
 
-  !> Reads what the next predictions for some disks will need, so that it is in the cache by then.
-  subroutine read_ahead(self, sim, disks)
-    class(neighbour_search_t), intent(inout) :: self
+  !> Asks for what the next predictions for some disks will need, so that it is in the cache by then. At each stage
+  !> that can be found out from what was asked for at those before.
+  subroutine read_ahead(self, sim, stage, disks)
+    class(neighbour_search_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: stage       !! from 1
     integer(int32), intent(in) :: disks(:)
   end subroutine read_ahead
 
