@@ -9,6 +9,7 @@ module cell_grid
   use cells, only: cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
+  use memory_hints, only: prefetch
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use obstacle_lists, only: obstacle_lists_t
   use simulation_state, only: simulation_t
@@ -168,7 +169,12 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: stage
     integer(int32), intent(in) :: disks(:)
+    integer(int32) :: k
     call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
+    if (.not. self%keeps_contacts .or. stage > 1) return
+    do k = 1, size(disks)
+      call prefetch(self%contact(disks(k))%time)
+    end do
   end subroutine read_ahead
 
   !> Whether disk i may meet anything but small disks and walls.
