@@ -12,8 +12,9 @@
 MAKEFLAGS += --no-print-directory
 comma := ,
 BUILD ?= build$(if $(DEBUG),/debug)
+$(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder may hold no space))
 ARCH ?= native
-OPT ?= $(if $(DEBUG),-O0,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
+OPT ?= $(if $(DEBUG),-O0 -Wno-maybe-uninitialized,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
 hot := -flto -flto-partition=none -finline-limit=600 -funswitch-loops --param=max-unswitch-insns=300 \
   -fno-trapping-math -fno-tree-vectorize
@@ -57,7 +58,7 @@ $(BUILD)/%.o: src/%.f90 $(BUILD)/flags
 # The one thing that Fortran cannot say, by the same driver; link-time optimisation makes it an instruction.
 $(BUILD)/%_c.o: src/%.c $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) -Wall -Wextra $(filter -O% -g -march=% -flto%,$(flags)) -c -o $@ $<
+	$(Q)$(FC) -Wall -Wextra $(filter -O% -g -march=% -flto% -Werror,$(flags)) -c -o $@ $<
 
 $(BUILD)/build_info.o: $(BUILD)/build_info.f90 $(BUILD)/flags
 	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<

@@ -229,10 +229,14 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code          !! the disk that just collided, and with whom
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: remedy
+    remedy = ""
+    if (code <= 0 .and. sim%box%falling()) remedy = "; a disk that starts at rest on a wall never leaves it: " &
+      //"start it higher, or take run.dynamics = 'steps'"
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
       "inelastic collapse, the clock stands still: "//moment(sim, i, code)//"; set contact.contact_time " &
       //"(TC model), well below the mean time between collisions, or raise " &
-      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0)))
+      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))//remedy)
     self%next_watch = sim%events + events_per_watch(sim)
     self%last_look = sim%now
   end subroutine watch

@@ -53,7 +53,7 @@ def test_promises_are_held_by_tests_that_exist():
 def test_scripts_and_inputs_that_are_named_exist(page):
     folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
     named = re.findall(rf"\b((?:{folders})/\w+\.(?:{endings})\b)", page.read_text())
-    mine = {"input/mine.nml"}
+    mine = {"runs/mine.nml"}
     missing = [name for name in named if not (ROOT / name).exists()]
     assert [name for name in missing if name not in mine and name == name.lower()] == []
 
