@@ -147,12 +147,12 @@ contains
     else                                           ! forward, or, if gravity turns the disk before, back
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
-      up = merge(1, 0, v + g*moment(now) > 0)
+      up = merge(1, 0, v > -g*moment(now))
       sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
       gap = max(sense*(line(up)%place - x), 0.0_real64)
-      disc = v*v + 2*sense*g*gap
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! not zero if at rest on the face
       if (disc >= 0) then
-        t = now + 2*gap/max(abs(v) + sqrt(disc), tiny(v))     ! at rest on the face: now
+        t = now + 2*gap/(abs(v) + sqrt(disc))
       else
         up = 1 - up
         gap = max(sense*(x - line(up)%place), 0.0_real64)
