@@ -3,7 +3,7 @@
 !> So a small disk asks its own cell alone for big ones, and a big disk looks through the ring of cells
 !> along its rim: nobody pays for a size that is not near.
 module big_disks
-  use kinds, only: int16, int32, real64
+  use kinds, only: int32, real64
   use disks, only: disk_t
   use simulation_state, only: simulation_t
   implicit none
@@ -42,7 +42,6 @@ module big_disks
     real(real64), private :: width(2) = 0.0_real64    !! of a cell [length]
   contains
     procedure :: start
-    procedure :: concern
     procedure :: number_of
     procedure :: register
   end type big_disks_t
@@ -73,8 +72,8 @@ contains
     integer(int32) :: i, k
     self%disk = pack([(i, i=1, sim%n_disks())], sim%disk%radius > small)
     self%count = size(self%disk, kind=int32)
-    if (self%count == 0) return
     self%small = small
+    if (self%count == 0) return
     self%width = width
     self%margin = 0.5_real64*minval(width)
     if (allocated(self%ring)) deallocate (self%ring, self%centre, self%first, self%entry)
@@ -86,16 +85,6 @@ contains
       call self%register(sim, k)
     end do
   end subroutine start
-
-  !> Whether a disk is a big one, or may meet one in its cell.
-  pure function concern(self, disk, cell) result(yes)
-    class(big_disks_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)        !! column and row, of a small disk
-    logical :: yes
-    yes = disk%radius > self%small
-    if (.not. yes) yes = self%first(cell(1), cell(2)) > 0
-  end function concern
 
   !> Which of the big disks disk i is; 0 if none.
   pure function number_of(self, i) result(k)

@@ -1,6 +1,5 @@
 !> Search by cells: the box is cut into cells at least one diameter wide, so that a disk meets only those in
 !> its own cell and the eight around it before it leaves its cell, which is an event like any other.
-!> The cost of a prediction does not depend on the number of disks.
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius
@@ -29,7 +28,6 @@ module cell_grid
     integer(int32) :: partner = 0                  !! 0: none
     integer(int32) :: stamp = 0                    !! the partner's when this was predicted
   end type contact_t
-
   integer(int32), parameter :: unknown = -1        !! as partner of a contact
 
   !> What is around a disk. Not initialised: it is made for each prediction.
@@ -44,7 +42,6 @@ module cell_grid
   type, extends(neighbour_search_t) :: cell_grid_t
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
-    integer(int32) :: step(2) = 0                  !! from cell to cell: to the next column, to the next row
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
     logical :: special = .false.                   !! more than small disks and walls
     logical :: obstructed = .false.                !! there are obstacles
@@ -60,7 +57,7 @@ module cell_grid
     procedure :: cross
     procedure :: read_ahead
     procedure, private :: predict_special
-    procedure, private :: scan_crowd
+    procedure, private :: scan_crowd, mark_ring
   end type cell_grid_t
 
 contains
@@ -77,13 +74,12 @@ contains
     self%keeps_contacts = width > reach
     width = max(width, reach)
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
-    self%step = [1, self%n(1) + 2]
     call self%faces%set(sim%box, self%n)
-    call self%cells%empty(self%step(2), self%n(2) + 2, sim%n_disks())
+    call self%cells%empty(self%n(1) + 2, self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       x = (sim%position(i) - sim%box%lower)/self%faces%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      if (.not. sim%disk(i)%radius > small) call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
+      if (.not. sim%disk(i)%radius > small) call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
     end do
     self%obstructed = sim%box%obstructed()
     if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width)
@@ -94,27 +90,32 @@ contains
     if (self%special) call mark_special_cells(self)
   end subroutine build
 
-  !> Marks the cells where a disk may meet an obstacle or others beyond a periodic side.
+  !> Marks the cells where a disk may meet an obstacle, a big disk, or others beyond a periodic side.
   subroutine mark_special_cells(self)
     class(cell_grid_t), intent(inout) :: self
     integer(int16) :: ix, iy
-    logical :: special
+    integer(int32) :: k, marks
     do iy = 1, int(self%n(2), int16)
       do ix = 1, int(self%n(1), int16)
-        special = at_periodic_edge(self, [ix, iy])
-        if (self%obstructed) special = special .or. self%obstacles%reach_into([ix, iy])
-        if (special) call self%cells%mark(cell_number(self, [ix, iy]))
+        marks = merge(1, 0, at_periodic_edge(self, [ix, iy]))
+        if (self%obstructed) marks = marks + merge(1, 0, self%obstacles%reach_into([ix, iy]))
+        call self%cells%mark(self%cells%number([ix, iy]), marks)
       end do
+    end do
+    do k = 1, self%big%count
+      call self%mark_ring(k, 1)
     end do
   end subroutine mark_special_cells
 
-  !> Number of the cell in column cell(1) and row cell(2), both from 1.
-  pure function cell_number(self, cell) result(c)
-    class(cell_grid_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(2)
-    integer(int32) :: c
-    c = cell(1) + self%step(2)*cell(2)
-  end function cell_number
+  !> Marks the cells along the rim of a big disk (1), or takes the marks back (-1).
+  subroutine mark_ring(self, number, change)
+    class(cell_grid_t), intent(inout) :: self
+    integer(int32), intent(in) :: number, change
+    integer :: m
+    do m = 1, size(self%big%ring(number)%at)
+      call self%cells%mark(self%cells%number(int(self%big%ring(number)%at(m)%cell, int16)), change)
+    end do
+  end subroutine mark_ring
 
   !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
   !> predicts what it meets there.
@@ -123,29 +124,31 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: face, axis, there, way
+    integer(int32) :: face, axis, there, way, number, step(2)
     logical :: known                               !! the contact that i expects, over the face
-    if (self%big%count > 0) then
-      if (sim%disk(i)%radius > self%big%small) then
-        call self%big%register(sim, self%big%number_of(i))
-        call self%predict(sim, i)
-        return
-      end if
+    if (sim%disk(i)%radius > self%big%small) then
+      number = self%big%number_of(i)
+      call self%mark_ring(number, -1)
+      call self%big%register(sim, number)
+      call self%mark_ring(number, 1)
+      call self%predict(sim, i)
+      return
     end if
     face = -merge(code - first_crossing, code, code <= first_crossing)
     axis = 1 + face/2
     way = 2*modulo(face, 2) - 1
-    call self%cells%remove(cell_number(self, sim%tag(i)%cell), i)
+    call self%cells%remove(self%cells%number(sim%tag(i)%cell), i)
     there = sim%tag(i)%cell(axis) + way
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
     sim%tag(i)%cell(axis) = int(there, int16)
-    call self%cells%insert(cell_number(self, sim%tag(i)%cell), i)
+    call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
+    step = [1, self%cells%stride]                  ! to the next column, to the next row
     known = self%keeps_contacts
     if (known .and. self%special) known = .not. is_special(self, sim, i)
     if (known) known = self%contact(i)%partner /= unknown
     if (known) call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, &
-      self%faces%falling, i, way*self%step(axis), self%step(3 - axis))
+      self%faces%falling, i, way*step(axis), step(3 - axis))
     if (.not. known) call self%predict(sim, i)
   end subroutine cross
 
@@ -183,9 +186,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     logical :: yes
-    yes = .false.
-    if (self%big%count > 0) yes = self%big%concern(sim%disk(i), sim%tag(i)%cell)
-    if (.not. yes) yes = self%cells%cell(cell_number(self, sim%tag(i)%cell))%is_marked()
+    yes = self%cells%cell(self%cells%number(sim%tag(i)%cell))%is_marked() .or. sim%disk(i)%radius > self%big%small
   end function is_special
 
   !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
@@ -247,8 +248,8 @@ contains
     integer(int32), intent(in) :: i
     type(outlook_t), intent(out) :: near
     call self%faces%next(disk, tag%cell, now, falling, near%time, near%code)
-    near%cell = cell_number(self, tag%cell)
-    call gather(cell, near%cell, self%step(2), i, near%list, near%n)
+    near%cell = self%cells%number(tag%cell)
+    call gather(cell, near%cell, self%cells%stride, i, near%list, near%n)
   end subroutine look_around
 
   !> Writes into disk i the first of what it can expect.
@@ -300,7 +301,7 @@ contains
     call self%faces%next(disk(i), tag%cell, now, falling, near%time, near%code)
     t = contact%time
     code = contact%partner
-    near%cell = cell_number(self, tag%cell)
+    near%cell = self%cells%number(tag%cell)
     near%n = 0
     do k = near%cell + ahead - along, near%cell + ahead + along, along
       near%list(near%n + 1:near%n + size(cell(k)%slot)) = cell(k)%slot
@@ -336,36 +337,37 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64) :: t
-    integer(int32) :: code, c, n, list(list_capacity)
-    if (self%big%count > 0 .and. sim%disk(i)%radius > self%big%small) then
-      call predict_big(self, sim, i)
-      return
-    end if
-    call self%faces%next(sim%disk(i), sim%tag(i)%cell, sim%now, self%faces%falling, t, code)
-    c = cell_number(self, sim%tag(i)%cell)
-    if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
-    if (at_periodic_edge(self, sim%tag(i)%cell)) then
-      call scan_around_edge(self, sim, i, t, code)
+    integer(int32) :: code
+    if (sim%disk(i)%radius > self%big%small) then
+      call foresee_big(self, sim, i, t, code)
     else
-      call gather(self%cells%cell, c, self%step(2), i, list, n)
-      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
-        self%faces%box%gravity, .false., no_shift, t, code)
-      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
+      call foresee_small(self, sim, i, t, code)
     end if
-    if (self%big%count > 0) call scan_big_ones(self, sim, i, t, code)
     sim%disk(i)%event_time = t
     sim%disk(i)%partner = code
     sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
   end subroutine predict_special
 
-  !> Contacts of a small disk with the big ones that can be near its cell.
-  subroutine scan_big_ones(self, sim, i, t, code)
+  !> The earliest event of a small disk in a marked cell.
+  subroutine foresee_small(self, sim, i, t, code)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    integer(int32) :: e
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    integer(int32) :: c, n, e, list(list_capacity)
+    call self%faces%next(sim%disk(i), sim%tag(i)%cell, sim%now, self%faces%falling, t, code)
+    c = self%cells%number(sim%tag(i)%cell)
+    if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
+    if (at_periodic_edge(self, sim%tag(i)%cell)) then
+      call scan_around_edge(self, sim, i, t, code)
+    else
+      call gather(self%cells%cell, c, self%cells%stride, i, list, n)
+      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
+        self%faces%box%gravity, .false., no_shift, t, code)
+      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
+    end if
+    if (self%big%count == 0) return
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
@@ -374,16 +376,18 @@ contains
         e = entry%next
       end associate
     end do
-  end subroutine scan_big_ones
+  end subroutine foresee_small
 
   !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
   !> the cells along its rim.
-  subroutine predict_big(self, sim, i)
+  subroutine foresee_big(self, sim, i, t, code)
     class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64) :: t, t_margin
-    integer(int32) :: code, number, ix, iy, m
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_margin
+    integer(int32) :: number, ix, iy, m
     number = self%big%number_of(i)
     call next_side(sim%box, sim%disk(i), t, code)
     if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
@@ -400,14 +404,11 @@ contains
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
-        call scan_cell(self, sim, i, place%cell(1) + self%step(2)*place%cell(2), &
+        call scan_cell(self, sim, i, place%cell(1) + self%cells%stride*place%cell(2), &
           -place%image*sim%box%edges(), t, code)
       end associate
     end do
-    sim%disk(i)%event_time = t
-    sim%disk(i)%partner = code
-    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
-  end subroutine predict_big
+  end subroutine foresee_big
 
   !> Whether the cells around lie partly beyond a periodic side.
   pure function at_periodic_edge(self, cell) result(yes)
@@ -425,7 +426,7 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: k, m
-    do k = c - self%step(2), c + self%step(2), self%step(2)
+    do k = c - self%cells%stride, c + self%cells%stride, self%cells%stride
       do m = k - 1, k + 1
         call scan_chain(self, disk, i, m, no_shift, t, code)
       end do
@@ -468,7 +469,7 @@ contains
         there = sim%tag(i)%cell + [dx, dy]
         image = merge(merge(1, 0, there > self%n) - merge(1, 0, there < 1), 0, sim%box%periodic)
         there = there - image*self%n
-        c = there(1) + self%step(2)*there(2)
+        c = there(1) + self%cells%stride*there(2)
         if (any(image /= 0)) then
           call scan_cell(self, sim, i, c, image*sim%box%edges(), t, code)
         else

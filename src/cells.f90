@@ -1,7 +1,7 @@
 !> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
 !> A cell with more of them chains the surplus behind its last disk.
 module cells
-  use kinds, only: int32, int64
+  use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
   use memory_hints, only: advise_huge_pages, prefetch
   implicit none
@@ -30,6 +30,7 @@ module cells
     type(cell_t), allocatable :: cell(:)         !! (0:)
     integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
   contains
+    procedure :: number
     procedure :: empty
     procedure :: mark
     procedure :: insert
@@ -40,6 +41,14 @@ module cells
   end type cells_t
 
 contains
+
+  !> Of the cell in column cell(1) and row cell(2), both from 1.
+  pure function number(self, cell) result(c)
+    class(cells_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    integer(int32) :: c
+    c = cell(1) + self%stride*cell(2)
+  end function number
 
   !> Makes rows of `stride` empty cells for n_disks disks.
   subroutine empty(self, stride, rows, n_disks)
@@ -59,11 +68,11 @@ contains
     end do
   end subroutine empty
 
-  !> Marks cell c until all are emptied.
-  pure subroutine mark(self, c)
+  !> Gives cell c a mark more (1), or takes one back (-1); there can be 127.
+  pure subroutine mark(self, c, change)
     class(cells_t), intent(inout) :: self
-    integer(int32), intent(in) :: c
-    self%cell(c)%slot(count_slot) = ior(self%cell(c)%slot(count_slot), marked)
+    integer(int32), intent(in) :: c, change
+    self%cell(c)%slot(count_slot) = self%cell(c)%slot(count_slot) + change*marked
   end subroutine mark
 
   !> Puts disk i into cell c.
@@ -214,22 +223,16 @@ contains
       case (1)
         call fetch(disks(k))
       case (2)
-        call fetch_cells(cell_of(disks(k)))
+        call fetch_cells(self%number(tag(disks(k))%cell))
         partner = disk(disks(k))%partner
         if (partner > 0) call fetch(partner)
       case default
-        call fetch_disks(cell_of(disks(k)))
+        call fetch_disks(self%number(tag(disks(k))%cell))
         partner = disk(disks(k))%partner
-        if (partner > 0) call fetch_cells(cell_of(partner))
+        if (partner > 0) call fetch_cells(self%number(tag(partner)%cell))
       end select
     end do
   contains
-
-    pure function cell_of(i) result(c)
-      integer(int32), intent(in) :: i
-      integer(int32) :: c
-      c = tag(i)%cell(1) + self%stride*tag(i)%cell(2)
-    end function cell_of
 
     subroutine fetch(i)
       integer(int32), intent(in) :: i
