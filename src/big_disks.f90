@@ -8,7 +8,7 @@ module big_disks
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: big_disks_t, largest_small_radius
+  public :: big_disks_t, largest_small_radius, ring_cell_t
 
   integer(int32), parameter :: most = 256        !! they test each other all with all
 

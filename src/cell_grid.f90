@@ -2,7 +2,7 @@
 !> its own cell and the eight around it before it leaves its cell, which is an event like any other.
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use big_disks, only: big_disks_t, largest_small_radius
+  use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
   use cell_faces, only: cell_faces_t
   use cells, only: cell_t, cells_t, gather, list_capacity
@@ -19,7 +19,6 @@ module cell_grid
   real(real64), parameter :: no_shift(2) = 0.0_real64
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
-
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
 
   !> The first contact of a disk with those in the cells around, beyond the end of its cell too.
@@ -57,7 +56,7 @@ module cell_grid
     procedure :: cross
     procedure :: read_ahead
     procedure, private :: predict_special
-    procedure, private :: scan_crowd, mark_ring
+    procedure, private :: scan_crowd, follow_big
   end type cell_grid_t
 
 contains
@@ -68,6 +67,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     real(real64) :: small, reach, width, x(2)
     integer(int32) :: i
+    integer(int16) :: ix, iy
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
     width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
@@ -87,35 +87,39 @@ contains
     if (allocated(self%contact)) deallocate (self%contact)
     allocate (self%contact(merge(sim%n_disks(), 0, self%keeps_contacts)))
     self%special = any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0
-    if (self%special) call mark_special_cells(self)
-  end subroutine build
-
-  !> Marks the cells where a disk may meet an obstacle, a big disk, or others beyond a periodic side.
-  subroutine mark_special_cells(self)
-    class(cell_grid_t), intent(inout) :: self
-    integer(int16) :: ix, iy
-    integer(int32) :: k, marks
+    if (.not. self%special) return
     do iy = 1, int(self%n(2), int16)
       do ix = 1, int(self%n(1), int16)
-        marks = merge(1, 0, at_periodic_edge(self, [ix, iy]))
-        if (self%obstructed) marks = marks + merge(1, 0, self%obstacles%reach_into([ix, iy]))
-        call self%cells%mark(self%cells%number([ix, iy]), marks)
+        call mark_special(self, [ix, iy])
       end do
     end do
-    do k = 1, self%big%count
-      call self%mark_ring(k, 1)
-    end do
-  end subroutine mark_special_cells
+  end subroutine build
 
-  !> Marks the cells along the rim of a big disk (1), or takes the marks back (-1).
-  subroutine mark_ring(self, number, change)
+  !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side.
+  subroutine mark_special(self, cell)
     class(cell_grid_t), intent(inout) :: self
-    integer(int32), intent(in) :: number, change
+    integer(int16), intent(in) :: cell(2)
+    logical :: yes
+    yes = at_periodic_edge(self, cell)
+    if (self%obstructed) yes = yes .or. self%obstacles%reach_into(cell)
+    if (self%big%count > 0) yes = yes .or. self%big%first(cell(1), cell(2)) > 0
+    call self%cells%mark(self%cells%number(cell), yes)
+  end subroutine mark_special
+
+  !> Registers a big disk anew. The cells it leaves and those it comes to change their marks.
+  subroutine follow_big(self, sim, number)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: number
+    type(ring_cell_t), allocatable :: ring(:)
     integer :: m
-    do m = 1, size(self%big%ring(number)%at)
-      call self%cells%mark(self%cells%number(int(self%big%ring(number)%at(m)%cell, int16)), change)
+    allocate (ring, source=self%big%ring(number)%at)
+    call self%big%register(sim, number)
+    ring = [ring, self%big%ring(number)%at]
+    do m = 1, size(ring)
+      call mark_special(self, int(ring(m)%cell, int16))
     end do
-  end subroutine mark_ring
+  end subroutine follow_big
 
   !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
   !> predicts what it meets there.
@@ -124,13 +128,10 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: face, axis, there, way, number, step(2)
+    integer(int32) :: face, axis, there, way, step(2)
     logical :: known                               !! the contact that i expects, over the face
     if (sim%disk(i)%radius > self%big%small) then
-      number = self%big%number_of(i)
-      call self%mark_ring(number, -1)
-      call self%big%register(sim, number)
-      call self%mark_ring(number, 1)
+      call self%follow_big(sim, self%big%number_of(i))
       call self%predict(sim, i)
       return
     end if

@@ -68,11 +68,14 @@ contains
     end do
   end subroutine empty
 
-  !> Gives cell c a mark more (1), or takes one back (-1); there can be 127.
-  pure subroutine mark(self, c, change)
+  !> Marks cell c, or takes its mark away.
+  pure subroutine mark(self, c, yes)
     class(cells_t), intent(inout) :: self
-    integer(int32), intent(in) :: c, change
-    self%cell(c)%slot(count_slot) = self%cell(c)%slot(count_slot) + change*marked
+    integer(int32), intent(in) :: c
+    logical, intent(in) :: yes
+    associate (count => self%cell(c)%slot(count_slot))
+      count = merge(ior(count, marked), iand(count, not(marked)), yes)
+    end associate
   end subroutine mark
 
   !> Puts disk i into cell c.
