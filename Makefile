@@ -16,8 +16,8 @@ $(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder may hold no space))
 ARCH ?= native
 OPT ?= $(if $(DEBUG),-O0 -Wno-maybe-uninitialized,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
-hot := -flto -flto-partition=none -finline-limit=600 -funswitch-loops --param=max-unswitch-insns=300 \
-  -fno-trapping-math -fno-tree-vectorize
+hot := -flto -flto-partition=none -finline-limit=600 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
+  --param=ipa-cp-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument $(OPT)
 
@@ -29,6 +29,8 @@ FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): gfortran or HDF5 for Fortran 
 endif
 hdf5_flags := $(filter -I%,$(hdf5))
 hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
+# Arrays on cache lines: see src/memory_hints.c.
+libraries = -Wl,--wrap=malloc $(hdf5_libs)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
 flags = $(FFLAGS) $(CHECKS) -ffp-contract=off -ffpe-summary=none
 
@@ -49,7 +51,7 @@ all: $(BUILD)/ricochet  ## builds the program (default)
 
 $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(hdf5_libs)
+	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(libraries)
 
 $(BUILD)/%.o: src/%.f90 $(BUILD)/flags
 	@echo "compile $<"
@@ -129,7 +131,7 @@ unit-tests: $(BUILD)/unit_tests
 
 $(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(shared_objects) $(objects)
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(hdf5_libs)
+	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(libraries)
 
 $(BUILD)/test_%.F90: $(suites)/test_%.pf tests/support/translate_pf.py
 	$(Q)$(translate)

@@ -7,8 +7,7 @@ module disks
   public :: disk_t, tag_t, species_t
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it leaves through a
-  !> periodic side); everybody else sees it by extrapolation. Hot fields first: allocation aligns to 16
-  !> bytes, so the first 48 always share one cache line.
+  !> periodic side); everybody else sees it by extrapolation.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]

@@ -1,5 +1,6 @@
 /* Hints about memory, for which Fortran has no words. They change nothing but the time that a run takes. */
 #include <stdint.h>
+#include <stdlib.h>
 #ifdef __linux__
 #include <linux/mman.h>
 #include <sys/mman.h>
@@ -20,4 +21,13 @@ void advise_huge_pages(const void *address, int64_t bytes)
 #else
     (void)address, (void)bytes;
 #endif
+}
+
+/* Large arrays begin with a cache line, so that each record of the size of a line lies on one only. The linker leads
+   all that asks for memory here (--wrap=malloc), as `allocate` has no word for that, either. */
+void *__real_malloc(size_t bytes);
+__attribute__((used)) void *__wrap_malloc(size_t bytes)
+{
+    const size_t line = 64, large = 4096;
+    return bytes < large || bytes > PTRDIFF_MAX ? __real_malloc(bytes) : aligned_alloc(line, (bytes + line - 1) / line * line);
 }
