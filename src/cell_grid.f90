@@ -1,42 +1,26 @@
 !> Search by cells: the box is cut into cells at least one diameter wide, so that a disk meets only those in
 !> its own cell and the eight around it before it leaves its cell, which is an event like any other.
 module cell_grid
-  use kinds, only: int16, int32, never, real64
+  use kinds, only: int16, int32, int64, never, real64
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
   use cell_faces, only: cell_faces_t
-  use cells, only: cell_t, cells_t, gather, list_capacity
+  use cells, only: append, cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use memory_hints, only: prefetch
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use obstacle_lists, only: obstacle_lists_t
+  use outlook, only: choose, contact_t, look_around, outlook_t, unknown
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: cell_grid_t
 
-  real(real64), parameter :: no_shift(2) = 0.0_real64
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
+  real(real64), parameter :: roomy = 1.5_real64             !! width of a cell, in diameters, where contacts are kept
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
-
-  !> The first contact of a disk with those in the cells around, beyond the end of its cell too.
-  type :: contact_t
-    real(real64) :: time = never
-    integer(int32) :: partner = 0                  !! 0: none
-    integer(int32) :: stamp = 0                    !! the partner's when this was predicted
-  end type contact_t
-  integer(int32), parameter :: unknown = -1        !! as partner of a contact
-
-  !> What is around a disk. Not initialised: it is made for each prediction.
-  type :: outlook_t
-    real(real64) :: time                           !! when the disk leaves its cell or meets a side
-    integer(int32) :: code                         !! of the crossing or the side
-    integer(int32) :: cell                         !! its number
-    integer(int32) :: n                            !! number of disks around
-    integer(int32) :: list(list_capacity)          !! (n), counted from 0
-  end type outlook_t
 
   type, extends(neighbour_search_t) :: cell_grid_t
     private
@@ -71,8 +55,8 @@ contains
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
     width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
-    self%keeps_contacts = width > reach
-    width = max(width, reach)
+    self%keeps_contacts = width > roomy*reach
+    if (.not. self%keeps_contacts) width = reach
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     call self%faces%set(sim%box, self%n)
     call self%cells%empty(self%n(1) + 2, self%n(2) + 2, sim%n_disks())
@@ -165,7 +149,11 @@ contains
         return
       end if
     end if
-    call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, self%faces%falling, i)
+    if (self%faces%falling) then
+      call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .true., i)
+    else
+      call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .false., i)
+    end if
   end subroutine predict
 
   subroutine read_ahead(self, sim, stage, disks)
@@ -203,7 +191,11 @@ contains
         return
       end if
     end if
-    call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, self%faces%falling, i, j)
+    if (self%faces%falling) then
+      call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .true., i, j)
+    else
+      call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .false., i, j)
+    end if
   end subroutine predict_both
 
   !> Where there are but small disks and walls.
@@ -214,11 +206,11 @@ contains
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    logical, intent(in) :: falling
-    integer(int32), intent(in) :: i, j
+    logical, value :: falling
+    integer(int32), value :: i, j
     type(outlook_t) :: near_i, near_j
-    call look_around(self, cell, disk(i), tag(i), now, falling, i, near_i)
-    call look_around(self, cell, disk(j), tag(j), now, falling, j, near_j)
+    call look_around(self%faces, self%cells%stride, cell, disk(i), tag(i), now, falling, i, near_i)
+    call look_around(self%faces, self%cells%stride, cell, disk(j), tag(j), now, falling, j, near_j)
     call expect_first(self, cell, contact, disk, tag(i), falling, i, near_i, .true.)
     call expect_first(self, cell, contact, disk, tag(j), falling, j, near_j, .true.)
   end subroutine predict_two
@@ -231,27 +223,12 @@ contains
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    logical, intent(in) :: falling
-    integer(int32), intent(in) :: i
+    logical, value :: falling
+    integer(int32), value :: i
     type(outlook_t) :: near
-    call look_around(self, cell, disk(i), tag(i), now, falling, i, near)
-    call expect_first(self, cell, contact, disk, tag(i), falling, i, near, disk(i)%clock >= now)
+    call look_around(self%faces, self%cells%stride, cell, disk(i), tag(i), now, falling, i, near)
+    call expect_first(self, cell, contact, disk, tag(i), falling, i, near, .false.)
   end subroutine predict_in_bulk
-
-  !> What is around disk i.
-  subroutine look_around(self, cell, disk, tag, now, falling, i, near)
-    class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
-    type(disk_t), intent(in) :: disk
-    type(tag_t), intent(in) :: tag
-    real(real64), intent(in) :: now
-    logical, intent(in) :: falling
-    integer(int32), intent(in) :: i
-    type(outlook_t), intent(out) :: near
-    call self%faces%next(disk, tag%cell, now, falling, near%time, near%code)
-    near%cell = self%cells%number(tag%cell)
-    call gather(cell, near%cell, self%cells%stride, i, near%list, near%n)
-  end subroutine look_around
 
   !> Writes into disk i the first of what it can expect.
   subroutine expect_first(self, cell, contact, disk, tag, falling, i, near, fresh)
@@ -260,8 +237,8 @@ contains
     type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
-    logical, intent(in) :: falling
-    integer(int32), intent(in) :: i
+    logical, value :: falling
+    integer(int32), value :: i
     type(outlook_t), intent(in) :: near
     logical, intent(in) :: fresh
     real(real64) :: t
@@ -273,7 +250,8 @@ contains
       code = 0
     end if
     if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
-    call earliest_contact(disk, i, near%n, near%list, fresh, falling, self%faces%box%gravity, .false., no_shift, t, code)
+    call earliest_contact(disk, i, near%n, near%list, self%keeps_contacts, fresh, falling, &
+      self%faces%box%gravity, t, code)
     stamp = disk(max(code, 1))%stamp               ! without a branch; of use if code > 0
     if (self%keeps_contacts) then
       contact(i) = contact_t(t, code, stamp)
@@ -292,45 +270,30 @@ contains
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
     real(real64), intent(in) :: now
-    logical, intent(in) :: falling
-    integer(int32), intent(in) :: i
+    logical, value :: falling
+    integer(int32), value :: i
     integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
     integer(int32), intent(in) :: along            !! from this one to the next
     type(outlook_t) :: near
     real(real64) :: t
+    integer(int64) :: n
     integer(int32) :: code, k
     call self%faces%next(disk(i), tag%cell, now, falling, near%time, near%code)
     t = contact%time
     code = contact%partner
     near%cell = self%cells%number(tag%cell)
-    near%n = 0
+    n = 0
     do k = near%cell + ahead - along, near%cell + ahead + along, along
-      near%list(near%n + 1:near%n + size(cell(k)%slot)) = cell(k)%slot
-      near%n = near%n + cell(k)%in_slots()
+      call append(cell(k), near%list, n)
     end do
     if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
-    call earliest_contact(disk, i, near%n, near%list, disk(i)%clock >= now, falling, &
-      self%faces%box%gravity, .false., no_shift, t, code)
+    call earliest_contact(disk, i, int(n, int32), near%list, .true., .false., falling, self%faces%box%gravity, t, code)
     if (t < contact%time .or. code /= contact%partner) contact = contact_t(t, code, disk(code)%stamp)
     call choose(near, i, t, code)
     disk(i)%event_time = t
     disk(i)%partner = code
     tag%partner_stamp = contact%stamp
   end subroutine predict_ahead
-
-  !> The end of the cell, unless the contact known is earlier. At the same moment the lower disk has its way, as in
-  !> the kernel.
-  pure subroutine choose(near, i, t, code)
-    type(outlook_t), intent(in) :: near
-    integer(int32), intent(in) :: i
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    integer(int32) :: crosses
-    crosses = merge(1, 0, near%time < t)           ! a toss-up: no branch on it
-    if (t == near%time) crosses = merge(1, 0, code > i)
-    t = merge(near%time, t, near%time < t)
-    code = ieor(code, iand(-crosses, ieor(code, near%code)))
-  end subroutine choose
 
   !> Everywhere else.
   subroutine predict_special(self, sim, i)
@@ -364,16 +327,16 @@ contains
       call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cells%cell, c, self%cells%stride, i, list, n)
-      call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
-        self%faces%box%gravity, .false., no_shift, t, code)
+      call earliest_contact(sim%disk, i, n, list, self%keeps_contacts, .false., self%faces%falling, &
+        self%faces%box%gravity, t, code)
       if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
     end if
     if (self%big%count == 0) return
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .false., .true., &
-          self%faces%box%gravity, .true., entry%image*sim%box%edges(), t, code)
+        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .true., .false., .true., &
+          self%faces%box%gravity, t, code, entry%image*sim%box%edges())
         e = entry%next
       end associate
     end do
@@ -399,8 +362,8 @@ contains
     t = min(t, t_margin)
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .false., .true., &
-          self%faces%box%gravity, .true., [ix, iy]*sim%box%edges(), t, code)
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .true., .false., .true., &
+          self%faces%box%gravity, t, code, [ix, iy]*sim%box%edges())
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
@@ -429,19 +392,19 @@ contains
     integer(int32) :: k, m
     do k = c - self%cells%stride, c + self%cells%stride, self%cells%stride
       do m = k - 1, k + 1
-        call scan_chain(self, disk, i, m, no_shift, t, code)
+        call scan_chain(self, disk, i, m, t, code)
       end do
     end do
   end subroutine scan_crowd
 
   !> Contacts with the chained disks of the crowded cell c.
-  pure subroutine scan_chain(self, disk, i, c, shift, t, code)
+  pure subroutine scan_chain(self, disk, i, c, t, code, shift)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: shift(2)
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
+    real(real64), intent(in), optional :: shift(2) !! of the cell, seen there [length]
     integer(int32) :: list(list_capacity), n, j
     j = self%cells%chain(c)
     do while (j > 0)
@@ -451,7 +414,7 @@ contains
         list(n) = j - 1
         j = self%cells%next(j)
       end do
-      call earliest_contact(disk, i, n, list, .false., .true., self%faces%box%gravity, .true., shift, t, code)
+      call earliest_contact(disk, i, n, list, .true., .false., .true., self%faces%box%gravity, t, code, shift)
     end do
   end subroutine scan_chain
 
@@ -463,7 +426,8 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    integer(int32) :: dx, dy, c, n, there(2), image(2), list(list_capacity)
+    integer(int32) :: dx, dy, c, there(2), image(2), list(list_capacity)
+    integer(int64) :: n
     n = 0
     do dy = -1, 1
       do dx = -1, 1
@@ -474,14 +438,13 @@ contains
         if (any(image /= 0)) then
           call scan_cell(self, sim, i, c, image*sim%box%edges(), t, code)
         else
-          list(n + 1:n + size(self%cells%cell(c)%slot)) = self%cells%cell(c)%slot
-          n = n + self%cells%cell(c)%in_slots()
-          call scan_chain(self, sim%disk, i, c, no_shift, t, code)
+          call append(self%cells%cell(c), list, n)
+          call scan_chain(self, sim%disk, i, c, t, code)
         end if
       end do
     end do
-    call earliest_contact(sim%disk, i, n, list, sim%disk(i)%clock >= sim%now, self%faces%falling, &
-      self%faces%box%gravity, .false., no_shift, t, code)
+    call earliest_contact(sim%disk, i, int(n, int32), list, self%keeps_contacts, .false., self%faces%falling, &
+      self%faces%box%gravity, t, code)
   end subroutine scan_around_edge
 
   !> Contacts with the disks of one cell, seen `shift` away.
@@ -492,9 +455,9 @@ contains
     real(real64), intent(in) :: shift(2)           !! [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, .false., &
-      .true., self%faces%box%gravity, .true., shift, t, code)
-    call scan_chain(self, sim%disk, i, c, shift, t, code)
+    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, .true., .false., &
+      .true., self%faces%box%gravity, t, code, shift)
+    call scan_chain(self, sim%disk, i, c, t, code, shift)
   end subroutine scan_cell
 
 end module cell_grid

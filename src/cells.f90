@@ -6,7 +6,7 @@ module cells
   use memory_hints, only: advise_huge_pages, prefetch
   implicit none
   private
-  public :: cell_t, cells_t, gather, list_capacity
+  public :: append, cell_t, cells_t, gather, list_capacity
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
@@ -189,28 +189,29 @@ contains
     integer(int32), intent(out) :: n               !! number of disks listed
     integer(int64) :: m, own
     m = 0
-    call append(cell(c - stride - 1))
-    call append(cell(c - stride))
-    call append(cell(c - stride + 1))
-    call append(cell(c - 1))
+    call append(cell(c - stride - 1), list, m)
+    call append(cell(c - stride), list, m)
+    call append(cell(c - stride + 1), list, m)
+    call append(cell(c - 1), list, m)
     own = m + 1 + slots_before(cell(c), i)
-    call append(cell(c))
+    call append(cell(c), list, m)
     list(own) = list(m)
     m = m - 1
-    call append(cell(c + 1))
-    call append(cell(c + stride - 1))
-    call append(cell(c + stride))
-    call append(cell(c + stride + 1))
+    call append(cell(c + 1), list, m)
+    call append(cell(c + stride - 1), list, m)
+    call append(cell(c + stride), list, m)
+    call append(cell(c + stride + 1), list, m)
     n = int(m, int32)
-  contains
-
-    subroutine append(this)
-      type(cell_t), intent(in) :: this
-      list(m + 1:m + count_slot) = this%slot
-      m = m + iand(this%slot(count_slot), counted)
-    end subroutine append
-
   end subroutine gather
+
+  !> Adds the disks in the slots of a cell to a list of n.
+  pure subroutine append(cell, list, n)
+    type(cell_t), intent(in) :: cell
+    integer(int32), intent(inout) :: list(list_capacity)
+    integer(int64), intent(inout) :: n
+    list(n + 1:n + count_slot) = cell%slot
+    n = n + cell%in_slots()
+  end subroutine append
 
   !> Asks for what predictions for some disks will need: what describes a disk, its cells, the disks in them; and of its
   !> partner, one stage later, the same but for the disks, most of which are among the first ones.
@@ -239,8 +240,7 @@ contains
 
     subroutine fetch(i)
       integer(int32), intent(in) :: i
-      call prefetch(tag(i)%species)                ! a tag lies on one line or two
-      call prefetch(tag(i)%partner_stamp)
+      call prefetch(tag(i)%species)
       call prefetch(disk(i)%stamp)
     end subroutine fetch
 

@@ -10,6 +10,7 @@ module neighbour_search
 
   !> Codes of `disk%partner` from here downwards: the disk leaves its cell to the left, right, bottom, top.
   integer(int32), parameter :: first_crossing = -2000000000
+  real(real64), parameter :: many = 32*epsilon(1.0_real64)        !! roundings
 
   type, abstract :: neighbour_search_t
     logical :: everyone = .false.    !! predict all disks anew after each event, not just those involved
@@ -29,7 +30,9 @@ module neighbour_search
       type(simulation_t), intent(inout) :: sim
     end subroutine build_search
 
-    !> Writes into disk i the earliest event it can expect: a disk, a side, an obstacle, a cell's end.
+    !> Writes into disk i the earliest event it can expect: a disk, a side, an obstacle, a cell's end. What it expects of
+    !> another disk after that one's own event may be left out: that one predicts anew then. Once all disks have
+    !> been predicted, each contact before all other events of the two is expected by at least one of them.
     subroutine predict_event(self, sim, i)
       import :: int32, neighbour_search_t, simulation_t
       class(neighbour_search_t), intent(inout) :: self
@@ -74,47 +77,47 @@ contains
   !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
   !> moment the one with the lower disks wins.
   !>
-  !> Most candidates fail one combined test: the root is not before the best so far (it needs
-  !> c < -2 b (t - late), with a margin above rounding) or not real.
-  pure subroutine earliest_contact(disk, i, n, list, fresh, falling, gravity, shifted, shift, t, partner)
+  !> Most candidates fail one combined test: the root is not real, not before the best so far, or (unless `thorough`)
+  !> not before the candidate's own event, at which that one will predict anew with i among its candidates. A root
+  !> before t needs c < -2 b (t - late), here with a margin above rounding.
+  pure subroutine earliest_contact(disk, i, n, list, thorough, fresh, falling, gravity, t, partner, shift)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
-    integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: n           !! number of candidates
+    integer(int32), value :: i
+    integer(int32), value :: n                !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
-    logical, intent(in) :: fresh              !! nobody has a later clock than i
-    logical, intent(in) :: falling            !! `gravity` is not zero
+    logical, value :: thorough                !! contacts after the candidate's own event, too
+    logical, value :: fresh                   !! nobody has a later clock than i
+    logical, value :: falling                 !! `gravity` is not zero
     real(real64), intent(in) :: gravity(2)
-    logical, intent(in) :: shifted            !! `shift` is not zero
-    real(real64), intent(in) :: shift(2)      !! of the candidates' image [length]
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
     integer(int32), intent(inout) :: partner  !! likewise
-    real(real64) :: xi, yi, ui, vi, clock, ri, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
-    real(real64) :: sigma2, b, c, disc, t_j, gate, reach, in_time
-    integer(int32) :: k, j
+    real(real64), intent(in), optional :: shift(2)  !! of the candidates' image [length]
+    real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
+    real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
+    integer(int32) :: k, j, whom
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
-    gate = above(t)
-    reach = 2*(clock - gate)
+    x = xi; y = yi; u = ui; v = vi; late = clock
+    best = t; whom = partner
+    margin = many*(abs(clock) + tiny(clock)/epsilon(clock)**2)
+    from = 2*clock - margin
     do k = 1, n
       j = list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
-      if (fresh) then                         ! the same numbers as below, with si = 0
-        late = clock
-        sj = late - clock_j
-        dx = moved(xj, uj, gravity(1), sj, falling) - xi
-        dy = moved(yj, vj, gravity(2), sj, falling) - yi
-        du = sped_up(uj, gravity(1), sj, falling) - ui
-        dv = sped_up(vj, gravity(2), sj, falling) - vi
-      else
+      if (.not. fresh) then                   ! else the same numbers come out, with si = 0
         late = merge(clock, clock_j, clock > clock_j)
+        from = 2*late - margin
         si = late - clock
-        sj = late - clock_j
-        dx = moved(xj, uj, gravity(1), sj, falling) - moved(xi, ui, gravity(1), si, falling)
-        dy = moved(yj, vj, gravity(2), sj, falling) - moved(yi, vi, gravity(2), si, falling)
-        du = sped_up(uj, gravity(1), sj, falling) - sped_up(ui, gravity(1), si, falling)
-        dv = sped_up(vj, gravity(2), sj, falling) - sped_up(vi, gravity(2), si, falling)
-        reach = 2*(late - gate)
+        x = moved(xi, ui, gravity(1), si, falling)
+        y = moved(yi, vi, gravity(2), si, falling)
+        u = sped_up(ui, gravity(1), si, falling)
+        v = sped_up(vi, gravity(2), si, falling)
       end if
-      if (shifted) then
+      sj = late - clock_j
+      dx = moved(xj, uj, gravity(1), sj, falling) - x
+      dy = moved(yj, vj, gravity(2), sj, falling) - y
+      du = sped_up(uj, gravity(1), sj, falling) - u
+      dv = sped_up(vj, gravity(2), sj, falling) - v
+      if (present(shift)) then
         dx = dx + shift(1)
         dy = dy + shift(2)
       end if
@@ -122,18 +125,20 @@ contains
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2
       disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
-      in_time = reach*b - c
+      latest = best
+      if (.not. thorough) latest = min(best, disk(j)%event_time)
+      in_time = (from - (2 + many)*latest)*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
-        if (t_j > t .or. b >= 0) cycle
-        if (t_j == t .and. .not. before(i, j + 1, partner)) cycle
-        t = t_j
-        partner = j + 1
-        gate = above(t)
-        reach = 2*(clock - gate)
+        if (b >= 0) cycle
+        if (.not. t_j < best) then            ! seldom
+          if (t_j > best .or. .not. before(i, j + 1, whom)) cycle
+        end if
+        best = t_j; whom = j + 1
       end if
     end do
+    t = best; partner = whom
   end subroutine earliest_contact
 
   !> The state of a disk, in numbers.
@@ -165,13 +170,6 @@ contains
     after = v
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
-
-  !> A time just above t by more than the rounding of the test that it guards.
-  elemental function above(t) result(gate)
-    real(real64), intent(in) :: t
-    real(real64) :: gate
-    gate = t + 16*epsilon(t)*abs(t) + tiny(t)/epsilon(t)
-  end function above
 
   !> Whether, at the same moment, i meets disk j before its other partner (a disk or, if <= 0, a wall).
   elemental function before(i, j, other) result(yes)
