@@ -272,8 +272,11 @@ def test_a_disk_that_others_fill_costs_no_earlier_sample(ricochet, started, tmp_
     process = started("gas.nml", "-o", "disk/gas.h5")
     wait_for(lambda: frames_in(part) > 1000)
     process.send_signal(signal.SIGUSR1)
+    wait_for((tmp_path / "disk/gas.chk.h5").exists)
+    process.send_signal(signal.SIGSTOP)  # else it may be done before the disk is full
     fill = ["dd", "if=/dev/zero", "of=disk/other", "bs=1M"]
     subprocess.run(fill, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    process.send_signal(signal.SIGCONT)
     message = process.communicate()[1]
     assert process.returncode == FILES and " bytes needed, " in message
     assert is_beginning(committed(part), committed(tmp_path / "whole.h5")) == []
