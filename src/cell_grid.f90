@@ -335,7 +335,7 @@ contains
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .true., .false., .true., &
+        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], self%keeps_contacts, .false., .true., &
           self%faces%box%gravity, t, code, entry%image*sim%box%edges())
         e = entry%next
       end associate
@@ -362,7 +362,7 @@ contains
     t = min(t, t_margin)
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .true., .false., .true., &
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, self%keeps_contacts, .false., .true., &
           self%faces%box%gravity, t, code, [ix, iy]*sim%box%edges())
       end do
     end do
@@ -414,7 +414,8 @@ contains
         list(n) = j - 1
         j = self%cells%next(j)
       end do
-      call earliest_contact(disk, i, n, list, .true., .false., .true., self%faces%box%gravity, t, code, shift)
+      call earliest_contact(disk, i, n, list, self%keeps_contacts, .false., .true., self%faces%box%gravity, &
+        t, code, shift)
     end do
   end subroutine scan_chain
 
@@ -455,8 +456,8 @@ contains
     real(real64), intent(in) :: shift(2)           !! [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, .true., .false., &
-      .true., self%faces%box%gravity, t, code, shift)
+    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, self%keeps_contacts, &
+      .false., .true., self%faces%box%gravity, t, code, shift)
     call scan_chain(self, sim%disk, i, c, t, code, shift)
   end subroutine scan_cell
 
