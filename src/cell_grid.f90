@@ -272,20 +272,21 @@ contains
     real(real64), intent(in) :: now
     logical, value :: falling
     integer(int32), value :: i
-    integer(int32), intent(in) :: ahead            !! from the disk's cell to the middle one of the three
-    integer(int32), intent(in) :: along            !! from this one to the next
+    integer(int32), value :: ahead            !! from the disk's cell to the middle one of the three
+    integer(int32), value :: along            !! from this one to the next
     type(outlook_t) :: near
     real(real64) :: t
     integer(int64) :: n
-    integer(int32) :: code, k
+    integer(int32) :: code, middle
     call self%faces%next(disk(i), tag%cell, now, falling, near%time, near%code)
     t = contact%time
     code = contact%partner
     near%cell = self%cells%number(tag%cell)
+    middle = near%cell + ahead
     n = 0
-    do k = near%cell + ahead - along, near%cell + ahead + along, along
-      call append(cell(k), near%list, n)
-    end do
+    call append(cell(middle - along), near%list, n)
+    call append(cell(middle), near%list, n)
+    call append(cell(middle + along), near%list, n)
     if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
     call earliest_contact(disk, i, int(n, int32), near%list, .true., .false., falling, self%faces%box%gravity, t, code)
     if (t < contact%time .or. code /= contact%partner) contact = contact_t(t, code, disk(code)%stamp)
