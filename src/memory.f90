@@ -9,7 +9,7 @@ module memory
   public :: check_memory, available_memory, number_after
 
   ! Measured with 200 000 and a million disks; a test compares them with what runs take. [bytes]
-  integer(int64), parameter :: per_disk = 220, per_growing_disk = 340, besides = 20000000
+  integer(int64), parameter :: per_disk = 240, per_growing_disk = 340, besides = 20000000
   integer(int64), parameter :: unlimited = huge(1_int64)
 
 contains

@@ -28,6 +28,6 @@ void advise_huge_pages(const void *address, int64_t bytes)
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
-    const size_t line = 64, large = 4096;
+    const size_t line = 64, large = 128*1024;
     return bytes < large || bytes > PTRDIFF_MAX ? __real_malloc(bytes) : aligned_alloc(line, (bytes + line - 1) / line * line);
 }
