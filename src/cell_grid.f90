@@ -149,7 +149,7 @@ contains
         return
       end if
     end if
-    if (self%faces%falling) then
+    if (self%faces%falling) then                   ! said in so many words, the compiler makes a version for each
       call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .true., i)
     else
       call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .false., i)
@@ -272,8 +272,8 @@ contains
     real(real64), intent(in) :: now
     logical, value :: falling
     integer(int32), value :: i
-    integer(int32), value :: ahead            !! from the disk's cell to the middle one of the three
-    integer(int32), value :: along            !! from this one to the next
+    integer(int32), value :: ahead                 !! from the disk's cell to the middle one of the three
+    integer(int32), value :: along                 !! from this one to the next
     type(outlook_t) :: near
     real(real64) :: t
     integer(int64) :: n
