@@ -209,8 +209,8 @@ contains
     logical, value :: falling
     integer(int32), value :: i, j
     type(outlook_t) :: near_i, near_j
-    call look_around(self%faces, self%cells%stride, cell, disk(i), tag(i), now, falling, i, near_i)
-    call look_around(self%faces, self%cells%stride, cell, disk(j), tag(j), now, falling, j, near_j)
+    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
+    call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
     call expect_first(self, cell, contact, disk, tag(i), falling, i, near_i, .true.)
     call expect_first(self, cell, contact, disk, tag(j), falling, j, near_j, .true.)
   end subroutine predict_two
@@ -226,7 +226,7 @@ contains
     logical, value :: falling
     integer(int32), value :: i
     type(outlook_t) :: near
-    call look_around(self%faces, self%cells%stride, cell, disk(i), tag(i), now, falling, i, near)
+    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
     call expect_first(self, cell, contact, disk, tag(i), falling, i, near, .false.)
   end subroutine predict_in_bulk
 

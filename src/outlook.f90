@@ -2,7 +2,7 @@
 module outlook
   use kinds, only: int32, never, real64
   use cell_faces, only: cell_faces_t
-  use cells, only: cell_t, gather, list_capacity
+  use cells, only: cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   implicit none
   private
@@ -28,10 +28,10 @@ module outlook
 contains
 
   !> What is around disk i.
-  subroutine look_around(faces, stride, cell, disk, tag, now, falling, i, near)
+  subroutine look_around(faces, grid, cell, disk, tag, now, falling, i, near)
     type(cell_faces_t), intent(in) :: faces
-    integer(int32), value :: stride                !! from a row of cells to the next
-    type(cell_t), intent(in) :: cell(0:*)
+    type(cells_t), intent(in) :: grid
+    type(cell_t), intent(in) :: cell(0:*)          !! those of the grid
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(in) :: tag
     real(real64), intent(in) :: now
@@ -39,8 +39,8 @@ contains
     integer(int32), value :: i
     type(outlook_t), intent(out) :: near
     call faces%next(disk, tag%cell, now, falling, near%time, near%code)
-    near%cell = tag%cell(1) + stride*tag%cell(2)
-    call gather(cell, near%cell, stride, i, near%list, near%n)
+    near%cell = grid%number(tag%cell)
+    call gather(cell, near%cell, grid%stride, i, near%list, near%n)
   end subroutine look_around
 
   !> The end of the cell, unless the contact known is earlier. At the same moment the lower disk has its way, as in
