@@ -39,7 +39,8 @@ module big_disks
     integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: free = 0          !! first of the entries not in use
-    real(real64), private :: width(2) = 0.0_real64    !! of a cell [length]
+    real(real64), private :: width(2) = 0.0_real64    !! from cell to cell [length]
+    real(real64), private :: half(2) = 0.0_real64     !! of a cell's extent [length]
   contains
     procedure :: start
     procedure :: number_of
@@ -63,18 +64,20 @@ contains
   end function largest_small_radius
 
   !> Finds the disks bigger than `small` and registers them in n(1) columns and n(2) rows of cells.
-  subroutine start(self, sim, small, n, width)
+  subroutine start(self, sim, small, n, width, overlap)
     class(big_disks_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: small            !! [length]
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: width(2)         !! of a cell [length]
+    real(real64), intent(in) :: width(2)         !! from cell to cell [length]
+    real(real64), intent(in) :: overlap(2)       !! of neighbouring cells [length]
     integer(int32) :: i, k
     self%disk = pack([(i, i=1, sim%n_disks())], sim%disk%radius > small)
     self%count = size(self%disk, kind=int32)
     self%small = small
     if (self%count == 0) return
     self%width = width
+    self%half = 0.5_real64*(width + overlap)
     self%margin = 0.5_real64*minval(width)
     if (allocated(self%ring)) deallocate (self%ring, self%centre, self%first, self%entry)
     allocate (self%ring(self%count), self%centre(2, self%count), self%first(n(1), n(2)), self%entry(0))
@@ -124,8 +127,8 @@ contains
     inner = sim%disk(self%disk(k))%radius - self%margin
     outer = inner + self%small + 2*self%margin
     n = shape(self%first)
-    low = floor((self%centre(:, k) - outer - sim%box%lower)/self%width) + 1
-    high = floor((self%centre(:, k) + outer - sim%box%lower)/self%width) + 1
+    low = floor((self%centre(:, k) - outer - sim%box%lower - self%half)/self%width + 0.5_real64) + 1
+    high = floor((self%centre(:, k) + outer - sim%box%lower + self%half)/self%width - 0.5_real64) + 1
     low = merge(low, max(low, 1), sim%box%periodic)
     high = merge(high, min(high, n), sim%box%periodic)
     allocate (found(product(max(high - low + 1, 0))))
@@ -133,8 +136,8 @@ contains
     do iy = low(2), high(2)
       do ix = low(1), high(1)
         to_middle = abs(sim%box%lower + ([ix, iy] - 0.5_real64)*self%width - self%centre(:, k))
-        if (norm2(max(to_middle - 0.5_real64*self%width, 0.0_real64)) > outer) cycle
-        if (norm2(to_middle + 0.5_real64*self%width) < inner) cycle
+        if (norm2(max(to_middle - self%half, 0.0_real64)) > outer) cycle
+        if (norm2(to_middle + self%half) < inner) cycle
         period = floor(real([ix, iy] - 1, real64)/n)
         m = m + 1
         found(m) = ring_cell_t([ix, iy] - period*n, -period)

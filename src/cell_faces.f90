@@ -1,4 +1,7 @@
 !> The faces of the cells of a grid, and when a disk leaves its cell; the sides of the box are faces as well.
+!>
+!> Cells overlap as far as can be: disks in cells with one between them just cannot touch. Where cells overlap, a disk
+!> may be in any of them, best in the one that it leaves last. It leaves wide cells less often then: by half and more.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, side_time
@@ -19,45 +22,75 @@ module cell_faces
   end type line_t
 
   type :: cell_faces_t
-    real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
+    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
+    real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
     logical :: falling = .false.                   !! disks fly on parabolas
     type(box_t) :: box
-    type(line_t), allocatable :: column(:)         !! (0:columns) their left and right faces
-    type(line_t), allocatable :: row(:)            !! (0:rows)
+    type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
+    type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
   contains
     procedure :: set
+    procedure :: choose_cell
     procedure :: next
     procedure, private :: next_falling
   end type cell_faces_t
 
 contains
 
-  !> Cuts the box into n(1) columns and n(2) rows of cells.
-  subroutine set(self, box, n)
+  !> Cuts the box into n(1) columns and n(2) rows of cells, for disks that touch within `reach` of each other.
+  subroutine set(self, box, n, reach)
     class(cell_faces_t), intent(out) :: self
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
+    real(real64), intent(in) :: reach              !! [length]
     self%width = box%edges()/n*(1 + 4*epsilon(self%width))       ! the last face is not before the side
+    self%overlap = max(self%width - reach, 0.0_real64)
     self%falling = box%falling()
     self%box = box
-    call cut(self%column, n(1), box%lower(1), box%upper(1), self%width(1), box%periodic(1))
-    call cut(self%row, n(2), box%lower(2), box%upper(2), self%width(2), box%periodic(2))
+    call cut(self%column, n(1), box%lower(1), box%upper(1), self%width(1), self%overlap(1), box%periodic(1))
+    call cut(self%row, n(2), box%lower(2), box%upper(2), self%width(2), self%overlap(2), box%periodic(2))
   end subroutine set
 
   !> The faces along one axis.
-  pure subroutine cut(line, n, lower, upper, width, periodic)
-    type(line_t), allocatable, intent(out) :: line(:)
+  pure subroutine cut(line, n, lower, upper, width, overlap, periodic)
+    type(line_t), allocatable, intent(out) :: line(:, :)
     integer(int32), intent(in) :: n
-    real(real64), intent(in) :: lower, upper, width
+    real(real64), intent(in) :: lower, upper, width, overlap
     logical, intent(in) :: periodic
     integer(int32) :: k
-    allocate (line(0:n))
+    allocate (line(0:1, n))
     do k = 1, n - 1
-      line(k) = line_t(lower + width*k, 0.0_real64, first_crossing)
+      line(1, k) = line_t(lower + width*k + 0.5_real64*overlap, 0.0_real64, first_crossing)
+      line(0, k + 1) = line_t(lower + width*k - 0.5_real64*overlap, 0.0_real64, first_crossing)
     end do
-    line(0) = line_t(lower, merge(0, 1, periodic), 0)
-    line(n) = line_t(upper, merge(0, -1, periodic), 0)
+    line(0, 1) = line_t(lower, merge(0, 1, periodic), 0)
+    line(1, n) = line_t(upper, merge(0, -1, periodic), 0)
   end subroutine cut
+
+  !> Of the cells that the disk is in, the one that it leaves last on its way.
+  pure subroutine choose_cell(self, disk, now, cell)
+    class(cell_faces_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    integer(int16), intent(inout) :: cell(2)       !! in: any of them
+    real(real64) :: s
+    s = now - disk%clock
+    cell(1) = cell(1) + ahead(self%column, self%overlap(1), disk%x(1), disk%v(1), self%box%gravity(1), s, cell(1))
+    cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), self%box%gravity(2), s, cell(2))
+  end subroutine choose_cell
+
+  !> Along one axis: a step into the next cell if the disk is in that one too, and goes there. No branch, as in `next`.
+  pure function ahead(line, overlap, x, v, g, s, cell) result(step)
+    type(line_t), intent(in) :: line(0:1, *)
+    real(real64), intent(in) :: overlap, x, v, g, s
+    integer(int16), intent(in) :: cell
+    integer(int16) :: step
+    real(real64) :: left
+    integer(int32) :: up
+    up = merge(1, 0, flight_velocity(v, g, s) > 0)
+    left = abs(line(up, cell)%place - flight(x, v, g, s))
+    step = int(iand(2*up - 1, -merge(1, 0, left < overlap .and. line(up, cell)%kind /= 0)), int16)
+  end function ahead
 
   !> When and how the disk leaves its cell, or meets a side within it.
   pure subroutine next(self, disk, cell, now, falling, t, code)
@@ -77,21 +110,19 @@ contains
 
   !> On a straight line; which axis and which way are toss-ups: no branch on them.
   pure subroutine next_of(column, row, x, v, clock, radius, cell, t, code)
-    type(line_t), intent(in) :: column(0:*), row(0:*)
+    type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
     real(real64), intent(in) :: x(2), v(2), clock, radius
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
     real(real64) :: t_x, t_y
-    integer(int32) :: up_x, up_y, k_x, k_y, code_x, code_y
+    integer(int32) :: up_x, up_y, code_x, code_y
     up_x = merge(1, 0, v(1) > 0)
     up_y = merge(1, 0, v(2) > 0)
-    k_x = cell(1) - 1 + up_x
-    k_y = cell(2) - 1 + up_y
-    t_x = line_time(column(k_x), x(1), v(1), clock, radius)
-    t_y = line_time(row(k_y), x(2), v(2), clock, radius)
-    code_x = column(k_x)%kind - up_x
-    code_y = row(k_y)%kind - 2 - up_y
+    t_x = line_time(column(up_x, cell(1)), x(1), v(1), clock, radius)
+    t_y = line_time(row(up_y, cell(2)), x(2), v(2), clock, radius)
+    code_x = column(up_x, cell(1))%kind - up_x
+    code_y = row(up_y, cell(2))%kind - 2 - up_y
     code = ieor(code_x, iand(-merge(1, 0, t_y < t_x), ieor(code_x, code_y)))
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_of
@@ -118,15 +149,15 @@ contains
     integer(int32), intent(out) :: code
     real(real64) :: t_y
     integer(int32) :: code_y
-    call leave(self%column(cell(1) - 1:cell(1)), 1, self%box, disk, now, t, code)
-    call leave(self%row(cell(2) - 1:cell(2)), 2, self%box, disk, now, t_y, code_y)
+    call leave(self%column(:, cell(1)), 1, self%box, disk, now, t, code)
+    call leave(self%row(:, cell(2)), 2, self%box, disk, now, t_y, code_y)
     code = ieor(code, iand(-merge(1, 0, t_y < t), ieor(code, code_y)))
     t = merge(t_y, t, t_y < t)
   end subroutine next_falling
 
   !> The same along one axis.
   pure subroutine leave(line, axis, box, disk, now, t, code)
-    type(line_t), intent(in) :: line(0:1)          !! around the disk's cell
+    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
     integer(int32), intent(in) :: axis
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk

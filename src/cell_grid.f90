@@ -1,24 +1,24 @@
 !> Search by cells: the box is cut into cells at least one diameter wide, so that a disk meets only those in
-!> its own cell and the eight around it before it leaves its cell, which is an event like any other.
+!> its own cell and the eight around it before it leaves its cell, which is an event like any other. Wider cells
+!> overlap (see `cell_faces`).
 module cell_grid
-  use kinds, only: int16, int32, int64, never, real64
+  use kinds, only: int16, int32, int64, real64
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
   use cell_faces, only: cell_faces_t
   use cells, only: append, cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
-  use memory_hints, only: prefetch
   use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
   use obstacle_lists, only: obstacle_lists_t
-  use outlook, only: choose, contact_t, look_around, outlook_t, unknown
+  use outlook, only: look_around, outlook_t
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: cell_grid_t
 
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
-  real(real64), parameter :: roomy = 1.5_real64             !! width of a cell, in diameters, where contacts are kept
+  real(real64), parameter :: spacious = 1.2_real64          !! cell, in diameters: wide enough for choosing to pay
   real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
   integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
 
@@ -28,8 +28,7 @@ module cell_grid
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
     logical :: special = .false.                   !! more than small disks and walls
     logical :: obstructed = .false.                !! there are obstacles
-    logical :: keeps_contacts = .false.            !! over the ends of cells: of use where disks are few
-    type(contact_t), allocatable :: contact(:)     !! (disks) if contacts are kept
+    logical :: chosen = .false.                    !! colliding disks choose among the cells that they are in
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
     type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
@@ -54,11 +53,10 @@ contains
     integer(int16) :: ix, iy
     small = largest_small_radius(sim%disk)
     reach = 2*small*(1 + spare_width)
-    width = sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks())
-    self%keeps_contacts = width > roomy*reach
-    if (.not. self%keeps_contacts) width = reach
+    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
-    call self%faces%set(sim%box, self%n)
+    call self%faces%set(sim%box, self%n, reach)
+    self%chosen = any(self%faces%width > spacious*reach)
     call self%cells%empty(self%n(1) + 2, self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       x = (sim%position(i) - sim%box%lower)/self%faces%width
@@ -66,10 +64,8 @@ contains
       if (.not. sim%disk(i)%radius > small) call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
     end do
     self%obstructed = sim%box%obstructed()
-    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width)
-    call self%big%start(sim, small, self%n, self%faces%width)
-    if (allocated(self%contact)) deallocate (self%contact)
-    allocate (self%contact(merge(sim%n_disks(), 0, self%keeps_contacts)))
+    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width, self%faces%overlap)
+    call self%big%start(sim, small, self%n, self%faces%width, self%faces%overlap)
     self%special = any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0
     if (.not. self%special) return
     do iy = 1, int(self%n(2), int16)
@@ -112,8 +108,8 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: face, axis, there, way, step(2)
-    logical :: known                               !! the contact that i expects, over the face
+    integer(int32) :: face, axis, there
+    integer(int16) :: cell(2)
     if (sim%disk(i)%radius > self%big%small) then
       call self%follow_big(sim, self%big%number_of(i))
       call self%predict(sim, i)
@@ -121,21 +117,39 @@ contains
     end if
     face = -merge(code - first_crossing, code, code <= first_crossing)
     axis = 1 + face/2
-    way = 2*modulo(face, 2) - 1
-    call self%cells%remove(self%cells%number(sim%tag(i)%cell), i)
-    there = sim%tag(i)%cell(axis) + way
+    cell = sim%tag(i)%cell
+    there = cell(axis) + 2*modulo(face, 2) - 1
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
-    sim%tag(i)%cell(axis) = int(there, int16)
-    call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
-    step = [1, self%cells%stride]                  ! to the next column, to the next row
-    known = self%keeps_contacts
-    if (known .and. self%special) known = .not. is_special(self, sim, i)
-    if (known) known = self%contact(i)%partner /= unknown
-    if (known) call predict_ahead(self, self%cells%cell, self%contact(i), sim%disk, sim%tag(i), sim%now, &
-      self%faces%falling, i, way*step(axis), step(3 - axis))
-    if (.not. known) call self%predict(sim, i)
+    cell(axis) = int(there, int16)
+    if (self%chosen) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
+    call move(self, sim%tag(i), i, cell)
+    call self%predict(sim, i)
   end subroutine cross
+
+  !> Lets disk i, which has just collided, choose its cell.
+  subroutine settle(self, disk, tag, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
+    integer(int16) :: cell(2)
+    if (disk%radius > self%big%small) return
+    cell = tag%cell
+    call self%faces%choose_cell(disk, disk%clock, cell)
+    if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
+  end subroutine settle
+
+  !> Moves disk i into another cell.
+  subroutine move(self, tag, i, cell)
+    class(cell_grid_t), intent(inout) :: self
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
+    integer(int16), intent(in) :: cell(2)
+    call self%cells%remove(self%cells%number(tag%cell), i)
+    tag%cell = cell
+    call self%cells%insert(self%cells%number(cell), i)
+  end subroutine move
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
   subroutine predict(self, sim, i)
@@ -145,14 +159,13 @@ contains
     if (self%special) then
       if (is_special(self, sim, i)) then
         call self%predict_special(sim, i)      ! by dispatch, which keeps it out of the way of the bulk
-        if (self%keeps_contacts) self%contact(i)%partner = unknown
         return
       end if
     end if
     if (self%faces%falling) then                   ! said in so many words, the compiler makes a version for each
-      call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .true., i)
+      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i)
     else
-      call predict_in_bulk(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .false., i)
+      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i)
     end if
   end subroutine predict
 
@@ -161,12 +174,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: stage
     integer(int32), intent(in) :: disks(:)
-    integer(int32) :: k
     call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
-    if (.not. self%keeps_contacts .or. stage > 1) return
-    do k = 1, size(disks)
-      call prefetch(self%contact(disks(k))%time)
-    end do
   end subroutine read_ahead
 
   !> Whether disk i may meet anything but small disks and walls.
@@ -184,6 +192,10 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
+    if (self%chosen) then
+      call settle(self, sim%disk(i), sim%tag(i), i)
+      call settle(self, sim%disk(j), sim%tag(j), j)
+    end if
     if (self%special) then
       if (is_special(self, sim, i) .or. is_special(self, sim, j)) then
         call self%predict(sim, i)
@@ -192,17 +204,16 @@ contains
       end if
     end if
     if (self%faces%falling) then
-      call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .true., i, j)
+      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, j)
     else
-      call predict_two(self, self%cells%cell, self%contact, sim%disk, sim%tag, sim%now, .false., i, j)
+      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, j)
     end if
   end subroutine predict_both
 
   !> Where there are but small disks and walls.
-  subroutine predict_two(self, cell, contact, disk, tag, now, falling, i, j)
+  subroutine predict_two(self, cell, disk, tag, now, falling, i, j)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
-    type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
@@ -211,15 +222,14 @@ contains
     type(outlook_t) :: near_i, near_j
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
     call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
-    call expect_first(self, cell, contact, disk, tag(i), falling, i, near_i, .true.)
-    call expect_first(self, cell, contact, disk, tag(j), falling, j, near_j, .true.)
+    call expect_first(self, cell, disk, tag(i), falling, i, near_i, .true.)
+    call expect_first(self, cell, disk, tag(j), falling, j, near_j, .true.)
   end subroutine predict_two
 
   !> Likewise for one disk.
-  subroutine predict_in_bulk(self, cell, contact, disk, tag, now, falling, i)
+  subroutine predict_in_bulk(self, cell, disk, tag, now, falling, i)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
-    type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
@@ -227,14 +237,13 @@ contains
     integer(int32), value :: i
     type(outlook_t) :: near
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
-    call expect_first(self, cell, contact, disk, tag(i), falling, i, near, .false.)
+    call expect_first(self, cell, disk, tag(i), falling, i, near, .false.)
   end subroutine predict_in_bulk
 
   !> Writes into disk i the first of what it can expect.
-  subroutine expect_first(self, cell, contact, disk, tag, falling, i, near, fresh)
+  subroutine expect_first(self, cell, disk, tag, falling, i, near, fresh)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
-    type(contact_t), intent(inout) :: contact(*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
     logical, value :: falling
@@ -242,59 +251,15 @@ contains
     type(outlook_t), intent(in) :: near
     logical, intent(in) :: fresh
     real(real64) :: t
-    integer(int32) :: code, stamp
+    integer(int32) :: code
     t = near%time
     code = near%code
-    if (self%keeps_contacts) then
-      t = never
-      code = 0
-    end if
     if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
-    call earliest_contact(disk, i, near%n, near%list, self%keeps_contacts, fresh, falling, &
-      self%faces%box%gravity, t, code)
-    stamp = disk(max(code, 1))%stamp               ! without a branch; of use if code > 0
-    if (self%keeps_contacts) then
-      contact(i) = contact_t(t, code, stamp)
-      call choose(near, i, t, code)
-    end if
+    call earliest_contact(disk, i, near%n, near%list, fresh, falling, self%faces%box%gravity, t, code)
     disk(i)%event_time = t
     disk(i)%partner = code
-    tag%partner_stamp = stamp
+    tag%partner_stamp = disk(max(code, 1))%stamp   ! without a branch; of use if code > 0
   end subroutine expect_first
-
-  !> Behind the face just crossed: the contact found before stays, three cells come into reach.
-  subroutine predict_ahead(self, cell, contact, disk, tag, now, falling, i, ahead, along)
-    class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
-    type(contact_t), intent(inout) :: contact
-    type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(inout) :: tag
-    real(real64), intent(in) :: now
-    logical, value :: falling
-    integer(int32), value :: i
-    integer(int32), value :: ahead                 !! from the disk's cell to the middle one of the three
-    integer(int32), value :: along                 !! from this one to the next
-    type(outlook_t) :: near
-    real(real64) :: t
-    integer(int64) :: n
-    integer(int32) :: code, middle
-    call self%faces%next(disk(i), tag%cell, now, falling, near%time, near%code)
-    t = contact%time
-    code = contact%partner
-    near%cell = self%cells%number(tag%cell)
-    middle = near%cell + ahead
-    n = 0
-    call append(cell(middle - along), near%list, n)
-    call append(cell(middle), near%list, n)
-    call append(cell(middle + along), near%list, n)
-    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
-    call earliest_contact(disk, i, int(n, int32), near%list, .true., .false., falling, self%faces%box%gravity, t, code)
-    if (t < contact%time .or. code /= contact%partner) contact = contact_t(t, code, disk(code)%stamp)
-    call choose(near, i, t, code)
-    disk(i)%event_time = t
-    disk(i)%partner = code
-    tag%partner_stamp = contact%stamp
-  end subroutine predict_ahead
 
   !> Everywhere else.
   subroutine predict_special(self, sim, i)
@@ -328,7 +293,7 @@ contains
       call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cells%cell, c, self%cells%stride, i, list, n)
-      call earliest_contact(sim%disk, i, n, list, self%keeps_contacts, .false., self%faces%falling, &
+      call earliest_contact(sim%disk, i, n, list, .false., self%faces%falling, &
         self%faces%box%gravity, t, code)
       if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
     end if
@@ -336,7 +301,7 @@ contains
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], self%keeps_contacts, .false., .true., &
+        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .false., .true., &
           self%faces%box%gravity, t, code, entry%image*sim%box%edges())
         e = entry%next
       end associate
@@ -363,7 +328,7 @@ contains
     t = min(t, t_margin)
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, self%keeps_contacts, .false., .true., &
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .false., .true., &
           self%faces%box%gravity, t, code, [ix, iy]*sim%box%edges())
       end do
     end do
@@ -415,7 +380,7 @@ contains
         list(n) = j - 1
         j = self%cells%next(j)
       end do
-      call earliest_contact(disk, i, n, list, self%keeps_contacts, .false., .true., self%faces%box%gravity, &
+      call earliest_contact(disk, i, n, list, .false., .true., self%faces%box%gravity, &
         t, code, shift)
     end do
   end subroutine scan_chain
@@ -445,7 +410,7 @@ contains
         end if
       end do
     end do
-    call earliest_contact(sim%disk, i, int(n, int32), list, self%keeps_contacts, .false., self%faces%falling, &
+    call earliest_contact(sim%disk, i, int(n, int32), list, .false., self%faces%falling, &
       self%faces%box%gravity, t, code)
   end subroutine scan_around_edge
 
@@ -457,7 +422,7 @@ contains
     real(real64), intent(in) :: shift(2)           !! [length]
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, self%keeps_contacts, &
+    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, &
       .false., .true., self%faces%box%gravity, t, code, shift)
     call scan_chain(self, sim%disk, i, c, t, code, shift)
   end subroutine scan_cell

@@ -77,15 +77,14 @@ contains
   !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
   !> moment the one with the lower disks wins.
   !>
-  !> Most candidates fail one combined test: the root is not real, not before the best so far, or (unless `thorough`)
-  !> not before the candidate's own event, at which that one will predict anew with i among its candidates. A root
-  !> before t needs c < -2 b (t - late), here with a margin above rounding.
-  pure subroutine earliest_contact(disk, i, n, list, thorough, fresh, falling, gravity, t, partner, shift)
+  !> Most candidates fail one combined test: the root is not real, not before the best so far, or not before the
+  !> candidate's own event, at which that one will predict anew with i among its candidates. A root before t
+  !> needs c < -2 b (t - late), here with a margin above rounding.
+  pure subroutine earliest_contact(disk, i, n, list, fresh, falling, gravity, t, partner, shift)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     integer(int32), value :: i
     integer(int32), value :: n                !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
-    logical, value :: thorough                !! contacts after the candidate's own event, too
     logical, value :: fresh                   !! nobody has a later clock than i
     logical, value :: falling                 !! `gravity` is not zero
     real(real64), intent(in) :: gravity(2)
@@ -125,8 +124,7 @@ contains
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2
       disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
-      latest = best
-      if (.not. thorough) latest = min(best, disk(j)%event_time)
+      latest = min(best, disk(j)%event_time)
       in_time = (from - (2 + many)*latest)*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then

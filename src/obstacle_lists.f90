@@ -12,7 +12,8 @@ module obstacle_lists
   type :: obstacle_lists_t
     private
     integer(int32) :: n(2) = 0                     !! columns and rows of cells
-    real(real64) :: width(2) = 0.0_real64          !! of a cell [length]
+    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
+    real(real64) :: half(2) = 0.0_real64           !! of a cell's extent [length]
     integer(int32), allocatable :: start(:)        !! (cells+1) first entry of a cell in `list`
     integer(int32), allocatable :: list(:)         !! obstacles that reach into the cell, ascending
     type(obstacle_t), allocatable :: listed(:)     !! what these lists were made for,
@@ -69,16 +70,18 @@ contains
   end function hold
 
   !> Lists, unless the lists are up to date, which obstacles a disk can touch with its centre in each cell.
-  subroutine renew(self, box, radius, n, width)
+  subroutine renew(self, box, radius, n, width, overlap)
     class(obstacle_lists_t), intent(inout) :: self
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius             !! largest of the disks [length]
     integer(int32), intent(in) :: n(2)             !! columns and rows of cells
-    real(real64), intent(in) :: width(2)           !! of a cell [length]
+    real(real64), intent(in) :: width(2)           !! from cell to cell [length]
+    real(real64), intent(in) :: overlap(2)         !! of neighbouring cells [length]
     integer(int32) :: c, m, entries, count_c
     if (hold(self, box, radius, n)) return
     self%n = n
     self%width = width
+    self%half = 0.5_real64*(width + overlap)
     if (allocated(self%start)) deallocate (self%start, self%list)
     self%listed = box%obstacle
     self%listed_radius = radius
@@ -137,7 +140,7 @@ contains
       middle = box%lower + (k - 0.5_real64)*self%width - box%obstacle(m)%centre
       middle = middle - nearest_image(box, middle)
       near(k) = box%obstacle(m)%inside .or. abs(middle(axis)) &
-        <= (0.5_real64*self%width(axis) + box%obstacle(m)%radius + self%listed_radius)*(1 + 2*spare_width)
+        <= (self%half(axis) + box%obstacle(m)%radius + self%listed_radius)*(1 + 2*spare_width)
     end do
   end function slices_near
 
@@ -149,13 +152,12 @@ contains
     real(real64), intent(in) :: radius
     integer(int32), intent(in) :: ix, iy
     logical :: yes
-    real(real64) :: middle(2), half(2), gap(2), far(2), spare
+    real(real64) :: middle(2), gap(2), far(2), spare
     middle = box%lower + ([ix, iy] - 0.5_real64)*self%width - obstacle%centre
     if (.not. obstacle%inside) middle = middle - nearest_image(box, middle)
-    half = 0.5_real64*self%width
     spare = 1 + spare_width
-    gap = max(abs(middle) - half*spare, 0.0_real64)
-    far = abs(middle) + half*spare
+    gap = max(abs(middle) - self%half*spare, 0.0_real64)
+    far = abs(middle) + self%half*spare
     if (obstacle%inside) then
       yes = norm2(far) >= (obstacle%radius - radius)/spare
     else

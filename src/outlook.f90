@@ -1,20 +1,12 @@
 !> What a disk has around it: the end of its cell, and the disks it may meet before that.
 module outlook
-  use kinds, only: int32, never, real64
+  use kinds, only: int32, real64
   use cell_faces, only: cell_faces_t
   use cells, only: cell_t, cells_t, gather, list_capacity
   use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: choose, contact_t, look_around, outlook_t, unknown
-
-  !> The first contact of a disk with those in the cells around, beyond the end of its cell too.
-  type :: contact_t
-    real(real64) :: time = never
-    integer(int32) :: partner = 0                  !! 0: none
-    integer(int32) :: stamp = 0                    !! the partner's when this was predicted
-  end type contact_t
-  integer(int32), parameter :: unknown = -1        !! as partner of a contact
+  public :: look_around, outlook_t
 
   !> What is around a disk. Not initialised: it is made for each prediction.
   type :: outlook_t
@@ -42,19 +34,5 @@ contains
     near%cell = grid%number(tag%cell)
     call gather(cell, near%cell, grid%stride, i, near%list, near%n)
   end subroutine look_around
-
-  !> The end of the cell, unless the contact known is earlier. At the same moment the lower disk has its way, as in
-  !> the kernel.
-  pure subroutine choose(near, i, t, code)
-    type(outlook_t), intent(in) :: near
-    integer(int32), intent(in) :: i
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    integer(int32) :: crosses
-    crosses = merge(1, 0, near%time < t)           ! a toss-up: no branch on it
-    if (t == near%time) crosses = merge(1, 0, code > i)
-    t = merge(near%time, t, near%time < t)
-    code = ieor(code, iand(-crosses, ieor(code, near%code)))
-  end subroutine choose
 
 end module outlook
