@@ -3,7 +3,7 @@
 module cells
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
-  use memory_hints, only: advise_huge_pages, prefetch
+  use memory_hints, only: prefetch
   implicit none
   private
   public :: append, cell_t, cells_t, gather, list_capacity
@@ -59,10 +59,7 @@ contains
     if (allocated(self%cell)) then
       if (size(self%cell) /= stride*rows .or. size(self%next) /= n_disks) deallocate (self%cell, self%next)
     end if
-    if (.not. allocated(self%cell)) then
-      allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
-      call advise_huge_pages(self%cell(0)%slot(1), size(self%cell)*storage_size(self%cell, int64)/8)
-    end if
+    if (.not. allocated(self%cell)) allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
     do c = 0, stride*rows - 1
       self%cell(c)%slot = 0
     end do

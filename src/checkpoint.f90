@@ -239,7 +239,7 @@ contains
     integer(int32), allocatable :: numbers(:)
     integer :: n
     n = sum(sim%species%count)
-    call sim%make_disks(n)
+    allocate (sim%disk(n), sim%tag(n))
     allocate (reals(n), numbers(n))
     reals = 0
     numbers = 1

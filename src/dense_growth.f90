@@ -95,7 +95,7 @@ contains
     sim%species = species
     sim%species%mass = 1
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
-    call sim%make_disks(n)
+    allocate (sim%disk(n), sim%tag(n))
     wanted = pi*sum(species%count*species%radius**2)/product(box%edges())
     scale = sqrt(min(1.0_real64, loose/wanted))
     do

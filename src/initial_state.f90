@@ -65,7 +65,7 @@ contains
   subroutine list_disks(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: s, i, k
-    call sim%make_disks(sum(sim%species%count))
+    allocate (sim%disk(sum(sim%species%count)), sim%tag(sum(sim%species%count)))
     k = 0
     do s = 1, size(sim%species, kind=int32)
       do i = 1, sim%species(s)%count

@@ -5,7 +5,6 @@ module simulation_state
   use collisions, only: contact_law_t
   use disks, only: disk_t, species_t, tag_t
   use free_flight, only: flight, flight_velocity
-  use memory_hints, only: advise_huge_pages
   implicit none
   private
   public :: simulation_t
@@ -31,7 +30,6 @@ module simulation_state
     real(real64) :: dissipated = 0.0_real64       !! kinetic energy lost in collisions
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
   contains
-    procedure :: make_disks
     procedure :: time
     procedure :: n_disks
     procedure :: position
@@ -40,16 +38,6 @@ module simulation_state
   end type simulation_t
 
 contains
-
-  !> Makes n disks, in huge pages, as each event reads disks here and there.
-  subroutine make_disks(self, n)
-    class(simulation_t), intent(inout) :: self
-    integer, intent(in) :: n
-    if (allocated(self%disk)) deallocate (self%disk, self%tag)
-    allocate (self%disk(n), self%tag(n))
-    call advise_huge_pages(self%disk(1)%x(1), n*storage_size(self%disk, int64)/8)
-    call advise_huge_pages(self%tag(1)%species, n*storage_size(self%tag, int64)/8)
-  end subroutine make_disks
 
   !> Time since the start of the run.
   pure function time(self) result(t)
