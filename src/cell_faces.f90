@@ -18,7 +18,7 @@ module cell_faces
   type :: line_t
     real(real64) :: place = 0.0_real64             !! of the face or side [length]
     real(real64) :: inset = 0.0_real64             !! in radii, from there to the line that the disk's centre reaches
-    integer(int32) :: kind = 0                     !! 0: a side, first_crossing: a face of a cell
+    integer(int32) :: code = 0                     !! of the event: a side, or a crossing
   end type line_t
 
   type :: cell_faces_t
@@ -47,24 +47,28 @@ contains
     self%overlap = max(self%width - reach, 0.0_real64)
     self%falling = box%falling()
     self%box = box
-    call cut(self%column, n(1), box%lower(1), box%upper(1), self%width(1), self%overlap(1), box%periodic(1))
-    call cut(self%row, n(2), box%lower(2), box%upper(2), self%width(2), self%overlap(2), box%periodic(2))
+    call cut(self, 1, n(1), self%column)
+    call cut(self, 2, n(2), self%row)
   end subroutine set
 
-  !> The faces along one axis.
-  pure subroutine cut(line, n, lower, upper, width, overlap, periodic)
+  !> The faces of n columns (axis 1) or rows.
+  pure subroutine cut(self, axis, n, line)
+    class(cell_faces_t), intent(in) :: self
+    integer(int32), intent(in) :: axis, n
     type(line_t), allocatable, intent(out) :: line(:, :)
-    integer(int32), intent(in) :: n
-    real(real64), intent(in) :: lower, upper, width, overlap
-    logical, intent(in) :: periodic
-    integer(int32) :: k
+    real(real64) :: face
+    integer(int32) :: low, high, inset, k
+    low = 2 - 2*axis                               ! codes of the two sides
+    high = low - 1
+    inset = merge(0, 1, self%box%periodic(axis))
     allocate (line(0:1, n))
     do k = 1, n - 1
-      line(1, k) = line_t(lower + width*k + 0.5_real64*overlap, 0.0_real64, first_crossing)
-      line(0, k + 1) = line_t(lower + width*k - 0.5_real64*overlap, 0.0_real64, first_crossing)
+      face = self%box%lower(axis) + self%width(axis)*k
+      line(1, k) = line_t(face + 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + high)
+      line(0, k + 1) = line_t(face - 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + low)
     end do
-    line(0, 1) = line_t(lower, merge(0, 1, periodic), 0)
-    line(1, n) = line_t(upper, merge(0, -1, periodic), 0)
+    line(0, 1) = line_t(self%box%lower(axis), inset, low)
+    line(1, n) = line_t(self%box%upper(axis), -inset, high)
   end subroutine cut
 
   !> Of the cells that the disk is in, the one that it leaves last on its way.
@@ -89,7 +93,7 @@ contains
     integer(int32) :: up
     up = merge(1, 0, flight_velocity(v, g, s) > 0)
     left = abs(line(up, cell)%place - flight(x, v, g, s))
-    step = int(iand(2*up - 1, -merge(1, 0, left < overlap .and. line(up, cell)%kind /= 0)), int16)
+    step = int(iand(2*up - 1, -merge(1, 0, left < overlap .and. line(up, cell)%code <= first_crossing)), int16)
   end function ahead
 
   !> When and how the disk leaves its cell, or meets a side within it.
@@ -121,8 +125,8 @@ contains
     up_y = merge(1, 0, v(2) > 0)
     t_x = line_time(column(up_x, cell(1)), x(1), v(1), clock, radius)
     t_y = line_time(row(up_y, cell(2)), x(2), v(2), clock, radius)
-    code_x = column(up_x, cell(1))%kind - up_x
-    code_y = row(up_y, cell(2))%kind - 2 - up_y
+    code_x = column(up_x, cell(1))%code
+    code_y = row(up_y, cell(2))%code
     code = ieor(code_x, iand(-merge(1, 0, t_y < t_x), ieor(code_x, code_y)))
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_of
@@ -170,7 +174,7 @@ contains
     up = merge(1, 0, disk%v(axis) > 0)
     if (.not. abs(g) > 0) then
       t = line_time(line(up), disk%x(axis), disk%v(axis), disk%clock, disk%radius)
-    else if (line(0)%kind == 0 .or. line(1)%kind == 0) then
+    else if (any(line%code > first_crossing)) then
       t = falling_time(line(up), up, axis, box, disk, now)
       x = falling_time(line(1 - up), 1 - up, axis, box, disk, now)
       up = ieor(up, merge(1, 0, x < t))
@@ -190,7 +194,7 @@ contains
         t = now + (abs(v) + sqrt(v*v - 2*sense*g*gap))/(-sense*g)
       end if
     end if
-    code = line(up)%kind - 2*(axis - 1) - up
+    code = line(up)%code
   end subroutine leave
 
   !> When a falling disk reaches a face or side. The root before `now`, where it came in, is not the one.
@@ -202,8 +206,8 @@ contains
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     real(real64) :: t, sense, g
-    if (line%kind == 0) then
-      t = side_time(box, disk, 2 - 2*axis - up)
+    if (line%code > first_crossing) then
+      t = side_time(box, disk, line%code)
       return
     end if
     t = never
