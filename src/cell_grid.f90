@@ -26,7 +26,6 @@ module cell_grid
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
-    logical :: special = .false.                   !! more than small disks and walls
     logical :: obstructed = .false.                !! there are obstacles
     logical :: chosen = .false.                    !! colliding disks choose among the cells that they are in
     type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
@@ -61,13 +60,16 @@ contains
     do i = 1, sim%n_disks()
       x = (sim%position(i) - sim%box%lower)/self%faces%width
       sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      if (.not. sim%disk(i)%radius > small) call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
+      if (sim%disk(i)%radius > small) then
+        sim%tag(i)%cell = 1                        ! one that is marked in any case
+      else
+        call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
+      end if
     end do
     self%obstructed = sim%box%obstructed()
     if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width, self%faces%overlap)
     call self%big%start(sim, small, self%n, self%faces%width, self%faces%overlap)
-    self%special = any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0
-    if (.not. self%special) return
+    if (.not. (any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0)) return
     do iy = 1, int(self%n(2), int16)
       do ix = 1, int(self%n(1), int16)
         call mark_special(self, [ix, iy])
@@ -75,14 +77,14 @@ contains
     end do
   end subroutine build
 
-  !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side.
+  !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
   subroutine mark_special(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
     yes = at_periodic_edge(self, cell)
     if (self%obstructed) yes = yes .or. self%obstacles%reach_into(cell)
-    if (self%big%count > 0) yes = yes .or. self%big%first(cell(1), cell(2)) > 0
+    if (self%big%count > 0) yes = yes .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
     call self%cells%mark(self%cells%number(cell), yes)
   end subroutine mark_special
 
@@ -156,17 +158,13 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    if (self%special) then
-      if (is_special(self, sim, i)) then
-        call self%predict_special(sim, i)      ! by dispatch, which keeps it out of the way of the bulk
-        return
-      end if
-    end if
+    logical :: done
     if (self%faces%falling) then                   ! said in so many words, the compiler makes a version for each
-      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i)
+      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, done)
     else
-      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i)
+      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, done)
     end if
+    if (.not. done) call self%predict_special(sim, i)    ! by dispatch, which keeps it out of the way of the bulk
   end subroutine predict
 
   subroutine read_ahead(self, sim, stage, disks)
@@ -177,41 +175,29 @@ contains
     call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
   end subroutine read_ahead
 
-  !> Whether disk i may meet anything but small disks and walls.
-  pure function is_special(self, sim, i) result(yes)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    logical :: yes
-    yes = self%cells%cell(self%cells%number(sim%tag(i)%cell))%is_marked() .or. sim%disk(i)%radius > self%big%small
-  end function is_special
-
   !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
   !> first: it need not wait for those.
   subroutine predict_both(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
+    logical :: done
     if (self%chosen) then
       call settle(self, sim%disk(i), sim%tag(i), i)
       call settle(self, sim%disk(j), sim%tag(j), j)
     end if
-    if (self%special) then
-      if (is_special(self, sim, i) .or. is_special(self, sim, j)) then
-        call self%predict(sim, i)
-        call self%predict(sim, j)
-        return
-      end if
-    end if
     if (self%faces%falling) then
-      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, j)
+      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, j, done)
     else
-      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, j)
+      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, j, done)
     end if
+    if (done) return
+    call self%predict(sim, i)
+    call self%predict(sim, j)
   end subroutine predict_both
 
-  !> Where there are but small disks and walls.
-  subroutine predict_two(self, cell, disk, tag, now, falling, i, j)
+  !> Not done where there is more than small disks and walls.
+  subroutine predict_two(self, cell, disk, tag, now, falling, i, j, done)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(inout) :: disk(*)
@@ -219,15 +205,18 @@ contains
     real(real64), intent(in) :: now
     logical, value :: falling
     integer(int32), value :: i, j
+    logical, intent(out) :: done
     type(outlook_t) :: near_i, near_j
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
     call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
+    done = .not. (cell(near_i%cell)%is_marked() .or. cell(near_j%cell)%is_marked())
+    if (.not. done) return
     call expect_first(self, cell, disk, tag(i), falling, i, near_i, .true.)
     call expect_first(self, cell, disk, tag(j), falling, j, near_j, .true.)
   end subroutine predict_two
 
   !> Likewise for one disk.
-  subroutine predict_in_bulk(self, cell, disk, tag, now, falling, i)
+  subroutine predict_in_bulk(self, cell, disk, tag, now, falling, i, done)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(inout) :: disk(*)
@@ -235,8 +224,11 @@ contains
     real(real64), intent(in) :: now
     logical, value :: falling
     integer(int32), value :: i
+    logical, intent(out) :: done
     type(outlook_t) :: near
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
+    done = .not. cell(near%cell)%is_marked()
+    if (.not. done) return
     call expect_first(self, cell, disk, tag(i), falling, i, near, .false.)
   end subroutine predict_in_bulk
 
