@@ -140,6 +140,8 @@ contains
     real(real64), intent(in) :: dx(2)           !! [length]
     real(real64) :: shift(2), edges(2)
     edges = box%edges()
+    shift = 0
+    if (abs(dx(1)) < 0.5_real64*edges(1) .and. abs(dx(2)) < 0.5_real64*edges(2)) return    ! nearly always
     shift = merge(edges*anint(dx/edges), 0.0_real64, box%periodic)
   end function nearest_image
 

@@ -377,33 +377,38 @@ contains
     end do
   end subroutine scan_chain
 
-  !> Contacts where some of the nine cells are images beyond a periodic side; these are scanned cell by cell. In a
-  !> box of fewer than three columns a cell stands for several of its images.
+  !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
+  !> together. In a box of fewer than three columns a cell stands for several of its images.
   subroutine scan_around_edge(self, sim, i, t, code)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    integer(int32) :: dx, dy, c, there(2), image(2), list(list_capacity)
+    real(real64) :: shift(2)
+    integer(int32) :: there(2, -1:1), image(2, -1:1), k, image_x, image_y, dx, dy, c, list(list_capacity)
     integer(int64) :: n
-    n = 0
-    do dy = -1, 1
-      do dx = -1, 1
-        there = sim%tag(i)%cell + [dx, dy]
-        image = merge(merge(1, 0, there > self%n) - merge(1, 0, there < 1), 0, sim%box%periodic)
-        there = there - image*self%n
-        c = there(1) + self%cells%stride*there(2)
-        if (any(image /= 0)) then
-          call scan_cell(self, sim, i, c, image*sim%box%edges(), t, code)
-        else
-          call append(self%cells%cell(c), list, n)
-          call scan_chain(self, sim%disk, i, c, t, code)
-        end if
+    do k = -1, 1
+      there(:, k) = sim%tag(i)%cell + k
+      image(:, k) = merge(merge(1, 0, there(:, k) > self%n) - merge(1, 0, there(:, k) < 1), 0, sim%box%periodic)
+      there(:, k) = there(:, k) - image(:, k)*self%n
+    end do
+    do image_y = minval(image(2, :)), maxval(image(2, :))
+      do image_x = minval(image(1, :)), maxval(image(1, :))
+        shift = [image_x, image_y]*sim%box%edges()
+        n = 0
+        do dy = -1, 1
+          if (image(2, dy) /= image_y) cycle
+          do dx = -1, 1
+            if (image(1, dx) /= image_x) cycle
+            c = there(1, dx) + self%cells%stride*there(2, dy)
+            call append(self%cells%cell(c), list, n)
+            call scan_chain(self, sim%disk, i, c, t, code, shift)
+          end do
+        end do
+        call earliest_contact(sim%disk, i, int(n, int32), list, .false., .true., self%faces%box%gravity, t, code, shift)
       end do
     end do
-    call earliest_contact(sim%disk, i, int(n, int32), list, .false., self%faces%falling, &
-      self%faces%box%gravity, t, code)
   end subroutine scan_around_edge
 
   !> Contacts with the disks of one cell, seen `shift` away.
