@@ -9,6 +9,7 @@
 # of RUNS=5 on one core. All runs start from a state that was mixed before. Nothing else should run
 # meanwhile. RICOCHET=build/ricochet is measured; for --check it must not contain AVX-512 code.
 set -euo pipefail
+export LC_ALL=C # so that awk reads and writes 0.5, whatever the language
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
 program=$(realpath "${RICOCHET:-build/ricochet}")
