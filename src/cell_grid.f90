@@ -207,10 +207,10 @@ contains
     integer(int32), value :: i, j
     logical, intent(out) :: done
     type(outlook_t) :: near_i, near_j
+    done = .not. (cell(self%cells%number(tag(i)%cell))%is_marked() .or. cell(self%cells%number(tag(j)%cell))%is_marked())
+    if (.not. done) return
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
     call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
-    done = .not. (cell(near_i%cell)%is_marked() .or. cell(near_j%cell)%is_marked())
-    if (.not. done) return
     call expect_first(self, cell, disk, tag(i), falling, i, near_i, .true.)
     call expect_first(self, cell, disk, tag(j), falling, j, near_j, .true.)
   end subroutine predict_two
@@ -226,9 +226,9 @@ contains
     integer(int32), value :: i
     logical, intent(out) :: done
     type(outlook_t) :: near
-    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
-    done = .not. cell(near%cell)%is_marked()
+    done = .not. cell(self%cells%number(tag(i)%cell))%is_marked()
     if (.not. done) return
+    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
     call expect_first(self, cell, disk, tag(i), falling, i, near, .false.)
   end subroutine predict_in_bulk
 

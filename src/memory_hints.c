@@ -14,11 +14,11 @@ void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
     const size_t line = 64, large = 128*1024, page = 2*1024*1024;
-    if (bytes < large || bytes > PTRDIFF_MAX) return __real_malloc(bytes);
-    if (bytes < page) return aligned_alloc(line, (bytes + line - 1) / line * line);
-    void *memory = aligned_alloc(page, bytes);
+    void *memory;
+    if (bytes < large) return __real_malloc(bytes);
+    if (posix_memalign(&memory, bytes < page ? line : page, bytes)) return NULL;
 #ifdef MADV_HUGEPAGE
-    if (memory) madvise(memory, bytes / page * page, MADV_HUGEPAGE);
+    if (bytes >= page) madvise(memory, bytes / page * page, MADV_HUGEPAGE);
 #endif
     return memory;
 }
