@@ -45,7 +45,7 @@ contains
     reach = merge(1, 0, sim%box%periodic)
     do image_y = -reach(2), reach(2)
       do image_x = -reach(1), reach(1)
-        call earliest_contact(sim%disk, i, sim%n_disks(), self%disk, .false., .true., sim%box%gravity, &
+        call earliest_contact(sim%disk, i, sim%n_disks(), self%disk, sim%now, .false., .true., sim%box%gravity, &
           t, code, [image_x, image_y]*edges)
       end do
     end do

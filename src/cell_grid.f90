@@ -211,8 +211,8 @@ contains
     if (.not. done) return
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
     call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
-    call expect_first(self, cell, disk, tag(i), falling, i, near_i, .true.)
-    call expect_first(self, cell, disk, tag(j), falling, j, near_j, .true.)
+    call expect_first(self, cell, disk, tag(i), now, falling, i, near_i, .true.)
+    call expect_first(self, cell, disk, tag(j), now, falling, j, near_j, .true.)
   end subroutine predict_two
 
   !> Likewise for one disk.
@@ -229,15 +229,16 @@ contains
     done = .not. cell(self%cells%number(tag(i)%cell))%is_marked()
     if (.not. done) return
     call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
-    call expect_first(self, cell, disk, tag(i), falling, i, near, .false.)
+    call expect_first(self, cell, disk, tag(i), now, falling, i, near, .false.)
   end subroutine predict_in_bulk
 
   !> Writes into disk i the first of what it can expect.
-  subroutine expect_first(self, cell, disk, tag, falling, i, near, fresh)
+  subroutine expect_first(self, cell, disk, tag, now, falling, i, near, fresh)
     class(cell_grid_t), intent(in) :: self
     type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
+    real(real64), intent(in) :: now
     logical, value :: falling
     integer(int32), value :: i
     type(outlook_t), intent(in) :: near
@@ -246,8 +247,8 @@ contains
     integer(int32) :: code
     t = near%time
     code = near%code
-    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, t, code)
-    call earliest_contact(disk, i, near%n, near%list, fresh, falling, self%faces%box%gravity, t, code)
+    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, now, t, code)
+    call earliest_contact(disk, i, near%n, near%list, now, fresh, falling, self%faces%box%gravity, t, code)
     disk(i)%event_time = t
     disk(i)%partner = code
     tag%partner_stamp = disk(max(code, 1))%stamp   ! without a branch; of use if code > 0
@@ -285,15 +286,15 @@ contains
       call scan_around_edge(self, sim, i, t, code)
     else
       call gather(self%cells%cell, c, self%cells%stride, i, list, n)
-      call earliest_contact(sim%disk, i, n, list, .false., self%faces%falling, &
+      call earliest_contact(sim%disk, i, n, list, sim%now, .false., self%faces%falling, &
         self%faces%box%gravity, t, code)
-      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, t, code)
+      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, sim%now, t, code)
     end if
     if (self%big%count == 0) return
     e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
     do while (e > 0)
       associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], .false., .true., &
+        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], sim%now, .false., .true., &
           self%faces%box%gravity, t, code, entry%image*sim%box%edges())
         e = entry%next
       end associate
@@ -320,7 +321,7 @@ contains
     t = min(t, t_margin)
     do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
       do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, .false., .true., &
+        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, sim%now, .false., .true., &
           self%faces%box%gravity, t, code, [ix, iy]*sim%box%edges())
       end do
     end do
@@ -341,25 +342,27 @@ contains
   end function at_periodic_edge
 
   !> Contacts with the chained disks of the nine cells around c.
-  pure subroutine scan_crowd(self, disk, i, c, t, code)
+  pure subroutine scan_crowd(self, disk, i, c, now, t, code)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: now
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: k, m
     do k = c - self%cells%stride, c + self%cells%stride, self%cells%stride
       do m = k - 1, k + 1
-        call scan_chain(self, disk, i, m, t, code)
+        call scan_chain(self, disk, i, m, now, t, code)
       end do
     end do
   end subroutine scan_crowd
 
   !> Contacts with the chained disks of the crowded cell c.
-  pure subroutine scan_chain(self, disk, i, c, t, code, shift)
+  pure subroutine scan_chain(self, disk, i, c, now, t, code, shift)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: now
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     real(real64), intent(in), optional :: shift(2) !! of the cell, seen there [length]
@@ -372,7 +375,7 @@ contains
         list(n) = j - 1
         j = self%cells%next(j)
       end do
-      call earliest_contact(disk, i, n, list, .false., .true., self%faces%box%gravity, &
+      call earliest_contact(disk, i, n, list, now, .false., .true., self%faces%box%gravity, &
         t, code, shift)
     end do
   end subroutine scan_chain
@@ -403,10 +406,11 @@ contains
             if (image(1, dx) /= image_x) cycle
             c = there(1, dx) + self%cells%stride*there(2, dy)
             call append(self%cells%cell(c), list, n)
-            call scan_chain(self, sim%disk, i, c, t, code, shift)
+            call scan_chain(self, sim%disk, i, c, sim%now, t, code, shift)
           end do
         end do
-        call earliest_contact(sim%disk, i, int(n, int32), list, .false., .true., self%faces%box%gravity, t, code, shift)
+        call earliest_contact(sim%disk, i, int(n, int32), list, sim%now, .false., .true., self%faces%box%gravity, &
+          t, code, shift)
       end do
     end do
   end subroutine scan_around_edge
@@ -420,8 +424,8 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, &
-      .false., .true., self%faces%box%gravity, t, code, shift)
-    call scan_chain(self, sim%disk, i, c, t, code, shift)
+      sim%now, .false., .true., self%faces%box%gravity, t, code, shift)
+    call scan_chain(self, sim%disk, i, c, sim%now, t, code, shift)
   end subroutine scan_cell
 
 end module cell_grid

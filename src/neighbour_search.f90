@@ -75,17 +75,19 @@ contains
   !> The time is a pure function of the states of the two disks: both are advanced to the later of their
   !> clocks, and every term changes sign, or nothing, when they trade places. So it comes out the same to
   !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
-  !> moment the one with the lower disks wins.
+  !> moment the one with the lower disks wins. A contact before `now` is one of rounding: disks that collided
+  !> without rebound stay in contact to the last bits, which a period may change that one of them is moved by.
   !>
   !> Most candidates fail one combined test: the root is not real, not before the best so far, or not before the
   !> candidate's own event, at which that one will predict anew with i among its candidates. A root before t
   !> needs c < -2 b (t - late), here with a margin above rounding.
-  pure subroutine earliest_contact(disk, i, n, list, fresh, falling, gravity, t, partner, shift)
+  pure subroutine earliest_contact(disk, i, n, list, now, fresh, falling, gravity, t, partner, shift)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     integer(int32), value :: i
     integer(int32), value :: n                !! number of candidates
     integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
-    logical, value :: fresh                   !! nobody has a later clock than i
+    real(real64), value :: now                !! [time]
+    logical, value :: fresh                   !! nobody has a later clock than i, which is now
     logical, value :: falling                 !! `gravity` is not zero
     real(real64), intent(in) :: gravity(2)
     real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
@@ -95,8 +97,7 @@ contains
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
     integer(int32) :: k, j, whom
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
-    x = xi; y = yi; u = ui; v = vi; late = clock
-    best = t; whom = partner
+    x = xi; y = yi; u = ui; v = vi; late = clock; best = t; whom = partner
     margin = many*(abs(clock) + tiny(clock)/epsilon(clock)**2)
     from = 2*clock - margin
     do k = 1, n
@@ -130,6 +131,10 @@ contains
       if (in_time > 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
         if (b >= 0) cycle
+        if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or else it is now
+          if (b + (du*du + dv*dv)*(now - late) >= 0) cycle
+          t_j = now
+        end if
         if (.not. t_j < best) then            ! seldom
           if (t_j > best .or. .not. before(i, j + 1, whom)) cycle
         end if

@@ -231,6 +231,26 @@ def test_the_event_log_lists_every_collision(ran):
     assert events["committed"][()] == len(when)
 
 
+@pytest.mark.parametrize(
+    ("count", "packing", "seed"), [(3, 0.001, 22), (3, 0.001, 23), (10, 0.01, 29), (10, 0.01, 37)]
+)
+def test_a_period_brings_no_old_contact_back(ran, tmp_path, count, packing, seed):
+    """Without rebound a pair stays in contact to the last bits, which a period changes."""
+    sticky = f"""&run seed = {seed} / &contact restitution = 0 /
+    &box boundary = 'periodic', 'periodic' /
+    &species count = {count} packing_fraction = {packing} temperature = 1 /
+    &stop collisions_per_disk = 50 time = 1e5 /
+    &output event_log = .true. frames_every_collisions = 1 /
+    """
+    for name, search, queue in (("cells", "cells", "calendar"), ("pairs", "pairs", "heap")):
+        ways = ("--set", f"run.search={search}", "--set", f"run.queue={queue}")
+        file = ran(sticky, *ways, name=name)
+        assert (np.diff(file["events/time"][:]) >= 0).all()
+        file.close()
+    found = differences(tmp_path / "cells.h5", tmp_path / "pairs.h5")
+    assert [name for name in found if "parameters" not in name] == []
+
+
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
     """Cost apart: two numbers of 8 bytes, and both runs on one build and host."""
     every = ["--set", "output.frames_every_time=", "--set", "output.frames_every_events=7"]
