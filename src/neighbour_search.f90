@@ -117,10 +117,8 @@ contains
       dy = moved(yj, vj, gravity(2), sj, falling) - y
       du = sped_up(uj, gravity(1), sj, falling) - u
       dv = sped_up(vj, gravity(2), sj, falling) - v
-      if (present(shift)) then
-        dx = dx + shift(1)
-        dy = dy + shift(2)
-      end if
+      if (present(shift)) dx = dx + shift(1)
+      if (present(shift)) dy = dy + shift(2)
       sigma2 = (ri + rj)**2
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2
