@@ -7,7 +7,7 @@
 #   PFUNIT_DIR=folder an installed pFUnit; else unit tests run on a substitute
 #   V=1               shows the commands
 #
-# Modules and their order are derived from src/*.f90: file name = module name.
+# Modules and their order are derived from the files in src/: file name = module name.
 
 MAKEFLAGS += --no-print-directory
 comma := ,
@@ -29,7 +29,7 @@ FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): gfortran or HDF5 for Fortran 
 endif
 hdf5_flags := $(filter -I%,$(hdf5))
 hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
-# Arrays on cache lines: see src/memory_hints.c.
+# Arrays on cache lines: see src/base/memory_hints.c.
 libraries = -Wl,--wrap=malloc $(hdf5_libs)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
 flags = $(FFLAGS) $(CHECKS) -ffp-contract=off -ffpe-summary=none
@@ -37,7 +37,9 @@ flags = $(FFLAGS) $(CHECKS) -ffp-contract=off -ffpe-summary=none
 PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
 
-sources := $(wildcard src/*.f90)
+sources := $(wildcard src/*.f90 src/*/*.f90)
+vpath %.f90 $(sort $(dir $(sources)))
+vpath %.c src/base
 modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(BUILD)/memory_hints_c.o
 
@@ -53,12 +55,12 @@ $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 	@echo "link    $@"
 	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(libraries)
 
-$(BUILD)/%.o: src/%.f90 $(BUILD)/flags
+$(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
 	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
 # The one thing that Fortran cannot say, by the same driver; link-time optimisation makes it an instruction.
-$(BUILD)/%_c.o: src/%.c $(BUILD)/flags
+$(BUILD)/%_c.o: %.c $(BUILD)/flags
 	@echo "compile $<"
 	$(Q)$(FC) -Wall -Wextra $(filter -O% -g -march=% -flto% -Werror,$(flags)) -c -o $@ $<
 
@@ -88,7 +90,7 @@ $(BUILD)/build_info.f90: FORCE | $(BUILD)
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
 
 # What tests share, among it the substitute for pFUnit, which pFUnit itself replaces.
-suites := tests
+suites := tests/unit
 tests := $(wildcard $(suites)/test_*.pf)
 shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
 test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
@@ -192,14 +194,14 @@ bench-check:  ## counts instructions per collision against what is promised
 
 # What the sanitizers watch: the unit tests, runs that write, stop and resume, damaged input. In unit tests leaks
 # do not count: gfortran 12 never frees the array constructors of obstacles that they are full of.
-watched := $(patsubst %,tests/test_%.py,output_file restart)
+watched := $(patsubst %,tests/runs/test_%.py,output_file restart)
 sanitized := $(BUILD)/sanitized
 
 sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
 	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q $(watched)
-	@$(venv) tests/fuzz_input.py --count 500 --program $(sanitized)/ricochet
+	@$(venv) tests/runs/fuzz_input.py --count 500 --program $(sanitized)/ricochet
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 

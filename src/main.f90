@@ -16,18 +16,19 @@ contains
     type(command_t) :: command
     type(error_t), allocatable :: error
     integer :: code
+
     code = exit_finished
     call fill_standard_streams()
     call read_command_line(command, error)
     if (.not. allocated(error)) then
-      if (command%question /= '') then
+      if (command%question /= "") then
         call answer(command, error)
       else
         call perform_run(command, error)
       end if
     end if
     if (allocated(error)) then
-      if (error%message /= '') write (error_unit, '(a)') error%message
+      if (error%message /= "") write (error_unit, "(a)") error%message
       code = error%code
     end if
     call leave(code)

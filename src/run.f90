@@ -17,8 +17,7 @@ module run
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, &
-    watch_signals
+  use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
   use texts, only: written
   use time_stepped, only: step_warning
   implicit none
@@ -44,8 +43,9 @@ contains
     real(real64) :: started, cpu(2), rate             ! [s], [1/s]
     integer(int64) :: before
     logical :: folder_is_new
+
     started = seconds()
-    input_text = ''
+    input_text = ""
     call watch_signals()
     call read_settings(command%input, command%overrides, settings, groups, input_text, error)
     if (.not. allocated(error)) call check_memory(settings%species, error)
@@ -61,9 +61,8 @@ contains
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
-      call output%open(command%output, settings, groups, input_text, command%overrides, sim, &
-        command%force, error)
-      if (folder_is_new .and. .not. (allocated(error) .or. command%quiet)) write (error_unit, '(a)') &
+      call output%open(command%output, settings, groups, input_text, command%overrides, sim, command%force, error)
+      if (folder_is_new .and. .not. (allocated(error) .or. command%quiet)) write (error_unit, "(a)") &
         "note: "//folder_of(command%output)//" was not there: it is made for the output"
     end if
     if (allocated(error)) return
@@ -98,6 +97,7 @@ contains
     integer(int64) :: turns
     real(real64) :: now, looked, next_checkpoint      ! [s]
     real(real64) :: begun                             ! by the clock of the simulation [time]
+
     turns = 1
     begun = sim%time()
     looked = seconds()
@@ -141,6 +141,7 @@ contains
     class(evolution_t), intent(in) :: evolution
     type(stop_rule_t), intent(in) :: stop_rule
     logical :: yes
+
     yes = stop_rule%met(sim) .or. stop_rule%too_cold(sim) .or. &
       (evolution%idle .and. .not. stop_rule%limits%time < never)
   end function is_over
@@ -150,6 +151,7 @@ contains
     integer(int64), intent(in) :: turns
     real(real64), intent(in) :: elapsed               !! for these turns [s]
     integer(int64) :: n
+
     n = turns
     if (elapsed < 0.5_real64*look_around) n = min(2*turns, 2_int64**40)
     if (elapsed > 2*look_around) n = max(turns/2, 1_int64)
@@ -160,10 +162,11 @@ contains
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
-    text = ''
-    if (settings%run%dynamics == 'steps') text = step_warning(sim, settings%run%dt)
-    if (text /= '') write (error_unit, '(a)') "warning: "//text
-    if (settings%stop%energy_fraction > 0 .and. .not. sim%start_energy > 0) write (error_unit, '(a)') &
+
+    text = ""
+    if (settings%run%dynamics == "steps") text = step_warning(sim, settings%run%dt)
+    if (text /= "") write (error_unit, "(a)") "warning: "//text
+    if (settings%stop%energy_fraction > 0 .and. .not. sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn
 
@@ -176,6 +179,7 @@ contains
     real(real64), intent(in) :: rate                  !! collisions per processor time of the simulation [1/s]
     character(len=:), allocatable :: text
     character(len=1), parameter :: eol = new_line("a")
+
     text = "output = "//path// &
       eol//"disks = "//written(int(sim%n_disks()))// &
       eol//"collisions = "//written(sim%collisions)// &

@@ -21,6 +21,7 @@ contains
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
+
     call create_simulation(settings, sim, error)
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
@@ -31,20 +32,21 @@ contains
     class(evolution_t), allocatable, intent(out) :: evolution
     type(event_driven_t), allocatable :: events
     type(time_stepped_t), allocatable :: steps
-    if (settings%dynamics == 'steps') then
+
+    if (settings%dynamics == "steps") then
       allocate (steps)
       steps%dt = settings%dt
-      steps%every_pair = settings%search /= 'cells'
+      steps%every_pair = settings%search /= "cells"
       call move_alloc(steps, evolution)
     else
       allocate (events)
-      if (settings%search == 'cells') then
+      if (settings%search == "cells") then
         allocate (cell_grid_t :: events%search)
       else
         allocate (all_pairs_t :: events%search)
-        events%search%everyone = settings%search == 'rescan'
+        events%search%everyone = settings%search == "rescan"
       end if
-      events%calendar = settings%queue == 'calendar'
+      events%calendar = settings%queue == "calendar"
       call move_alloc(events, evolution)
     end if
   end subroutine choose_evolution

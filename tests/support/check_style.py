@@ -2,8 +2,9 @@
 
     python tests/support/check_style.py [FOLDER]
 
-Layers (their table stands in src/README.md), file and procedure lengths, privacy, names, no
-pre-processor; and no path of somebody's machine in any file of the project.
+Arrows between folders (the picture in src/README.md), lengths of files, procedures and argument
+lists, comments before procedures, privacy, names, no preprocessor; and no path of somebody's
+machine in any file of the project.
 """
 
 import re
@@ -14,13 +15,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 OUTSIDE = {"hdf5", "iso_c_binding", "iso_fortran_env", "ieee_arithmetic"}
-MOST_LINES_OF_FILE = 500
-MOST_LINES_OF_PROCEDURE = 60
+MOST_LINES_OF_FILE = 530
+MOST_LINES_OF_PROCEDURE = 62
+MOST_ARGUMENTS = 7
+MOST_FILES_OF_FOLDER = 13
+ARROWS = re.compile(r"^ *(\w+) *--> *(\w+(?: *& *\w+)*) *$", re.MULTILINE)
 UNIT = re.compile(r"\s*(?:module|program)\s+(\w+)\s*$")
 USE = re.compile(r"\s*use(?:\s*,\s*intrinsic\s*::)?\s+(\w+)\s*(,\s*only\s*:)?")
 PREFIX = r"(?:(?:pure|impure|elemental|recursive|module)\s+|(?:\w+(?:\([^)]*\))?)\s+)*?"
 PROCEDURE = re.compile(rf"\s*{PREFIX}(?:subroutine|function)\s+(\w+)\s*\(")
 END = re.compile(r"\s*end\s+(?:subroutine|function)\b")
+TYPES = "type|class|real|integer|logical|character|procedure"
+DECLARATION = re.compile(rf"(?:use|import|implicit)\b|(?:{TYPES})\b.*::")
 EMPTY_WORDS = re.compile(r"(?:get|set(?!_in_)|do|handle)_|(?:\w+_)?(?:manager|utils?)(?:_|$)")
 MACHINE_PATH = re.compile(r"""(?:^|[\s"'=(:])/(?:home|root|Users|work|tmp|mnt|scratch)/\w""")
 
@@ -41,26 +47,29 @@ def code_of(line: str) -> str:
     return re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0].lower()
 
 
-def layers_of(table: str) -> dict[str, int]:
-    """The layer of each module, from the rows `| layer | `module` | ...` of src/README.md."""
-    rows = re.findall(r"^\| *(\d+) *\| *`(\w+)` *\|", table, re.MULTILINE)
-    return {name: int(layer) for layer, name in rows}
+def arrows_of(page: str) -> dict[str, set[str]]:
+    """The folders that each folder may use, from the lines `one --> other & another`."""
+    arrows: dict[str, set[str]] = {}
+    for start, ends in ARROWS.findall(page):
+        arrows.setdefault(start, set()).update(re.findall(r"\w+", ends))
+    return arrows
 
 
-def layer_problems(path: Path, lines: list[str], layers: dict[str, int]) -> Iterator[Problem]:
-    """Modules outside the table, and uses that do not point downwards or name no entities."""
-    name = path.stem
-    if name not in layers:
-        yield Problem(path, 1, f"{name} is missing in the table of src/README.md")
+def arrow_problems(
+    path: Path, lines: list[str], homes: dict[str, str], arrows: dict[str, set[str]]
+) -> Iterator[Problem]:
+    """Uses that name no entities, or have no arrow in the picture."""
+    own = path.parent.name
     for number, line in enumerate(lines, start=1):
         use = USE.match(line)
         if not use:
             continue
         if not use[2]:
             yield Problem(path, number, f"use {use[1]} without only")
-        own, other = layers.get(name), layers.get(use[1])
-        if use[1] not in OUTSIDE and None not in (own, other) and other >= own:
-            yield Problem(path, number, f"layer {own} uses {use[1]} of layer {other}")
+        other = homes.get(use[1], own)
+        if own != "src" and other not in arrows.get(own, set()) | {own}:
+            what = f"{own}/ uses {use[1]} of {other}/"
+            yield Problem(path, number, f"{what}: no such arrow in src/README.md")
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
@@ -74,7 +83,7 @@ def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
         yield Problem(path, 1, "no private statement")
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):
-            yield Problem(path, number, "pre-processor line")
+            yield Problem(path, number, "preprocessor line")
 
 
 def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
@@ -89,6 +98,48 @@ def procedure_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
             start, name = number, procedure[1]
             if EMPTY_WORDS.match(name):
                 yield Problem(path, number, f"{name}: such a name says nothing; say what it is")
+
+
+def statements_of(text: str) -> list[tuple[int, str]]:
+    """Each statement as one line, with the number of its first; comments and blanks as well."""
+    statements: list[tuple[int, str]] = []
+    continued = False
+    for number, line in enumerate(text.splitlines(), start=1):
+        code = line.strip() if line.lstrip().startswith("!") else code_of(line).strip()
+        if continued:
+            statements[-1] = (statements[-1][0], statements[-1][1] + code.removesuffix("&"))
+        else:
+            statements.append((number, code.removesuffix("&")))
+        continued = code.endswith("&") and not code.startswith("!")
+    return statements
+
+
+def heading_problems(path: Path, text: str) -> Iterator[Problem]:
+    """Procedures without `!>`, with long argument lists, or whose body follows without a gap.
+
+    Interfaces of C functions need no comment: their manual pages have it.
+    """
+    statements = statements_of(text)
+    foreign = declared = inside = False
+    before = ""
+    for number, statement in statements:
+        if re.match(r"(abstract )?interface\b|end interface\b", statement):
+            foreign = statement.startswith("interface")
+        elif (procedure := PROCEDURE.match(statement)) and not END.match(statement):
+            name, words = procedure[1], statement[procedure.end() :].split(")")[0]
+            count = len([word for word in words.split(",") if word.strip()])
+            if not foreign and not before.startswith("!>"):
+                yield Problem(path, number, f"{name} has no !> before it")
+            if not foreign and count > MOST_ARGUMENTS:
+                yield Problem(path, number, f"{name} has {count} arguments, not {MOST_ARGUMENTS}")
+            inside, declared = True, False
+        elif inside and DECLARATION.match(statement):
+            declared = True
+        elif inside and not statement.startswith("!"):
+            if declared and statement and not re.match(r"end\b|contains\b", statement) and before:
+                yield Problem(path, number, f"{name}: no blank line before the body")
+            inside = False
+        before = statement
 
 
 def path_problems(root: Path) -> Iterator[Problem]:
@@ -106,23 +157,34 @@ def path_problems(root: Path) -> Iterator[Problem]:
 
 def problems_of(root: Path) -> Iterator[Problem]:
     """All problems of the project in `root`."""
-    layers = layers_of((root / "src" / "README.md").read_text())
-    paths = sorted((root / "src").glob("*.f90"))
-    for name in layers.keys() - {path.stem for path in paths} - {"build_info"}:
-        yield Problem(Path("src/README.md"), 1, f"there is no src/{name}.f90")
+    arrows = arrows_of((root / "src" / "README.md").read_text())
+    paths = sorted((root / "src").rglob("*.f90"))
+    homes = {path.stem: path.parent.name for path in paths}
+    folders = {path.parent for path in paths if path.parent.name != "src"}
+    named = arrows.keys() | set().union(*arrows.values())
+    for name in sorted(named - {folder.name for folder in folders} - {"run"}):
+        yield Problem(Path("src/README.md"), 1, f"there is no folder src/{name}")
+    for folder in sorted(folders):
+        if not (folder / "README.md").exists():
+            yield Problem(folder.relative_to(root), 1, "has no README.md")
+        if len(list(folder.glob("*.f90"))) > MOST_FILES_OF_FOLDER:
+            yield Problem(folder.relative_to(root), 1, f"more than {MOST_FILES_OF_FOLDER} modules")
     for path in paths:
-        lines = [code_of(line) for line in path.read_text().splitlines()]
+        text = path.read_text()
+        lines = [code_of(line) for line in text.splitlines()]
         own = path.relative_to(root)
-        yield from layer_problems(own, lines, layers)
+        yield from arrow_problems(own, lines, homes, arrows)
         yield from unit_problems(own, lines)
         yield from procedure_problems(own, lines)
+        if "--strict" in sys.argv:
+            yield from heading_problems(own, text)
     yield from path_problems(root)
 
 
 def main() -> int:
     """Prints the problems; 1 if there are any."""
-    root = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    problems = list(problems_of(root))
+    folders = [argument for argument in sys.argv[1:] if argument != "--strict"]
+    problems = list(problems_of(Path(folders[0] if folders else ".")))
     print(*problems, sep="\n", end="\n" if problems else "")
     return 1 if problems else 0
 

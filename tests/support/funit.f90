@@ -13,7 +13,7 @@ module funit
 
   integer, parameter :: pf_real = real64      !! the kind in which tolerances apply
   integer, parameter :: pair_length = 132     !! enough for two numbers; long texts are cut
-  character(len=*), parameter :: pair_format = '("expected <",g0,"> actual <",g0,">")'
+  character(len=*), parameter :: pair_format = "(""expected <"",g0,""> actual <"",g0,"">"")"
 
   !> Whether two values are equal, by the rules of `@assertEqual`.
   interface pf_same
@@ -60,13 +60,13 @@ contains
   subroutine pf_begin()
     integer :: length
     character(len=2) :: option
-    filter = ''
-    report = ''
+    filter = ""
+    report = ""
     if (command_argument_count() == 0) return
     call get_command_argument(1, option)
     call get_command_argument(2, length=length)
-    if (option /= '-f' .or. command_argument_count() /= 2) then
-      write (error_unit, '(a)') 'usage: unit_tests [-f part_of_a_name]'
+    if (option /= "-f" .or. command_argument_count() /= 2) then
+      write (error_unit, "(a)") "usage: unit_tests [-f part_of_a_name]"
       stop 1
     end if
     deallocate (filter)
@@ -83,7 +83,7 @@ contains
     tests = tests + 1
     failed = .false.
     test_name = name
-    write (output_unit, '(a)', advance='no') '.'
+    write (output_unit, "(a)", advance="no") "."
     flush (output_unit)
     if (present(before)) call before()
     if (.not. failed) then
@@ -92,19 +92,19 @@ contains
     end if
     if (failed) then
       failures = failures + 1
-      write (output_unit, '(a)', advance='no') 'F'
+      write (output_unit, "(a)", advance="no") "F"
     end if
   end subroutine pf_run
 
   !> The report, and exit status 0 or 2. No test at all is a failure too.
   subroutine pf_finish()
-    write (output_unit, '(a)') ''
+    write (output_unit, "(a)") ""
     if (failures == 0 .and. tests > 0) then
-      write (output_unit, '(a,/,a,i0,a)') ' OK', ' (', tests, merge(' test) ', ' tests)', tests == 1)
+      write (output_unit, "(a,/,a,i0,a)") " OK", " (", tests, merge(" test) ", " tests)", tests == 1)
       return
     end if
-    write (output_unit, '(a)') report//' FAILURES!!!'
-    write (output_unit, '(2(a,i0))') 'Tests run: ', tests, ', Failures: ', failures
+    write (output_unit, "(a)") report//" FAILURES!!!"
+    write (output_unit, "(2(a,i0))") "Tests run: ", tests, ", Failures: ", failures
     flush (output_unit)
     stop 2
   end subroutine pf_finish
@@ -115,12 +115,12 @@ contains
     integer, intent(in) :: line
     character(len=*), intent(in), optional :: message
     character(len=12) :: number
-    character, parameter :: nl = new_line('a')
-    write (number, '(i0)') line
+    character, parameter :: nl = new_line("a")
+    write (number, "(i0)") line
     failed = .true.
-    report = report//'Failure in: '//test_name//nl//'  Location: ['//file//':'//trim(number)//']'//nl
-    if (present(message)) report = report//'  '//message//nl
-    if (what /= '') report = report//'  '//what//nl
+    report = report//"Failure in: "//test_name//nl//"  Location: ["//file//":"//trim(number)//"]"//nl
+    if (present(message)) report = report//"  "//message//nl
+    if (what /= "") report = report//"  "//what//nl
   end subroutine pf_fail
 
   !> A failed comparison, reported at the first element that is wrong.
@@ -133,11 +133,11 @@ contains
     character(len=12) :: number
     integer :: k
     k = findloc(good, .false., dim=1)
-    write (number, '(i0)') k
+    write (number, "(i0)") k
     if (size(good) == 1) then
-      call pf_fail(file, line, what//' failed: '//trim(pairs(k)), message)
+      call pf_fail(file, line, what//" failed: "//trim(pairs(k)), message)
     else
-      call pf_fail(file, line, what//' failed at element '//trim(number)//': '//trim(pairs(k)), message)
+      call pf_fail(file, line, what//" failed at element "//trim(number)//": "//trim(pairs(k)), message)
     end if
   end subroutine pf_fail_pair
 

@@ -4,7 +4,7 @@ It accepts the part of pFUnit's language that the tests need and refuses everyth
 pFUnit itself would accept or silently ignore: a file that runs here runs under pFUnit with the same
 verdict. One line stays one line, so compilers and failures speak of lines of the .pf file.
 
-    python translate_pf.py tests/test_errors.pf build/tests/test_errors.F90
+    python translate_pf.py tests/unit/test_errors.pf build/tests/test_errors.F90
 """
 
 import re

@@ -1,0 +1,161 @@
+!> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36
+!> (2021)), seeded through SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), so that neighbouring
+!> seeds give unrelated streams. A stream is a value: a copy goes on like the original.
+!>
+!> Both generators calculate modulo 2**64. Fortran has no unsigned integers and forbids overflow of
+!> the signed ones, hence the sums in two halves.
+module random_stream
+  use kinds, only: int32, int64, real64
+  implicit none
+  private
+  public :: random_stream_t
+
+  integer(int64), parameter :: lower_half = int(z"FFFFFFFF", int64)
+  real(real64), parameter :: unit_53 = 2.0_real64**(-53)
+
+  type :: random_stream_t
+    integer(int64) :: word(4) = 0_int64         !! the state, not all zero once seeded
+  contains
+    procedure :: seed
+    procedure :: draw_word
+    procedure :: draw_uniform
+    procedure :: draw_index
+    procedure :: draw_direction
+    procedure :: draw_normals
+  end type random_stream_t
+
+contains
+
+  !> Starts the stream that belongs to a seed and a key. Streams with different keys are
+  !> independent: what one purpose draws never shifts what another one gets.
+  pure subroutine seed(self, number, key)
+    class(random_stream_t), intent(inout) :: self
+    integer(int64), intent(in) :: number        !! the user's seed, any value
+    integer, intent(in) :: key(:)               !! what the stream is for; may be empty
+    integer(int64) :: state, word
+    integer :: k
+
+    state = number
+    do k = 1, size(key)
+      call draw_seed(state, word)
+      state = ieor(word, int(key(k), int64))
+    end do
+    do k = 1, size(self%word)
+      call draw_seed(state, self%word(k))
+    end do
+  end subroutine seed
+
+  !> The next 64 random bits.
+  pure subroutine draw_word(self, word)
+    class(random_stream_t), intent(inout) :: self
+    integer(int64), intent(out) :: word
+    integer(int64) :: shifted
+
+    associate (s => self%word)
+      word = ishftc(wrapped_sum(s(2), ishft(s(2), 2)), 7)
+      word = wrapped_sum(word, ishft(word, 3))
+      shifted = ishft(s(2), 17)
+      s(3) = ieor(s(3), s(1))
+      s(4) = ieor(s(4), s(2))
+      s(2) = ieor(s(2), s(3))
+      s(1) = ieor(s(1), s(4))
+      s(3) = ieor(s(3), shifted)
+      s(4) = ishftc(s(4), 45)
+    end associate
+  end subroutine draw_word
+
+  !> A number uniform in [0, 1): a multiple of 2**-53 from the upper 53 bits.
+  pure subroutine draw_uniform(self, u)
+    class(random_stream_t), intent(inout) :: self
+    real(real64), intent(out) :: u
+    integer(int64) :: word
+
+    call self%draw_word(word)
+    u = real(ishft(word, -11), real64)*unit_53
+  end subroutine draw_uniform
+
+  !> One of 1, 2, ..., n.
+  pure subroutine draw_index(self, n, k)
+    class(random_stream_t), intent(inout) :: self
+    integer(int32), intent(in) :: n             !! > 0
+    integer(int32), intent(out) :: k
+    real(real64) :: u
+
+    call self%draw_uniform(u)
+    k = 1 + int(n*u, int32)
+  end subroutine draw_index
+
+  !> A unit vector of random direction: a point of the disk, normalised. No sine or cosine, whose
+  !> last bits depend on the mathematical library.
+  pure subroutine draw_direction(self, e)
+    class(random_stream_t), intent(inout) :: self
+    real(real64), intent(out) :: e(2)
+    real(real64) :: s
+
+    call draw_in_disk(self, e, s)
+    e = e/sqrt(s)
+  end subroutine draw_direction
+
+  !> Two independent normal deviates of mean 0 and variance 1, by the polar method (Marsaglia and
+  !> Bray, SIAM Rev. 6, 260 (1964)). It takes a logarithm: the last bit may depend on the
+  !> mathematical library.
+  pure subroutine draw_normals(self, z)
+    class(random_stream_t), intent(inout) :: self
+    real(real64), intent(out) :: z(2)
+    real(real64) :: s
+
+    call draw_in_disk(self, z, s)
+    z = z*sqrt(-2*log(s)/s)
+  end subroutine draw_normals
+
+  !> A point uniform in the unit disk without its centre, and its squared distance from there.
+  pure subroutine draw_in_disk(stream, point, s)
+    class(random_stream_t), intent(inout) :: stream
+    real(real64), intent(out) :: point(2), s
+
+    do
+      call stream%draw_uniform(point(1))
+      call stream%draw_uniform(point(2))
+      point = 2*point - 1
+      s = point(1)**2 + point(2)**2
+      if (s > 0 .and. s < 1) exit
+    end do
+  end subroutine draw_in_disk
+
+  !> One step of SplitMix64.
+  pure subroutine draw_seed(state, word)
+    integer(int64), intent(inout) :: state
+    integer(int64), intent(out) :: word
+    integer(int64), parameter :: step = ior(ishft(int(z"9E3779B9", int64), 32), int(z"7F4A7C15", int64))
+    integer(int64), parameter :: factor_1 = ior(ishft(int(z"BF58476D", int64), 32), int(z"1CE4E5B9", int64))
+    integer(int64), parameter :: factor_2 = ior(ishft(int(z"94D049BB", int64), 32), int(z"133111EB", int64))
+
+    state = wrapped_sum(state, step)
+    word = wrapped_product(ieor(state, ishft(state, -30)), factor_1)
+    word = wrapped_product(ieor(word, ishft(word, -27)), factor_2)
+    word = ieor(word, ishft(word, -31))
+  end subroutine draw_seed
+
+  !> a + b modulo 2**64.
+  pure function wrapped_sum(a, b) result(c)
+    integer(int64), intent(in) :: a, b
+    integer(int64) :: c, low, high
+
+    low = iand(a, lower_half) + iand(b, lower_half)
+    high = ishft(a, -32) + ishft(b, -32) + ishft(low, -32)
+    c = ior(ishft(high, 32), iand(low, lower_half))
+  end function wrapped_sum
+
+  !> a*b modulo 2**64 by written multiplication in binary: slow, but only seeding needs it.
+  pure function wrapped_product(a, b) result(c)
+    integer(int64), intent(in) :: a, b
+    integer(int64) :: c
+    integer :: k
+
+    c = 0
+    do k = 0, bit_size(b) - 1
+      if (btest(b, k)) c = wrapped_sum(c, ishft(a, k))
+    end do
+  end function wrapped_product
+
+end module random_stream

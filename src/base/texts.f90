@@ -1,0 +1,182 @@
+!> Short texts: lists of them, numbers as text, and the known word nearest to a misspelt one.
+module texts
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
+  use kinds, only: int64, real64
+  implicit none
+  private
+  public :: text_t, written, written_exactly, lower_case, shown, joined, nearest_word, suggestion
+
+  !> A text of its own length, as an element of a list.
+  type :: text_t
+    character(len=:), allocatable :: text
+  end type text_t
+
+  !> A number as a person would write it.
+  interface written
+    procedure :: written_integer, written_long_integer, written_real
+  end interface written
+
+  character(len=*), parameter :: upper_letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+  character(len=*), parameter :: lower_letters = "abcdefghijklmnopqrstuvwxyz"
+
+contains
+
+  pure function written_integer(number) result(text)
+    integer, intent(in) :: number
+    character(len=:), allocatable :: text
+
+    text = written_long_integer(int(number, int64))
+  end function written_integer
+
+  pure function written_long_integer(number) result(text)
+    integer(int64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=24) :: buffer
+
+    write (buffer, "(i0)") number
+    text = trim(buffer)
+  end function written_long_integer
+
+  !> Without trailing zeros; with an exponent only where it helps.
+  pure recursive function written_real(number) result(text)
+    real(real64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=24) :: buffer
+    integer :: exponent
+
+    if (.not. ieee_is_normal(number)) then          ! NaN, infinite, or its power of ten underflows
+      write (buffer, "(es24.16e3)") number
+      text = trim(adjustl(buffer))
+    else if (number == 0 .or. (abs(number) >= 1.0e-3_real64 .and. abs(number) < 1.0e6_real64)) then
+      write (buffer, "(f24.6)") number
+      text = trim(adjustl(buffer(:verify(buffer, "0", back=.true.))))
+      if (text(len(text):) == ".") text = text(:len(text) - 1)
+    else
+      exponent = floor(log10(abs(number)))
+      text = written_real(number/10.0_real64**exponent)//"e"//written_integer(exponent)
+    end if
+  end function written_real
+
+  !> With as many digits as it takes to read the same number back.
+  pure function written_exactly(number) result(text)
+    real(real64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=24) :: buffer
+    real(real64) :: again
+
+    text = written_real(number)
+    read (text, *) again
+    if (again == number) return
+    write (buffer, "(es24.16e3)") number
+    text = trim(adjustl(buffer))
+  end function written_exactly
+
+  !> ASCII letters in lower case; every other byte as it is.
+  pure function lower_case(text) result(lower)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: lower
+    integer :: i, letter
+
+    do i = 1, len(text)
+      lower(i:i) = text(i:i)
+      letter = index(upper_letters, text(i:i))
+      if (letter > 0) lower(i:i) = lower_letters(letter:letter)
+    end do
+  end function lower_case
+
+  !> Foreign text fit for a message: in quotes, cut when long, control characters as `?`.
+  pure function shown(text) result(quoted)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+    integer, parameter :: longest = 40
+    integer :: i, last
+
+    last = min(len(text), longest)
+    do while (last > longest - 4 .and. last < len(text))
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! not inside a UTF-8 character
+      last = last - 1
+    end do
+    quoted = text(:last)
+    do i = 1, len(quoted)
+      if (iachar(quoted(i:i)) < 32 .or. iachar(quoted(i:i)) == 127) quoted(i:i) = "?"
+    end do
+    if (len(text) > longest) quoted = quoted//"..."
+    quoted = '"'//quoted//'"'
+  end function shown
+
+  !> The words in one line, with `glue` between them.
+  pure function joined(words, glue) result(line)
+    character(len=*), intent(in) :: words(:)
+    character(len=*), intent(in) :: glue
+    character(len=:), allocatable :: line
+    integer :: i
+
+    line = ""
+    do i = 1, size(words)
+      if (i > 1) line = line//glue
+      line = line//trim(words(i))
+    end do
+  end function joined
+
+  !> What to say after an unknown word: the known one that was probably meant, or all of them.
+  pure function suggestion(word, known) result(advice)
+    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: known(:)
+    character(len=:), allocatable :: advice
+
+    advice = nearest_word(word, known)
+    if (advice /= "") then
+      advice = "did you mean """//advice//"""?"
+    else
+      advice = "known: "//joined(known, ", ")
+    end if
+  end function suggestion
+
+  !> The known word that `word` was probably meant to be: it begins so, or up to a third of the
+  !> letters differ. Empty if there is none.
+  pure function nearest_word(word, known) result(nearest)
+    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: known(:)
+    character(len=:), allocatable :: nearest
+    integer, parameter :: longest = 64
+    integer :: k, distance, least
+
+    nearest = ""
+    if (len(word) > longest) return
+    least = (len(word) + 1)/3
+    do k = 1, size(known)
+      distance = edit_distance(lower_case(word), trim(known(k)))
+      if (distance > least) cycle
+      if (distance == least .and. nearest /= "") cycle
+      least = distance
+      nearest = trim(known(k))
+    end do
+    if (nearest /= "" .or. len(word) < 3) return
+    do k = size(known), 1, -1
+      if (index(known(k), lower_case(word)) == 1) nearest = trim(known(k))
+    end do
+  end function nearest_word
+
+  !> Insertions, deletions, changes and swaps of neighbours that turn `a` into `b`
+  !> (Damerau 1964, optimal string alignment).
+  pure function edit_distance(a, b) result(distance)
+    character(len=*), intent(in) :: a, b
+    integer :: distance
+    integer :: d(-1:len(a), -1:len(b)), i, j, change
+
+    d(0:, 0) = [(i, i=0, len(a))]
+    d(0, 0:) = [(j, j=0, len(b))]
+    do j = 1, len(b)
+      do i = 1, len(a)
+        change = merge(0, 1, a(i:i) == b(j:j))
+        d(i, j) = min(d(i - 1, j) + 1, d(i, j - 1) + 1, d(i - 1, j - 1) + change)
+        if (i == 1 .or. j == 1) cycle
+        if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
+          d(i, j) = min(d(i, j), d(i - 2, j - 2) + 1)
+        end if
+      end do
+    end do
+    distance = d(len(a), len(b))
+  end function edit_distance
+
+end module texts

@@ -1,0 +1,156 @@
+!> An array-backed min-heap of events, at most one per disk, with access by disk: earliest first, ties in
+!> a fixed order that does not depend on who expects the event or how it was filed.
+module event_heap
+  use kinds, only: int32, real64
+  implicit none
+  private
+  public :: event_t, event_heap_t, need_order, precedes
+
+  integer(int32), parameter :: arity = 4         !! children per node: shallower than 2, same cache lines
+
+  !> An event that a disk expects.
+  type :: event_t
+    real(real64) :: time = 0.0_real64            !! since the epoch [time]
+    integer(int32) :: disk = 0                   !! who expects it
+    integer(int32) :: partner = 0                !! whom it meets: a disk (> 0) or a code (<= 0)
+  end type event_t
+
+  type :: event_heap_t
+    integer(int32) :: n = 0                      !! number of events
+    type(event_t), allocatable, private :: entry(:)        !! (n) in heap order
+    integer(int32), allocatable, private :: slot(:)        !! (disks) place of a disk's event, 0: none
+  contains
+    procedure :: initialise
+    procedure :: update
+    procedure :: remove
+    procedure :: first
+  end type event_heap_t
+
+contains
+
+  !> Order of events: by time, then by the lower and the higher disk concerned. Both disks of a pair may
+  !> expect the same collision; it takes its turn no matter which of them does.
+  elemental function precedes(a, b) result(yes)
+    type(event_t), intent(in) :: a, b
+    logical :: yes
+    integer(int32) :: low_a, low_b
+
+    if (a%time < b%time) then
+      yes = .true.
+    else if (a%time > b%time) then
+      yes = .false.
+    else
+      low_a = merge(min(a%disk, a%partner), a%disk, a%partner > 0)
+      low_b = merge(min(b%disk, b%partner), b%disk, b%partner > 0)
+      if (low_a /= low_b) then
+        yes = low_a < low_b
+      else
+        yes = max(a%partner, merge(a%disk, 0, a%partner > 0)) < max(b%partner, merge(b%disk, 0, b%partner > 0))
+      end if
+    end if
+  end function precedes
+
+  !> Not zero if two events at the same moment need an order: most are one collision that both disks expect.
+  elemental function need_order(a, b) result(bits)
+    type(event_t), intent(in) :: a, b
+    integer(int32) :: bits
+
+    bits = iand(-merge(1, 0, a%time <= b%time), ior(ieor(a%disk, b%partner), ieor(a%partner, b%disk)))
+  end function need_order
+
+  !> Empties the heap and makes room for the events of n disks.
+  subroutine initialise(self, n)
+    class(event_heap_t), intent(inout) :: self
+    integer(int32), intent(in) :: n              !! number of disks
+
+    if (allocated(self%slot)) then
+      if (size(self%slot) /= n) deallocate (self%slot, self%entry)
+    end if
+    if (.not. allocated(self%slot)) allocate (self%slot(n), self%entry(n))
+    self%slot = 0
+    self%n = 0
+  end subroutine initialise
+
+  !> Inserts the event of a disk, or puts it in the place of the one that this disk had.
+  pure subroutine update(self, event)
+    class(event_heap_t), intent(inout) :: self
+    type(event_t), intent(in) :: event
+    integer(int32) :: k
+
+    k = self%slot(event%disk)
+    if (k == 0) then
+      self%n = self%n + 1
+      k = self%n
+    end if
+    call sift_up(self, k, event)
+    if (self%slot(event%disk) == k) call sift_down(self, k, event)
+  end subroutine update
+
+  !> Takes a disk's event out; nothing happens if there is none.
+  pure subroutine remove(self, disk)
+    class(event_heap_t), intent(inout) :: self
+    integer(int32), intent(in) :: disk
+    type(event_t) :: last
+    integer(int32) :: k
+
+    k = self%slot(disk)
+    if (k == 0) return
+    self%slot(disk) = 0
+    last = self%entry(self%n)
+    self%n = self%n - 1
+    if (last%disk == disk) return
+    call sift_up(self, k, last)
+    if (self%slot(last%disk) == k) call sift_down(self, k, last)
+  end subroutine remove
+
+  !> The earliest event. The heap must not be empty.
+  pure function first(self) result(event)
+    class(event_heap_t), intent(in) :: self
+    type(event_t) :: event
+
+    event = self%entry(1)
+  end function first
+
+  !> Moves the hole at `start` up to where `event` belongs and fills it.
+  pure subroutine sift_up(self, start, event)
+    class(event_heap_t), intent(inout) :: self
+    integer(int32), intent(in) :: start
+    type(event_t), intent(in) :: event
+    integer(int32) :: k, parent
+
+    k = start
+    do while (k > 1)
+      parent = (k - 2)/arity + 1
+      if (.not. precedes(event, self%entry(parent))) exit
+      self%entry(k) = self%entry(parent)
+      self%slot(self%entry(k)%disk) = k
+      k = parent
+    end do
+    self%entry(k) = event
+    self%slot(event%disk) = k
+  end subroutine sift_up
+
+  !> Moves the hole at `start` down to where `event` belongs and fills it.
+  pure subroutine sift_down(self, start, event)
+    class(event_heap_t), intent(inout) :: self
+    integer(int32), intent(in) :: start
+    type(event_t), intent(in) :: event
+    integer(int32) :: k, child, best
+
+    k = start
+    do
+      best = arity*(k - 1) + 2
+      if (best > self%n) exit
+      do child = best + 1, min(best + arity - 1, self%n)
+        if (precedes(self%entry(child), self%entry(best))) best = child
+      end do
+      if (.not. precedes(self%entry(best), event)) exit
+      self%entry(k) = self%entry(best)
+      self%slot(self%entry(k)%disk) = k
+      k = best
+    end do
+    self%entry(k) = event
+    self%slot(event%disk) = k
+  end subroutine sift_down
+
+end module event_heap

@@ -1,0 +1,65 @@
+!> Disks that are neighbours in space become neighbours in memory.
+module renumbering
+  use kinds, only: int32, real64
+  use disks, only: disk_t, tag_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: renumber
+
+  integer(int32), parameter :: tile = 8           !! cells along the side of a tile, whose disks fill a page
+
+contains
+
+  !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
+  !> few pages hold a neighbourhood. The order follows from the state alone and is the same for every search
+  !> and queue; `tag%id` keeps the names.
+  subroutine renumber(sim)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), allocatable :: first(:), place(:), cell(:)
+    integer(int32) :: n(2), c(2), i, k
+
+    n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
+    n = tile*((n + tile - 1)/tile)
+    allocate (first(0:product(n)), place(sim%n_disks()), cell(sim%n_disks()))
+    first = 0
+    do i = 1, sim%n_disks()
+      c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*n, 0.0_real64), n - 1.0_real64), int32)
+      cell(i) = tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
+      first(cell(i) + 1) = first(cell(i) + 1) + 1
+    end do
+    do k = 1, product(n)
+      first(k) = first(k) + first(k - 1)
+    end do
+    do i = 1, sim%n_disks()
+      first(cell(i)) = first(cell(i)) + 1
+      place(i) = first(cell(i))
+    end do
+    call permute(sim%disk, sim%tag, place)
+  end subroutine renumber
+
+  !> Moves the i-th disk to place(i), in place along the cycles; `place` is used up.
+  pure subroutine permute(disk, tag, place)
+    type(disk_t), intent(inout) :: disk(:)
+    type(tag_t), intent(inout) :: tag(:)
+    integer(int32), intent(inout) :: place(:)
+    type(disk_t) :: moved_disk
+    type(tag_t) :: moved_tag
+    integer(int32) :: i, to
+
+    do i = 1, size(place, kind=int32)
+      do while (place(i) /= i)
+        to = place(i)
+        moved_disk = disk(to)
+        moved_tag = tag(to)
+        disk(to) = disk(i)
+        tag(to) = tag(i)
+        disk(i) = moved_disk
+        tag(i) = moved_tag
+        place(i) = place(to)
+        place(to) = to
+      end do
+    end do
+  end subroutine permute
+
+end module renumbering

@@ -1,0 +1,126 @@
+!> When a run ends: the first of the rules in the input that is met; and before rounding begins to rule.
+!>
+!> In a periodic box inelastic disks cool until they fly on side by side: what is left is the momentum that
+!> rounding gave to all of them. Long before, no digit of the temperature is true. So the run ends when
+!> the gas is that cold. It is looked for at certain numbers of events, so that the end depends on
+!> nothing but the trajectory.
+module stop_rules
+  use kinds, only: int32, int64, never, real64
+  use evolution, only: limits_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: stop_rule_t, stop_settings_t
+
+  real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
+  integer, parameter :: look_interval = 4                    !! events per disk between two looks at it
+
+  !> What is not asked for is `never` (times) or `huge` (counts); fraction 0 means no rule.
+  type :: stop_settings_t
+    real(real64) :: time
+    integer(int64) :: collisions
+    real(real64) :: collisions_per_disk
+    integer(int64) :: events
+    real(real64) :: energy_fraction
+    real(real64) :: wall_clock                        !! [s]
+  end type stop_settings_t
+
+  type :: stop_rule_t
+    type(limits_t) :: limits
+    real(real64) :: wall_clock = never       !! [s]
+    integer(int64) :: look_every = huge(0_int64)    !! events between two looks at the temperature
+  contains
+    procedure :: met
+    procedure :: next_look
+    procedure :: too_cold
+    procedure :: share
+  end type stop_rule_t
+
+  interface stop_rule_t
+    module procedure new_stop_rule
+  end interface stop_rule_t
+
+contains
+
+  !> The rules that `settings` asks for, in terms of the state they are compared with.
+  pure function new_stop_rule(settings, sim) result(rule)
+    type(stop_settings_t), intent(in) :: settings
+    type(simulation_t), intent(in) :: sim
+    type(stop_rule_t) :: rule
+    real(real64) :: collisions
+
+    rule%limits%time = settings%time
+    rule%limits%collisions = settings%collisions
+    rule%limits%events = settings%events
+    rule%wall_clock = settings%wall_clock
+    collisions = 0.5_real64*settings%collisions_per_disk*sim%n_disks()
+    if (collisions < 9.0e18_real64) rule%limits%collisions = min(rule%limits%collisions, ceiling(collisions, int64))
+    if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
+    if (all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. any(sim%law%restitution < 1)) &
+      rule%look_every = look_interval*int(sim%n_disks(), int64)
+  end function new_stop_rule
+
+  !> Whether the simulation has come to its end, wall clock aside.
+  pure function met(self, sim) result(yes)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%time() >= self%limits%time .or. sim%collisions >= self%limits%collisions &
+      .or. sim%events >= self%limits%events .or. sim%dissipated >= self%limits%dissipated
+  end function met
+
+  !> The number of events at which to pause for a look at the temperature.
+  pure function next_look(self, sim) result(events)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: events
+
+    events = self%look_every*(sim%events/self%look_every + 1)
+  end function next_look
+
+  !> Whether the motion relative to the common one has all but died out.
+  pure function too_cold(self, sim) result(yes)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = .false.
+    if (sim%events > 0 .and. modulo(sim%events, self%look_every) == 0) &
+      yes = relative_energy(sim) <= coldest*sim%start_energy
+  end function too_cold
+
+  !> Kinetic energy relative to the common motion. Two passes: a difference of sums would be rounded.
+  pure function relative_energy(sim) result(energy)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: energy                          !! [energy]
+    real(real64) :: drift(2), mass(sim%n_disks())
+    integer(int32) :: i
+
+    mass = sim%species(sim%tag%species)%mass
+    drift = 0
+    do i = 1, sim%n_disks()
+      drift = drift + mass(i)*sim%velocity(i)
+    end do
+    drift = drift/sum(mass)
+    energy = 0
+    do i = 1, sim%n_disks()
+      energy = energy + 0.5_real64*mass(i)*sum((sim%velocity(i) - drift)**2)
+    end do
+  end function relative_energy
+
+  !> How much of the run is done, from 0 to 1, by the rule that is nearest to its end.
+  pure function share(self, sim, elapsed) result(done)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: elapsed      !! by the wall clock [s]
+    real(real64) :: done
+    real(real64), parameter :: least = 1/never     ! a limit may be 0
+
+    done = max(sim%time()/max(self%limits%time, least), real(sim%collisions, real64)/max(self%limits%collisions, 1_int64), &
+      real(sim%events, real64)/max(self%limits%events, 1_int64), sim%dissipated/max(self%limits%dissipated, least), &
+      elapsed/max(self%wall_clock, least))
+    done = min(max(done, 0.0_real64), 1.0_real64)
+  end function share
+
+end module stop_rules

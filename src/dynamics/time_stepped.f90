@@ -1,0 +1,288 @@
+!> Time-stepped dynamics: exact free flight over a fixed step; then every disk beyond a wall turns round, and
+!> every pair that overlaps and approaches collides, once. A contact is noticed up to one step late, a
+!> short one not at all: this is the method to compare the event-driven one with.
+!>
+!> As there, a disk's own state changes only at its own collisions: no error adds up from step to step.
+module time_stepped
+  use kinds, only: int32, int64, never, real64
+  use box_geometry, only: box_t, n_sides, nearest_image
+  use disks, only: disk_t
+  use encounters, only: collide, pass_side, passes, wall_normal
+  use errors, only: error_t, exit_broken, fail
+  use event_log, only: event_log_t
+  use evolution, only: evolution_t, limits_t
+  use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
+  use simulation_state, only: simulation_t
+  use texts, only: written
+  implicit none
+  private
+  public :: time_stepped_t, step_warning
+
+  !> A disk should move less than this share of the smallest radius in one step.
+  real(real64), parameter :: longest_way = 0.5_real64
+  integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
+  real(real64), parameter :: slowest = 1/never      !! a disk slower than this is at rest [length/time]
+
+  type, extends(evolution_t) :: time_stepped_t
+    real(real64) :: dt = 0.0_real64                 !! [time]
+    logical :: every_pair = .false.                 !! test all pairs at every step, not only near ones
+    type(near_pairs_t), private :: near
+    ! Of the current step
+    real(real64), allocatable, private :: x(:, :)   !! (2,disks) where they are [length]
+    integer(int32), allocatable, private :: outside(:)  !! (disks) those beyond a side come first
+    type(pair_list_t), private :: contacts
+  contains
+    procedure :: start
+    procedure :: advance
+  end type time_stepped_t
+
+contains
+
+  subroutine start(self, sim)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+
+    if (allocated(self%x)) deallocate (self%x, self%outside)
+    allocate (self%x(2, sim%n_disks()), self%outside(sim%n_disks()))
+    call self%near%start()
+    self%idle = .false.
+  end subroutine start
+
+  !> Takes steps; the k-th is at the time k*dt, wherever this paused before.
+  subroutine advance(self, sim, limits, error)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: k, turn
+
+    k = steps_taken(sim%now, self%dt)
+    do turn = 1, limits%turns
+      if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
+        .or. sim%dissipated >= limits%dissipated .or. is_half_full(self%log)) return
+      if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
+      if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
+        if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
+        return
+      end if
+      k = k + 1
+      sim%now = k*self%dt
+      call take_step(self, sim, error)
+      if (allocated(error)) return
+    end do
+  end subroutine advance
+
+  !> The largest k with k*dt <= now: it follows from the state alone.
+  pure function steps_taken(now, dt) result(k)
+    real(real64), intent(in) :: now, dt             !! [time]
+    integer(int64) :: k
+
+    k = nint(now/dt, int64) + 1
+    do while (k*dt > now)
+      k = k - 1
+    end do
+  end function steps_taken
+
+  !> Whether nothing moves, and nothing ever will.
+  pure function at_rest(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+    integer(int32) :: i
+
+    yes = .not. sim%box%falling()
+    do i = 1, sim%n_disks()
+      if (.not. yes) return
+      yes = .not. any(abs(sim%disk(i)%v) > slowest)
+    end do
+  end function at_rest
+
+  !> All that happens at `sim%now`. First sides, then obstacles, then pairs of disks; each in ascending order,
+  !> so that it does not matter how they are found.
+  subroutine take_step(self, sim, error)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(inout) :: error
+    integer(int32) :: n_outside, i
+    integer :: k
+
+    call fly(sim%disk, sim%box, sim%now, self%x, self%outside, n_outside)
+    call make_room(self%log, n_sides*n_outside)
+    do k = 1, n_outside
+      i = self%outside(k)
+      if (any(self%x(:, i) /= self%x(:, i))) then
+        call fail(error, exit_broken, "a position became NaN: disk "//name_of(sim, i))
+        return
+      end if
+      call meet_sides(self, sim, i)
+    end do
+    if (self%every_pair) then
+      call find_all_contacts(sim, self%x, self%contacts)
+    else
+      call self%near%find_contacts(sim, self%x, self%dt, self%contacts)
+    end if
+    call make_room(self%log, self%contacts%n)
+    do k = 1, self%contacts%n
+      associate (p => self%contacts%pair(k))
+        if (p%partner > 0) then
+          call meet_disk(self, sim, p%i, p%partner)
+        else
+          call meet_wall(self, sim, p%i, p%partner)
+        end if
+      end associate
+    end do
+  end subroutine take_step
+
+  !> A step is never cut in two: there must be room for all its collisions. So the log is to be emptied when
+  !> it is half full, and grows only if one step needs more than the other half.
+  pure function is_half_full(log) result(yes)
+    type(event_log_t), intent(in) :: log
+    logical :: yes
+
+    yes = .false.
+    if (log%is_on()) yes = 2*log%n >= size(log%time)
+  end function is_half_full
+
+  pure subroutine make_room(log, n)
+    type(event_log_t), intent(inout) :: log
+    integer, intent(in) :: n                        !! collisions that may come
+    type(event_log_t) :: larger
+
+    if (.not. log%is_on()) return
+    if (log%n + n <= size(log%time)) return
+    larger = event_log_t(2*(log%n + n))
+    larger%n = log%n
+    larger%time(:log%n) = log%time(:log%n)
+    larger%impulse(:log%n) = log%impulse(:log%n)
+    larger%pair(:, :log%n) = log%pair(:, :log%n)
+    log = larger
+  end subroutine make_room
+
+  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN). The same numbers as
+  !> `flight`, which a disk's own state takes when it collides.
+  pure subroutine fly(disk, box, t, x, outside, n)
+    type(disk_t), intent(in) :: disk(:)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: t                   !! since the epoch [time]
+    real(real64), intent(out) :: x(:, :)            !! (2,disks) [length]
+    integer(int32), intent(out) :: outside(:)       !! (disks) the first n count, ascending
+    integer(int32), intent(out) :: n
+    real(real64) :: g(2), inset(2), s
+    integer(int32) :: i
+
+    g = box%gravity
+    inset = merge(0.0_real64, 1.0_real64, box%periodic)
+    n = 0
+    do i = 1, size(disk, kind=int32)
+      s = t - disk(i)%clock
+      x(1, i) = disk(i)%x(1) + (disk(i)%v(1) + 0.5_real64*g(1)*s)*s
+      x(2, i) = disk(i)%x(2) + (disk(i)%v(2) + 0.5_real64*g(2)*s)*s
+      if (x(1, i) >= box%lower(1) + inset(1)*disk(i)%radius .and. x(1, i) <= box%upper(1) - inset(1)*disk(i)%radius &
+        .and. x(2, i) >= box%lower(2) + inset(2)*disk(i)%radius &
+        .and. x(2, i) <= box%upper(2) - inset(2)*disk(i)%radius) cycle
+      n = n + 1
+      outside(n) = i
+    end do
+  end subroutine fly
+
+  !> Takes disk i through the periodic sides that it is beyond, and turns it round at such walls.
+  subroutine meet_sides(self, sim, i)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64) :: beyond, inset, before(2)
+    integer(int32) :: side
+    integer :: axis
+
+    do side = 0, 1 - n_sides, -1
+      axis = 1 - side/2
+      inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
+      if (modulo(side, 2) == 0) then
+        beyond = (sim%box%lower(axis) + inset) - self%x(axis, i)
+      else
+        beyond = self%x(axis, i) - (sim%box%upper(axis) - inset)
+      end if
+      if (.not. beyond > 0) cycle
+      if (passes(sim, side)) then
+        before = self%x(:, i)
+        call pass_side(sim, i, side)
+        self%x(:, i) = sim%position(i)
+        call self%near%shift(i, self%x(:, i) - before)
+      else
+        call meet_wall(self, sim, i, side)
+      end if
+    end do
+  end subroutine meet_sides
+
+  !> Turns disk i round, which is beyond a side or an obstacle, if it moves further out. Where it is it
+  !> stays: so its energy does.
+  subroutine meet_wall(self, sim, i, code)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
+
+    if (dot_product(sim%velocity(i), wall_normal(sim%box, code, self%x(:, i))) < 0) &
+      call collide(sim, i, code, sim%now, self%log)
+  end subroutine meet_wall
+
+  !> Lets the disks i < j, which overlap, collide if they approach.
+  subroutine meet_disk(self, sim, i, j)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64) :: dx(2)
+
+    dx = self%x(:, j) - self%x(:, i)
+    dx = dx - nearest_image(sim%box, dx)
+    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, self%log)
+  end subroutine meet_disk
+
+  !> Name of disk i, and the time, for a message.
+  pure function name_of(sim, i) result(text)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    character(len=:), allocatable :: text
+
+    text = written(sim%tag(i)%id)//" ("//sim%species(sim%tag(i)%species)%name//") at time "//written(sim%time())
+  end function name_of
+
+  !> What is wrong with the step, '' if nothing. The fastest disk may fall through the whole box, and then
+  !> has the speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact cannot
+  !> hold against gravity, and sinks by up to g dt**2/2 in each: the TC model prevents it.
+  pure function step_warning(sim, dt) result(text)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: dt                  !! [time]
+    character(len=:), allocatable :: text
+    real(real64) :: speed, radius
+    integer(int32) :: i
+
+    text = ""
+    speed = 0
+    do i = 1, sim%n_disks()
+      speed = max(speed, norm2(sim%velocity(i)))
+    end do
+    speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges()))
+    radius = minval(sim%disk%radius)
+    if (speed*dt > longest_way*radius) then
+      text = "run.dt: at speeds up to "//about(speed)//" a disk moves by "//about(speed*dt/radius) &
+        //" radii in a step, so that collisions are missed; better: below "//about(longest_way*radius/speed)
+    end if
+    if (sim%box%falling() .and. sim%law%contact_time <= dt &
+      .and. min(minval(sim%law%restitution), sim%law%wall_restitution) < 1) then
+      if (text /= "") text = text//"; "
+      text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
+        //"is more than run.dt"
+    end if
+  end function step_warning
+
+  !> A number with three digits.
+  pure function about(number) result(text)
+    real(real64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=12) :: buffer
+    real(real64) :: rounded
+
+    write (buffer, "(es12.2e3)") number
+    read (buffer, *) rounded
+    text = written(rounded)
+  end function about
+end module time_stepped

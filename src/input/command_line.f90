@@ -1,0 +1,235 @@
+!> The command line: options, names of any length, and the answers to --help and its like.
+module command_line
+  use errors, only: error_t, exit_usage, fail
+  use parameters, only: defaults_text, explain
+  use system, only: print_text
+  use texts, only: nearest_word, shown, text_t
+  use version, only: program_version
+  implicit none
+  private
+  public :: command_t, read_command_line, parse_arguments, answer, help_text
+
+  type :: command_t
+    character(len=:), allocatable :: question      !! '' to run; else help, version, print-defaults
+                                                   !! or explain: see `answer`
+    character(len=:), allocatable :: topic         !! the variable of --explain
+    character(len=:), allocatable :: input         !! path of the input file
+    character(len=:), allocatable :: output        !! path of the output file
+    type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
+    logical :: resume = .false.
+    logical :: check = .false.                     !! validate only
+    logical :: quiet = .false.
+    logical :: force = .false.                     !! overwrite a finished output file
+  end type command_t
+
+  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", &
+    "--resume", "--check", "--quiet", "--force", "--help", "--version", "--print-defaults", &
+    "--explain"]
+
+contains
+
+  !> Reads the arguments of the program.
+  subroutine read_command_line(command, error)
+    type(command_t), intent(out) :: command
+    type(error_t), allocatable, intent(out) :: error
+    type(text_t) :: arguments(command_argument_count())
+    integer :: k, length
+
+    do k = 1, size(arguments)
+      call get_command_argument(k, length=length)
+      allocate (character(len=length) :: arguments(k)%text)
+      call get_command_argument(k, arguments(k)%text)
+    end do
+    call parse_arguments(arguments, command, error)
+  end subroutine read_command_line
+
+  pure subroutine parse_arguments(arguments, command, error)
+    type(text_t), intent(in) :: arguments(:)
+    type(command_t), intent(out) :: command
+    type(error_t), allocatable, intent(out) :: error
+    logical :: only_files
+    integer :: k
+
+    command%question = ""
+    command%input = ""
+    command%output = ""
+    allocate (command%overrides(0))
+    only_files = .false.
+    k = 1
+    do while (k <= size(arguments))
+      associate (argument => arguments(k)%text)
+        if (.not. only_files .and. argument == "--") then
+          only_files = .true.
+        else if (.not. only_files .and. index(argument, "-") == 1) then
+          call take_option(arguments, k, command, error)
+        else if (command%input == "" .and. argument /= "") then
+          command%input = argument
+        else if (argument == "") then
+          call fail(error, exit_usage, "an empty argument is no input file")
+        else
+          call fail(error, exit_usage, "one input file only, not also "//shown(argument))
+        end if
+      end associate
+      if (allocated(error) .or. command%question /= "") return
+      k = k + 1
+    end do
+    if (command%input == "") then
+      call fail(error, exit_usage, "which input file? as in: ricochet input/gas.nml; see --help")
+    end if
+    if (command%output == "") command%output = default_output(command%input)
+  end subroutine parse_arguments
+
+  !> Takes one option, and the next argument if it is the option's value.
+  pure subroutine take_option(arguments, k, command, error)
+    type(text_t), intent(in) :: arguments(:)
+    integer, intent(inout) :: k
+    type(command_t), intent(inout) :: command
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name, value
+    integer :: equals
+
+    name = arguments(k)%text
+    value = ""
+    equals = index(name, "=")
+    if (index(name, "--") == 1 .and. equals > 0) name = name(:equals - 1)
+    select case (name)
+    case ("-o", "--output", "--set", "--explain")
+      call take_value(arguments, k, name, value, error)
+    case default
+      if (name /= arguments(k)%text .and. any(options == name)) &
+        call fail(error, exit_usage, "option "//name//" takes no value")
+    end select
+    if (allocated(error)) return
+    select case (name)
+    case ("-o", "--output")
+      command%output = value
+    case ("--set")
+      call append(command%overrides, value)
+    case ("--explain")
+      command%question = "explain"
+      command%topic = value
+    case ("-h", "--help", "--version", "--print-defaults")
+      command%question = name(3:)
+      if (name == "-h") command%question = "help"
+    case ("--resume")
+      command%resume = .true.
+    case ("--check")
+      command%check = .true.
+    case ("--quiet")
+      command%quiet = .true.
+    case ("--force")
+      command%force = .true.
+    case default
+      call report_unknown(name, error)
+    end select
+  end subroutine take_option
+
+  !> Adds a text to a list. (The compiler loses memory when an array is built of texts.)
+  pure subroutine append(list, text)
+    type(text_t), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: text
+    type(text_t), allocatable :: longer(:)
+
+    allocate (longer(size(list) + 1))
+    longer(:size(list)) = list
+    longer(size(longer))%text = text
+    call move_alloc(longer, list)
+  end subroutine append
+
+  !> The value after `=` or in the next argument.
+  pure subroutine take_value(arguments, k, name, value, error)
+    type(text_t), intent(in) :: arguments(:)
+    integer, intent(inout) :: k
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable, intent(out) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
+    value = ""
+    if (name /= arguments(k)%text) then
+      value = arguments(k)%text(len(name) + 2:)
+    else if (k < size(arguments)) then
+      k = k + 1
+      value = arguments(k)%text
+    end if
+    if (value == "") call fail(error, exit_usage, "option "//name//" needs a value")
+  end subroutine take_value
+
+  pure subroutine report_unknown(name, error)
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: meant
+
+    meant = nearest_word(name, options)
+    if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
+    if (meant /= "") then
+      meant = "did you mean "//meant//"?"
+    else
+      meant = "see --help; a file whose name begins with - comes after --"
+    end if
+    call fail(error, exit_usage, "unknown option "//shown(name)//"; "//meant)
+  end subroutine report_unknown
+
+  !> `runs/<input name>.h5`
+  pure function default_output(input) result(output)
+    character(len=*), intent(in) :: input
+    character(len=:), allocatable :: output
+
+    output = input(index(input, "/", back=.true.) + 1:)
+    if (len(output) > 4) then
+      if (output(len(output) - 3:) == ".nml") output = output(:len(output) - 4)
+    end if
+    output = "runs/"//output//".h5"
+  end function default_output
+
+  !> Prints what `command%question` asks for.
+  subroutine answer(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
+
+    select case (command%question)
+    case ("help")
+      text = help_text()
+    case ("version")
+      text = "ricochet "//program_version
+    case ("print-defaults")
+      text = defaults_text()
+      text = text(:len(text) - 1)
+    case default
+      call explain(command%topic, text, error)
+      if (allocated(error)) return
+    end select
+    call print_text(text, error)
+  end subroutine answer
+
+  !> One screen.
+  pure function help_text() result(text)
+    character(len=:), allocatable :: text
+    character(len=1), parameter :: eol = new_line("a")
+
+    text = "ricochet: event-driven simulation of hard disks"//eol//eol// &
+      "usage:  ricochet INPUT.nml [option]..."//eol// &
+      "        ricochet --help | --version | --print-defaults | --explain VARIABLE"//eol//eol// &
+      "  -o, --output FILE   where the results go; default runs/<input name>.h5"//eol// &
+      "  --set NAME=VALUE    override a variable of the input, any number of times:"//eol// &
+      "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
+      "                      the last one for a variable counts, an empty VALUE"//eol// &
+      "                      brings the default back"//eol// &
+      "  --resume            go on from the checkpoint of a stopped run"//eol// &
+      "  --check             read and check everything, run nothing"//eol// &
+      "  --force             overwrite a finished output file"//eol// &
+      "  --quiet             no progress on stderr"//eol// &
+      "  --print-defaults    an input file with every variable and its default"//eol// &
+      "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &
+      "  --                  what follows is a file name, even if it begins with -"//eol//eol// &
+      "exit:   0 finished; 2 wrong usage or bad input; 3 cannot read or write a file;"//eol// &
+      "        4 the simulation broke off; 75 stopped after writing a checkpoint,"//eol// &
+      "        the same command with --resume goes on"//eol//eol// &
+      "examples:"//eol// &
+      "  ricochet input/gas.nml"//eol// &
+      "  ricochet input/crater.nml -o runs/heavy.h5 --set species.projectile.mass=50"//eol// &
+      "  ricochet input/cooling.nml --set contact.restitution=0.8 --check"//eol// &
+      "  ricochet --explain restitution"
+  end function help_text
+
+end module command_line

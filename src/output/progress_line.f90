@@ -1,0 +1,137 @@
+!> Tells how far a run is: a line that renews itself on a terminal, else one now and then.
+module progress_line
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use kinds, only: int64, never, real64
+  use simulation_state, only: simulation_t
+  use stop_rules, only: stop_rule_t
+  use system, only: seconds, talks_to_terminal
+  implicit none
+  private
+  public :: progress_line_t
+
+  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
+  integer, parameter :: window = 20                !! reports over which rates are taken
+  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! of the terminal's line
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line
+
+  type :: progress_line_t
+    private
+    logical :: quiet = .false.
+    logical :: terminal = .false.
+    real(real64) :: pause = file_pause             !! between reports [s]
+    real(real64) :: started = 0.0_real64           !! where the wall clock began [s]
+    real(real64) :: next_report = 0.0_real64       !! [s]
+    integer :: n = 0                               !! reports so far
+    real(real64) :: clock(0:window - 1) = 0.0_real64       !! of the last reports [s]
+    real(real64) :: share(0:window - 1) = 0.0_real64       !! of the run done at those
+    integer(int64) :: collisions(0:window - 1) = 0_int64
+  contains
+    procedure :: start
+    procedure :: report
+    procedure :: clear
+  end type progress_line_t
+
+contains
+
+  subroutine start(self, sim, stop_rule, started, quiet)
+    class(progress_line_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(stop_rule_t), intent(in) :: stop_rule
+    real(real64), intent(in) :: started            !! when the program did [s]
+    logical, intent(in) :: quiet
+
+    self%quiet = quiet
+    self%started = started
+    self%terminal = talks_to_terminal()
+    self%pause = merge(terminal_pause, file_pause, self%terminal)
+    self%next_report = seconds() + self%pause
+    self%n = 0
+    call remember(self, sim, stop_rule)
+  end subroutine start
+
+  !> Writes a line if it is time.
+  subroutine report(self, sim, stop_rule)
+    class(progress_line_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(stop_rule_t), intent(in) :: stop_rule
+    character(len=160) :: line
+    real(real64) :: span, rate, left
+    integer :: first, last
+
+    if (self%quiet) return
+    if (seconds() < self%next_report) return
+    self%next_report = seconds() + self%pause
+    call remember(self, sim, stop_rule)
+    last = modulo(self%n - 1, window)
+    first = modulo(max(self%n - window, 0), window)
+    span = max(self%clock(last) - self%clock(first), 1.0e-3_real64)
+    rate = (self%collisions(last) - self%collisions(first))/span
+    left = never
+    if (self%share(last) > self%share(first)) left = (1 - self%share(last))*span/(self%share(last) - self%share(first))
+    write (line, "(""t "",g0.6,""  "",f5.1,"" %  "",i0,"" collisions  "",a,"" per s  ETA "",a)") sim%time(), &
+      100*self%share(last), sim%collisions, short_number(rate), clock_text(left)
+    if (self%terminal) then
+      write (error_unit, "(a)", advance="no") achar(13)//no_wrap//trim(line)//erase_rest//wrap
+    else
+      write (error_unit, "(a)") trim(line)
+    end if
+    flush (error_unit)
+  end subroutine report
+
+  !> Wipes the line from the terminal, so that what follows stands alone.
+  subroutine clear(self)
+    class(progress_line_t), intent(in) :: self
+
+    if (self%terminal .and. self%n > 1) write (error_unit, "(a)", advance="no") achar(13)//erase_rest
+    flush (error_unit)
+  end subroutine clear
+
+  !> Keeps the present moment for rates over the last reports.
+  subroutine remember(self, sim, stop_rule)
+    class(progress_line_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(stop_rule_t), intent(in) :: stop_rule
+    integer :: k
+
+    k = modulo(self%n, window)
+    self%clock(k) = seconds()
+    self%share(k) = stop_rule%share(sim, self%clock(k) - self%started)
+    self%collisions(k) = sim%collisions
+    self%n = self%n + 1
+  end subroutine remember
+
+  !> A rate with a unit that keeps it short.
+  pure function short_number(x) result(text)
+    real(real64), intent(in) :: x
+    character(len=:), allocatable :: text
+    character(len=20) :: line
+
+    if (x >= 1.0e6_real64) then
+      write (line, "(f8.2,"" M"")") x/1.0e6_real64
+    else if (x >= 1.0e3_real64) then
+      write (line, "(f8.1,"" k"")") x/1.0e3_real64
+    else
+      write (line, "(f8.0)") x
+    end if
+    text = trim(adjustl(line))
+  end function short_number
+
+  !> Seconds as h:mm:ss or m:ss.
+  pure function clock_text(s) result(text)
+    real(real64), intent(in) :: s
+    character(len=:), allocatable :: text
+    character(len=20) :: line
+    integer :: whole
+
+    text = "?"
+    if (.not. s < 3.6e6_real64) return
+    whole = nint(s)
+    if (whole < 3600) then
+      write (line, "(i0,"":"",i2.2)") whole/60, modulo(whole, 60)
+    else
+      write (line, "(i0,"":"",i2.2,"":"",i2.2)") whole/3600, modulo(whole/60, 60), modulo(whole, 60)
+    end if
+    text = trim(line)
+  end function clock_text
+
+end module progress_line

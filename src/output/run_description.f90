@@ -1,0 +1,224 @@
+!> What an output file says once: who made it, the box, the disks, every parameter, and where it comes from.
+module run_description
+  use, intrinsic :: iso_fortran_env, only: compiler_version
+  use kinds, only: int32, int64, real64
+  use box_geometry, only: box_t, obstacle_t
+  use build_info, only: build_flags, git_commit
+  use hdf5_objects, only: hdf5_file_t, hdf5_version
+  use parameter_values, only: parameter_group_t, parameter_value_t
+  use parameters, only: is_repeated
+  use settings, only: settings_t
+  use simulation_state, only: simulation_t
+  use system, only: host_name
+  use texts, only: text_t
+  use version, only: program_version
+  implicit none
+  private
+  public :: describe_run, describe_cost
+
+  integer, parameter :: longest_attribute = 1000      !! values; HDF5 has no room for more than 64 kB
+
+contains
+
+  !> Writes all that is known at the start.
+  subroutine describe_run(file, settings, groups, input_text, overrides, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(settings_t), intent(in) :: settings
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=*), intent(in) :: input_text
+    type(text_t), intent(in) :: overrides(:)
+    type(simulation_t), intent(in) :: sim
+
+    call describe_format(file)
+    call describe_box(file, sim%box)
+    call describe_disks(file, sim)
+    call describe_input(file, groups, input_text, overrides)
+    call describe_species(file, sim)
+    call describe_populations(file, sim)
+    if (allocated(sim%box%obstacle)) call describe_obstacles(file, sim%box%obstacle)
+    call file%put("parameters/seed", [integer ::], [settings%run%seed])
+    call describe_origin(file)
+    call describe_cost(file, 0.0_real64, 0.0_real64)     ! so that nothing is added at the end
+  end subroutine describe_run
+
+  subroutine describe_format(file)
+    type(hdf5_file_t), intent(inout) :: file
+
+    call file%make_group("h5md/author")
+    call file%make_group("h5md/creator")
+    call file%make_group("h5md/modules/thermodynamics")
+    call file%put("h5md@version", [2], [1_int32, 1_int32])
+    call file%put("h5md/author@name", author())
+    call file%put("h5md/creator@name", "ricochet")
+    call file%put("h5md/creator@version", program_version)
+    call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
+  end subroutine describe_format
+
+  !> Who runs the program, as far as the system tells.
+  function author() result(name)
+    character(len=:), allocatable :: name
+    integer :: length
+
+    call get_environment_variable("USER", length=length)
+    allocate (character(len=length) :: name)
+    call get_environment_variable("USER", name)
+    if (name == "") name = "unknown"
+  end function author
+
+  subroutine describe_box(file, box)
+    type(hdf5_file_t), intent(inout) :: file
+    type(box_t), intent(in) :: box
+    character(len=8) :: boundary(2)
+
+    boundary = merge("periodic", "none    ", box%periodic)
+    call file%make_group("particles/disks/box")
+    call file%put("particles/disks/box@dimension", [integer ::], [2_int32])
+    call file%put("particles/disks/box@boundary", boundary)
+    call file%put("particles/disks/box/edges", [2], box%edges())
+    call file%put("particles/disks/box/lower", [2], box%lower)
+  end subroutine describe_box
+
+  !> What belongs to a disk for good, in file order.
+  subroutine describe_disks(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    integer(int32), allocatable :: numbers(:)
+    integer(int32) :: i
+
+    allocate (numbers(sim%n_disks()))
+    numbers = [(i, i=1, sim%n_disks())]
+    call file%put("particles/disks/id", [size(numbers)], numbers)
+    numbers(sim%tag%id) = sim%tag%species
+    call file%put("particles/disks/species", [size(numbers)], numbers)
+    call file%put("particles/disks/mass", [size(numbers)], sim%species(numbers)%mass)
+    call file%put("particles/disks/radius", [size(numbers)], sim%species(numbers)%radius)
+  end subroutine describe_disks
+
+  !> The input as it was given, and every variable as it was used.
+  subroutine describe_input(file, groups, input_text, overrides)
+    type(hdf5_file_t), intent(inout) :: file
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=*), intent(in) :: input_text
+    type(text_t), intent(in) :: overrides(:)
+    character(len=:), allocatable :: group, list
+    integer :: g, k
+
+    do g = 1, size(groups)
+      if (groups(g)%name == "obstacle") cycle           ! one table below
+      group = "parameters/"//trim(groups(g)%name)
+      if (is_repeated(groups(g)%name)) group = group//"/"//trim(groups(g)%instance)
+      call file%make_group(group)
+      do k = 1, size(groups(g)%values)
+        call describe_value(file, group, groups(g)%values(k))
+      end do
+    end do
+    call file%put("parameters/input", input_text)
+    list = ""
+    do k = 1, size(overrides)
+      list = list//overrides(k)%text//new_line("a")
+    end do
+    call file%put("parameters/overrides", list)
+  end subroutine describe_input
+
+  !> One variable; nothing if it has no value.
+  subroutine describe_value(file, group, value)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: group
+    type(parameter_value_t), intent(in) :: value
+    integer, allocatable :: extents(:)
+    character(len=:), allocatable :: name
+
+    name = group//"@"//trim(value%name)
+    extents = [integer ::]
+    if (allocated(value%reals)) then
+      if (size(value%reals) > longest_attribute) name = group//"/"//trim(value%name)
+      if (size(value%reals) > 1) extents = [size(value%reals)]
+      call file%put(name, extents, value%reals)
+    else if (allocated(value%integers)) then
+      if (size(value%integers) > 1) extents = [size(value%integers)]
+      call file%put(name, extents, value%integers)
+    else if (allocated(value%logicals)) then
+      if (size(value%logicals) > 1) extents = [size(value%logicals)]
+      call file%put(name, extents, merge(1_int32, 0_int32, value%logicals))
+    else if (allocated(value%texts)) then
+      if (size(value%texts) > 1) then
+        call file%put(name, value%texts)
+      else
+        call file%put(name, trim(value%texts(1)))
+      end if
+    end if
+  end subroutine describe_value
+
+  subroutine describe_species(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    character(len=64) :: names(size(sim%species))
+    integer :: k
+
+    do k = 1, size(names)
+      names(k) = sim%species(k)%name
+    end do
+    call file%put("parameters/species/names", names)
+    call file%put("parameters/species/counts", [size(names)], int(sim%species%count, int32))
+  end subroutine describe_species
+
+  !> What the thermodynamics module of H5MD wants beside the observables of a group.
+  subroutine describe_populations(file, sim)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: group
+    integer(int32) :: n
+    integer :: s
+
+    do s = 0, size(sim%species)
+      group = "observables/all"
+      n = sim%n_disks()
+      if (s > 0) group = "observables/"//sim%species(s)%name
+      if (s > 0) n = sim%species(s)%count
+      call file%make_group(group)
+      call file%put(group//"@dimension", [integer ::], [2_int32])
+      call file%put(group//"/particle_number", [integer ::], [n])
+    end do
+  end subroutine describe_populations
+
+  subroutine describe_obstacles(file, obstacles)
+    type(hdf5_file_t), intent(inout) :: file
+    type(obstacle_t), intent(in) :: obstacles(:)
+    character(len=64) :: names(size(obstacles))
+    real(real64) :: centres(2*size(obstacles))
+    integer :: k
+
+    if (size(obstacles) == 0) return
+    do k = 1, size(names)
+      names(k) = obstacles(k)%name
+      centres(2*k - 1:2*k) = obstacles(k)%centre
+    end do
+    call file%put("parameters/obstacle/name", names)
+    call file%put("parameters/obstacle/centre", [2, size(names)], centres)
+    call file%put("parameters/obstacle/radius", [size(names)], obstacles%radius)
+    call file%put("parameters/obstacle/inside", [size(names)], merge(1_int32, 0_int32, obstacles%inside))
+  end subroutine describe_obstacles
+
+  subroutine describe_origin(file)
+    type(hdf5_file_t), intent(inout) :: file
+
+    call file%make_group("provenance")
+    call file%put("provenance@program_version", program_version)
+    call file%put("provenance@git_commit", git_commit)
+    call file%put("provenance@compiler", compiler_version())
+    call file%put("provenance@flags", build_flags)
+    call file%put("provenance@hdf5_version", hdf5_version())
+    call file%put("provenance@host", host_name())
+  end subroutine describe_origin
+
+  !> Writes, or writes anew, what is known at the end only.
+  subroutine describe_cost(file, wall_seconds, rate)
+    type(hdf5_file_t), intent(inout) :: file
+    real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
+    real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
+
+    call file%put("provenance@wall_time", [integer ::], [wall_seconds])
+    call file%put("provenance@collisions_per_second", [integer ::], [rate])
+  end subroutine describe_cost
+
+end module run_description

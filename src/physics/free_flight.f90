@@ -1,0 +1,211 @@
+!> Kinematics of free flight, as pure functions: where a disk is after a while, and when it touches a
+!> line, another disk or a circle. Times are measured from the state that is passed in.
+module free_flight
+  use kinds, only: never, real64
+  implicit none
+  private
+  public :: flight, flight_velocity, time_to_contact, time_to_line, time_to_circle
+
+contains
+
+  !> Position after the time s on the parabola x + v s + g s**2/2; by coordinate.
+  elemental function flight(x, v, g, s) result(there)
+    real(real64), intent(in) :: x         !! [length]
+    real(real64), intent(in) :: v         !! [length/time]
+    real(real64), intent(in) :: g         !! acceleration [length/time**2]
+    real(real64), intent(in) :: s         !! [time]
+    real(real64) :: there
+
+    there = x + (v + 0.5_real64*g*s)*s
+  end function flight
+
+  !> Velocity after the time s; by coordinate.
+  elemental function flight_velocity(v, g, s) result(then)
+    real(real64), intent(in) :: v, g, s
+    real(real64) :: then
+
+    then = v + g*s
+  end function flight_velocity
+
+  !> Time until two disks touch, `never` if they do not. Zero if they touch or overlap by rounding and
+  !> approach. The root is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant is
+  !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs.
+  pure function time_to_contact(dx, dv, sigma) result(s)
+    real(real64), intent(in) :: dx(2)     !! separation x_j - x_i [length]
+    real(real64), intent(in) :: dv(2)     !! relative velocity [length/time]
+    real(real64), intent(in) :: sigma     !! distance of the centres at contact [length]
+    real(real64) :: s, b, c, disc
+
+    s = never
+    b = dx(1)*dv(1) + dx(2)*dv(2)
+    if (b >= 0) return
+    disc = sigma*sigma*(dv(1)*dv(1) + dv(2)*dv(2)) - (dx(1)*dv(2) - dx(2)*dv(1))**2
+    if (disc <= 0) return
+    c = dx(1)*dx(1) + dx(2)*dx(2) - sigma*sigma
+    s = max(c, 0.0_real64)/(sqrt(disc) - b)
+  end function time_to_contact
+
+  !> Time until a line at `distance` ahead is crossed in the forward direction, `never` if it is not.
+  !> Each branch takes the form of the quadratic's root that does not cancel.
+  pure function time_to_line(distance, speed, acceleration) result(s)
+    real(real64), intent(in) :: distance      !! along the normal; negative: the line lies behind [length]
+    real(real64), intent(in) :: speed         !! along the normal [length/time]
+    real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
+    real(real64), parameter :: slowest = 1/never  !! slower is at rest; the time would overflow
+    real(real64) :: s, root
+
+    s = never
+    if (acceleration > 0) then
+      root = sqrt(max(speed**2 + 2*acceleration*distance, 0.0_real64))
+      if (speed > 0) then
+        s = 2*distance/(speed + root)
+      else
+        s = (root - speed)/acceleration
+      end if
+    else if (speed > slowest) then
+      if (acceleration < 0) then
+        root = speed**2 + 2*acceleration*distance
+        if (root >= 0) s = 2*distance/(speed + sqrt(root))
+      else
+        s = distance/speed
+      end if
+    end if
+  end function time_to_line
+
+  !> Time until a disk's centre reaches a circle of radius rho around the origin: from outside, or from
+  !> inside if `inside`. Zero if it is there already (or beyond, by rounding) and still moves on.
+  pure function time_to_circle(d, v, g, rho, inside) result(s)
+    real(real64), intent(in) :: d(2)      !! centre of the disk relative to the circle's [length]
+    real(real64), intent(in) :: v(2)      !! [length/time]
+    real(real64), intent(in) :: g(2)      !! [length/time**2]
+    real(real64), intent(in) :: rho       !! [length]
+    logical, intent(in) :: inside
+    real(real64) :: s, b, c, speed2, disc
+
+    if (any(abs(g) > 0)) then
+      s = time_to_circle_falling(d, v, g, rho, inside)
+      return
+    end if
+    s = never
+    b = d(1)*v(1) + d(2)*v(2)
+    c = d(1)*d(1) + d(2)*d(2) - rho*rho
+    speed2 = v(1)*v(1) + v(2)*v(2)
+    disc = rho*rho*speed2 - (d(1)*v(2) - d(2)*v(1))**2
+    if (inside) then
+      if (.not. speed2 > 0) return
+      disc = sqrt(max(disc, 0.0_real64))
+      if (b > 0) then
+        s = max(-c, 0.0_real64)/(disc + b)
+      else
+        s = (disc - b)/speed2
+      end if
+    else if (b < 0 .and. disc > 0) then
+      s = max(c, 0.0_real64)/(sqrt(disc) - b)
+    end if
+  end function time_to_circle
+
+  !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic; between the roots of F'
+  !> it is monotone, and those are bracketed in turn by the roots of the quadratic F''. So every root is
+  !> found by bisection in a bracket that holds exactly one: no first contact can be missed.
+  pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
+    real(real64), intent(in) :: d(2), v(2), g(2), rho
+    logical, intent(in) :: inside
+    real(real64) :: s, quartic(0:4), cubic(0:3), edge(0:4), a, b, c, disc, bend(2), sense, bound
+    integer :: k, n
+
+    sense = merge(-1.0_real64, 1.0_real64, inside)     ! contact: sense*F falls through zero
+    quartic = sense*[dot_product(d, d) - rho**2, 2*dot_product(d, v), &
+      dot_product(v, v) + dot_product(d, g), dot_product(v, g), 0.25_real64*dot_product(g, g)]
+    cubic = [quartic(1), 2*quartic(2), 3*quartic(3), 4*quartic(4)]
+    bound = 1 + maxval(abs(cubic(0:2)))/abs(cubic(3))  ! Cauchy: beyond it F' has no root
+    a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' = a s**2 + 2 b s + c
+    disc = max(b*b - a*c, 0.0_real64)
+    bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
+
+    edge(0) = 0                                        ! ends of the intervals on which F is monotone
+    n = 0
+    call add_root(cubic, 0.0_real64, min(max(bend(1), 0.0_real64), bound), edge, n)
+    call add_root(cubic, min(max(bend(1), 0.0_real64), bound), min(max(bend(2), 0.0_real64), bound), edge, n)
+    call add_root(cubic, min(max(bend(2), 0.0_real64), bound), bound, edge, n)
+    n = n + 1
+    edge(n) = edge(n - 1) + bound
+    do while (inside .and. value(quartic, edge(n)) > 0)
+      edge(n) = 2*edge(n)
+    end do
+    s = never
+    do k = 1, n
+      if (value(quartic, edge(k)) > 0 .or. value(quartic, edge(k)) >= value(quartic, edge(k - 1))) cycle
+      s = last_apart(d, v, g, rho, inside, edge(k - 1), edge(k))
+      return
+    end do
+  end function time_to_circle_falling
+
+  !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
+  !> to the last bit of the distance itself, which is sharper than the polynomial.
+  pure function last_apart(d, v, g, rho, inside, lo, hi) result(s)
+    real(real64), intent(in) :: d(2), v(2), g(2), rho, lo, hi
+    logical, intent(in) :: inside
+    real(real64) :: s, left, right, x(2)
+
+    left = lo
+    right = hi
+    do
+      s = 0.5_real64*(left + right)
+      if (s <= left .or. s >= right) exit
+      x = flight(d, v, g, s)
+      if (x(1)*x(1) + x(2)*x(2) > rho*rho .neqv. inside) then
+        left = s
+      else
+        right = s
+      end if
+    end do
+    s = left
+  end function last_apart
+
+  !> Appends the root of `poly` in (lo, hi), if it changes sign there.
+  pure subroutine add_root(poly, lo, hi, edge, n)
+    real(real64), intent(in) :: poly(0:), lo, hi
+    real(real64), intent(inout) :: edge(0:)
+    integer, intent(inout) :: n
+
+    if (.not. hi > lo) return
+    if ((value(poly, lo) > 0) .eqv. (value(poly, hi) > 0)) return
+    n = n + 1
+    edge(n) = root_between(poly, lo, hi)
+  end subroutine add_root
+
+  !> The root of `poly` between lo and hi, where it changes sign once; bisection to the last bit.
+  pure function root_between(poly, lo, hi) result(s)
+    real(real64), intent(in) :: poly(0:), lo, hi
+    real(real64) :: s, left, right
+    logical :: sign_left
+
+    left = lo
+    right = hi
+    sign_left = value(poly, left) > 0
+    do
+      s = 0.5_real64*(left + right)
+      if (s <= left .or. s >= right) exit
+      if ((value(poly, s) > 0) .eqv. sign_left) then
+        left = s
+      else
+        right = s
+      end if
+    end do
+    s = left                                           ! the side before contact
+  end function root_between
+
+  !> Horner's rule.
+  pure function value(poly, s) result(p)
+    real(real64), intent(in) :: poly(0:)
+    real(real64), intent(in) :: s
+    real(real64) :: p
+    integer :: k
+
+    p = 0
+    do k = ubound(poly, 1), 0, -1
+      p = p*s + poly(k)
+    end do
+  end function value
+
+end module free_flight

@@ -1,0 +1,92 @@
+!> The state of a simulation: all that a checkpoint holds and nothing else.
+module simulation_state
+  use kinds, only: int32, int64, real64
+  use box_geometry, only: box_t, n_sides
+  use collisions, only: contact_law_t
+  use disks, only: disk_t, species_t, tag_t
+  use free_flight, only: flight, flight_velocity
+  implicit none
+  private
+  public :: simulation_t
+
+  type :: simulation_t
+    ! Given by the input
+    type(box_t) :: box
+    type(contact_law_t) :: law
+    type(species_t), allocatable :: species(:)
+    ! Changing
+    type(disk_t), allocatable :: disk(:)          !! (n) in the order of the cells, `tag%id` names them
+    type(tag_t), allocatable :: tag(:)            !! (n)
+    real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
+    real(real64) :: now = 0.0_real64              !! since the epoch [time]
+    integer(int64) :: next_epoch = 0              !! number of events at which the epoch moves
+    ! Counts and sums since the start of the run
+    integer(int64) :: events = 0                  !! collisions of any kind
+    integer(int64) :: collisions = 0              !! of pairs
+    integer(int64) :: wall_collisions(n_sides) = 0      !! left, right, bottom, top
+    integer(int64) :: obstacle_collisions = 0
+    real(real64) :: wall_impulse(n_sides) = 0.0_real64  !! sum of |change of normal momentum|
+    real(real64) :: virial = 0.0_real64           !! sum of impulse times distance over pair collisions
+    real(real64) :: dissipated = 0.0_real64       !! kinetic energy lost in collisions
+    real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
+  contains
+    procedure :: time
+    procedure :: n_disks
+    procedure :: position
+    procedure :: velocity
+    procedure :: kinetic_energy
+  end type simulation_t
+
+contains
+
+  !> Time since the start of the run.
+  pure function time(self) result(t)
+    class(simulation_t), intent(in) :: self
+    real(real64) :: t
+
+    t = self%epoch + self%now
+  end function time
+
+  pure function n_disks(self) result(n)
+    class(simulation_t), intent(in) :: self
+    integer(int32) :: n
+
+    n = size(self%disk, kind=int32)
+  end function n_disks
+
+  !> Where disk i is now. Looking at a disk never changes it.
+  pure function position(self, i) result(x)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    real(real64) :: x(2)                          !! [length]
+
+    associate (d => self%disk(i))
+      x = flight(d%x, d%v, self%box%gravity, self%now - d%clock)
+    end associate
+  end function position
+
+  !> Velocity of disk i now.
+  pure function velocity(self, i) result(v)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    real(real64) :: v(2)                          !! [length/time]
+
+    associate (d => self%disk(i))
+      v = flight_velocity(d%v, self%box%gravity, self%now - d%clock)
+    end associate
+  end function velocity
+
+  !> Kinetic energy of all disks now.
+  pure function kinetic_energy(self) result(energy)
+    class(simulation_t), intent(in) :: self
+    real(real64) :: energy, v(2)
+    integer(int32) :: i
+
+    energy = 0
+    do i = 1, self%n_disks()
+      v = self%velocity(i)
+      energy = energy + 0.5_real64*self%species(self%tag(i)%species)%mass*dot_product(v, v)
+    end do
+  end function kinetic_energy
+
+end module simulation_state

@@ -1,0 +1,240 @@
+!> The faces of the cells of a grid, and when a disk leaves its cell; the sides of the box are faces as well.
+!>
+!> Cells overlap as far as can be: disks in cells with one between them just cannot touch. Where cells overlap, a disk
+!> may be in any of them, best in the one that it leaves last. It leaves wide cells less often then: by half and more.
+module cell_faces
+  use kinds, only: int16, int32, never, real64
+  use box_geometry, only: box_t, side_time
+  use disks, only: disk_t
+  use free_flight, only: flight, flight_velocity, time_to_line
+  use neighbour_search, only: first_crossing
+  implicit none
+  private
+  public :: cell_faces_t
+
+  real(real64), parameter :: slowest = 1/never     !! a disk slower than this is at rest
+
+  !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
+  type :: line_t
+    real(real64) :: place = 0.0_real64             !! of the face or side [length]
+    real(real64) :: inset = 0.0_real64             !! in radii, from there to the line that the disk's centre reaches
+    integer(int32) :: code = 0                     !! of the event: a side, or a crossing
+  end type line_t
+
+  type :: cell_faces_t
+    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
+    real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
+    logical :: falling = .false.                   !! disks fly on parabolas
+    type(box_t) :: box
+    type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
+    type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
+  contains
+    procedure :: set
+    procedure :: choose_cell
+    procedure :: next
+    procedure, private :: next_falling
+  end type cell_faces_t
+
+contains
+
+  !> Cuts the box into n(1) columns and n(2) rows of cells, for disks that touch within `reach` of each other.
+  subroutine set(self, box, n, reach)
+    class(cell_faces_t), intent(out) :: self
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: n(2)
+    real(real64), intent(in) :: reach              !! [length]
+
+    self%width = box%edges()/n*(1 + 4*epsilon(self%width))       ! the last face is not before the side
+    self%overlap = max(self%width - reach, 0.0_real64)
+    self%falling = box%falling()
+    self%box = box
+    call cut(self, 1, n(1), self%column)
+    call cut(self, 2, n(2), self%row)
+  end subroutine set
+
+  !> The faces of n columns (axis 1) or rows.
+  pure subroutine cut(self, axis, n, line)
+    class(cell_faces_t), intent(in) :: self
+    integer(int32), intent(in) :: axis, n
+    type(line_t), allocatable, intent(out) :: line(:, :)
+    real(real64) :: face
+    integer(int32) :: low, high, inset, k
+
+    low = 2 - 2*axis                               ! codes of the two sides
+    high = low - 1
+    inset = merge(0, 1, self%box%periodic(axis))
+    allocate (line(0:1, n))
+    do k = 1, n - 1
+      face = self%box%lower(axis) + self%width(axis)*k
+      line(1, k) = line_t(face + 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + high)
+      line(0, k + 1) = line_t(face - 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + low)
+    end do
+    line(0, 1) = line_t(self%box%lower(axis), inset, low)
+    line(1, n) = line_t(self%box%upper(axis), -inset, high)
+  end subroutine cut
+
+  !> Of the cells that the disk is in, the one that it leaves last on its way.
+  pure subroutine choose_cell(self, disk, now, cell)
+    class(cell_faces_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    integer(int16), intent(inout) :: cell(2)       !! in: any of them
+    real(real64) :: s
+
+    s = now - disk%clock
+    cell(1) = cell(1) + ahead(self%column, self%overlap(1), disk%x(1), disk%v(1), self%box%gravity(1), s, cell(1))
+    cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), self%box%gravity(2), s, cell(2))
+  end subroutine choose_cell
+
+  !> Along one axis: a step into the next cell if the disk is in that one too, and goes there. No branch, as in `next`.
+  pure function ahead(line, overlap, x, v, g, s, cell) result(step)
+    type(line_t), intent(in) :: line(0:1, *)
+    real(real64), intent(in) :: overlap, x, v, g, s
+    integer(int16), intent(in) :: cell
+    integer(int16) :: step
+    real(real64) :: left
+    integer(int32) :: up
+
+    up = merge(1, 0, flight_velocity(v, g, s) > 0)
+    left = abs(line(up, cell)%place - flight(x, v, g, s))
+    step = int(iand(2*up - 1, -merge(1, 0, left < overlap .and. line(up, cell)%code <= first_crossing)), int16)
+  end function ahead
+
+  !> When and how the disk leaves its cell, or meets a side within it.
+  pure subroutine next(self, disk, cell, now, falling, t, code)
+    class(cell_faces_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(in) :: now
+    logical, intent(in) :: falling
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+
+    if (falling) then
+      call self%next_falling(disk, cell, now, t, code)
+    else
+      call next_of(self%column, self%row, disk%x, disk%v, disk%clock, disk%radius, cell, t, code)
+    end if
+  end subroutine next
+
+  !> On a straight line; which axis and which way are toss-ups: no branch on them.
+  pure subroutine next_of(column, row, x, v, clock, radius, cell, t, code)
+    type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
+    real(real64), intent(in) :: x(2), v(2), clock, radius
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_x, t_y
+    integer(int32) :: up_x, up_y, code_x, code_y
+
+    up_x = merge(1, 0, v(1) > 0)
+    up_y = merge(1, 0, v(2) > 0)
+    t_x = line_time(column(up_x, cell(1)), x(1), v(1), clock, radius)
+    t_y = line_time(row(up_y, cell(2)), x(2), v(2), clock, radius)
+    code_x = column(up_x, cell(1))%code
+    code_y = row(up_y, cell(2))%code
+    code = ieor(code_x, iand(-merge(1, 0, t_y < t_x), ieor(code_x, code_y)))
+    t = merge(t_y, t_x, t_y < t_x)
+  end subroutine next_of
+
+  !> When a disk on its way to a line reaches it. Contact with a side comes out as `side_time` has it: it is one
+  !> event, whoever predicts it.
+  pure function line_time(line, x, v, clock, radius) result(t)
+    type(line_t), intent(in) :: line
+    real(real64), intent(in) :: x, v, clock, radius
+    real(real64) :: t, speed
+
+    speed = abs(v)
+    t = ((line%place + line%inset*radius) - x)/sign(merge(speed, slowest, speed > slowest), v)
+    t = clock + merge(t, 0.0_real64, t > 0)
+    t = merge(t, never, speed > slowest)
+  end function line_time
+
+  !> On a parabola.
+  pure subroutine next_falling(self, disk, cell, now, t, code)
+    class(cell_faces_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk
+    integer(int16), intent(in) :: cell(2)
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: t_y
+    integer(int32) :: code_y
+
+    call leave(self%column(:, cell(1)), 1, self%box, disk, now, t, code)
+    call leave(self%row(:, cell(2)), 2, self%box, disk, now, t_y, code_y)
+    code = ieor(code, iand(-merge(1, 0, t_y < t), ieor(code, code_y)))
+    t = merge(t_y, t, t_y < t)
+  end subroutine next_falling
+
+  !> The same along one axis.
+  pure subroutine leave(line, axis, box, disk, now, t, code)
+    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    integer(int32), intent(in) :: axis
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    real(real64) :: g, x, v, sense, gap, disc
+    integer(int32) :: up
+
+    g = box%gravity(axis)
+    up = merge(1, 0, disk%v(axis) > 0)
+    if (.not. abs(g) > 0) then
+      t = line_time(line(up), disk%x(axis), disk%v(axis), disk%clock, disk%radius)
+    else if (any(line%code > first_crossing)) then
+      t = falling_time(line(up), up, axis, box, disk, now)
+      x = falling_time(line(1 - up), 1 - up, axis, box, disk, now)
+      up = ieor(up, merge(1, 0, x < t))
+      t = min(t, x)
+    else                                           ! forward, or, if gravity turns the disk before, back
+      x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
+      v = flight_velocity(disk%v(axis), g, now - disk%clock)
+      up = merge(1, 0, v > -g*moment(now))
+      sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
+      gap = max(sense*(line(up)%place - x), 0.0_real64)
+      disc = (v*v + tiny(v)) + 2*sense*g*gap       ! not zero if at rest on the face
+      if (disc >= 0) then
+        t = now + 2*gap/(abs(v) + sqrt(disc))
+      else
+        up = 1 - up
+        gap = max(sense*(x - line(up)%place), 0.0_real64)
+        t = now + (abs(v) + sqrt(v*v - 2*sense*g*gap))/(-sense*g)
+      end if
+    end if
+    code = line(up)%code
+  end subroutine leave
+
+  !> When a falling disk reaches a face or side. The root before `now`, where it came in, is not the one.
+  pure function falling_time(line, up, axis, box, disk, now) result(t)
+    type(line_t), intent(in) :: line
+    integer(int32), intent(in) :: up               !! 1: the upper one along the axis, 0: the lower
+    integer(int32), intent(in) :: axis
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64) :: t, sense, g
+
+    if (line%code > first_crossing) then
+      t = side_time(box, disk, line%code)
+      return
+    end if
+    t = never
+    sense = 2*up - 1
+    g = box%gravity(axis)
+    if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + moment(now)) <= 0 &
+      .and. sense*g < 0) return                    ! flies away from it, ever faster
+    t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
+  end function falling_time
+
+  !> The least while after `now` that a time can tell. A disk that turns at a face within it would else go through
+  !> that face to and fro and come to no later time.
+  elemental function moment(now)
+    real(real64), intent(in) :: now
+    real(real64) :: moment
+
+    moment = 4*epsilon(now)*now + tiny(now)
+  end function moment
+
+end module cell_faces

@@ -1,0 +1,282 @@
+!> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
+!> A cell with more of them chains the surplus behind its last disk.
+module cells
+  use kinds, only: int16, int32, int64
+  use disks, only: disk_t, tag_t
+  use memory_hints, only: prefetch
+  implicit none
+  private
+  public :: append, cell_t, cells_t, gather, list_capacity
+
+  integer(int32), parameter :: cell_capacity = 3
+  integer(int32), parameter :: count_slot = cell_capacity + 1
+  integer(int32), parameter :: counted = 65535               !! mask of the number of disks
+  integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
+  integer(int32), parameter :: marked = shiftl(crowd, 8)     !! beyond nine crowded cells
+  integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
+
+  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
+  !> in its lower half, and in its upper half the crowded cells among the nine around this one; and it holds a mark.
+  type :: cell_t
+    integer(int32) :: slot(count_slot)
+  contains
+    procedure :: in_slots
+    procedure :: near_crowd
+    procedure :: is_marked
+  end type cell_t
+
+  type :: cells_t
+    integer(int32) :: stride = 0                 !! from row to row
+    type(cell_t), allocatable :: cell(:)         !! (0:)
+    integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
+  contains
+    procedure :: number
+    procedure :: empty
+    procedure :: mark
+    procedure :: insert
+    procedure :: remove
+    procedure :: chain
+    procedure :: read_ahead
+    procedure, private :: count_crowd
+  end type cells_t
+
+contains
+
+  !> Of the cell in column cell(1) and row cell(2), both from 1.
+  pure function number(self, cell) result(c)
+    class(cells_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    integer(int32) :: c
+
+    c = cell(1) + self%stride*cell(2)
+  end function number
+
+  !> Makes rows of `stride` empty cells for n_disks disks.
+  subroutine empty(self, stride, rows, n_disks)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: stride, rows, n_disks
+    integer(int32) :: c
+
+    self%stride = stride
+    if (allocated(self%cell)) then
+      if (size(self%cell) /= stride*rows .or. size(self%next) /= n_disks) deallocate (self%cell, self%next)
+    end if
+    if (.not. allocated(self%cell)) allocate (self%cell(0:stride*rows - 1), self%next(n_disks))
+    do c = 0, stride*rows - 1
+      self%cell(c)%slot = 0
+    end do
+  end subroutine empty
+
+  !> Marks cell c, or takes its mark away.
+  pure subroutine mark(self, c, yes)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c
+    logical, intent(in) :: yes
+
+    associate (count => self%cell(c)%slot(count_slot))
+      count = merge(ior(count, marked), iand(count, not(marked)), yes)
+    end associate
+  end subroutine mark
+
+  !> Puts disk i into cell c.
+  pure subroutine insert(self, c, i)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, i
+    integer(int32) :: n, head
+
+    n = self%cell(c)%in_slots()
+    associate (slot => self%cell(c)%slot)
+      self%next(i) = 0
+      if (n < cell_capacity) then
+        slot(n + 1) = i - 1
+        slot(count_slot) = slot(count_slot) + 1
+        return
+      end if
+      head = slot(cell_capacity) + 1
+      self%next(i) = head                          ! becomes the head of the chain
+      slot(cell_capacity) = i - 1
+    end associate
+    if (self%next(head) == 0) call self%count_crowd(c, 1)
+  end subroutine insert
+
+  !> Takes disk i out of cell c.
+  pure subroutine remove(self, c, i)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, i
+    integer(int32) :: n, k, link
+
+    link = self%chain(c)
+    associate (slot => self%cell(c)%slot)
+      k = 1 + slots_before(self%cell(c), i)
+      if (link == 0) then
+        n = self%cell(c)%in_slots()
+        slot(k) = slot(n)
+        slot(count_slot) = slot(count_slot) - 1
+        return
+      end if
+      if (slot(k) == i - 1) then                   ! the head of the chain takes the free place
+        slot(k) = link - 1
+        slot(cell_capacity) = self%next(link) - 1
+        self%next(link) = 0
+      else
+        do while (self%next(link) /= i)
+          link = self%next(link)
+        end do
+        self%next(link) = self%next(i)
+      end if
+    end associate
+    if (self%chain(c) == 0) call self%count_crowd(c, -1)
+  end subroutine remove
+
+  !> Tells the cells around that cell c became crowded (1), or no longer is (-1).
+  pure subroutine count_crowd(self, c, change)
+    class(cells_t), intent(inout) :: self
+    integer(int32), intent(in) :: c, change
+    integer(int32) :: k, m
+
+    do k = c - self%stride, c + self%stride, self%stride
+      do m = k - 1, k + 1
+        self%cell(m)%slot(count_slot) = self%cell(m)%slot(count_slot) + change*crowd
+      end do
+    end do
+  end subroutine count_crowd
+
+  !> Number of disks in the slots.
+  elemental function in_slots(self) result(n)
+    class(cell_t), intent(in) :: self
+    integer(int32) :: n
+
+    n = iand(self%slot(count_slot), counted)
+  end function in_slots
+
+  !> Whether the cell was marked.
+  elemental function is_marked(self) result(yes)
+    class(cell_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%slot(count_slot) >= marked
+  end function is_marked
+
+  !> Whether one of the nine cells around is crowded; true for marked cells.
+  elemental function near_crowd(self) result(yes)
+    class(cell_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%slot(count_slot) >= crowd
+  end function near_crowd
+
+  !> The first disk in the chain of cell c, which is the last one in its slots; 0 if the cell is not crowded.
+  pure function chain(self, c) result(i)
+    class(cells_t), intent(in) :: self
+    integer(int32), intent(in) :: c
+    integer(int32) :: i
+
+    i = 0
+    if (self%cell(c)%in_slots() < cell_capacity) return
+    i = self%cell(c)%slot(cell_capacity) + 1
+    if (self%next(i) == 0) i = 0
+  end function chain
+
+  !> How many slots lie before the one of disk i, which is in this cell; 2 if it is in the chain.
+  elemental function slots_before(self, i) result(n)
+    type(cell_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    integer(int32) :: n, first
+
+    first = merge(0, 1, self%slot(1) == i - 1)
+    n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
+  end function slots_before
+
+  !> Lists the disks in the slots of the nine cells around c, where disk i is, without i. Whole cells are copied
+  !> without a branch on how many they hold. If i is not in the slots of its crowded cell, the first disk of the
+  !> chain is left out.
+  subroutine gather(cell, c, stride, i, list, n)
+    type(cell_t), intent(in) :: cell(0:*)
+    integer(int32), intent(in) :: c, stride, i
+    integer(int32), intent(out) :: list(list_capacity)
+    integer(int32), intent(out) :: n               !! number of disks listed
+    integer(int64) :: m, own
+
+    m = 0
+    call append(cell(c - stride - 1), list, m)
+    call append(cell(c - stride), list, m)
+    call append(cell(c - stride + 1), list, m)
+    call append(cell(c - 1), list, m)
+    own = m + 1 + slots_before(cell(c), i)
+    call append(cell(c), list, m)
+    list(own) = list(m)
+    m = m - 1
+    call append(cell(c + 1), list, m)
+    call append(cell(c + stride - 1), list, m)
+    call append(cell(c + stride), list, m)
+    call append(cell(c + stride + 1), list, m)
+    n = int(m, int32)
+  end subroutine gather
+
+  !> Adds the disks in the slots of a cell to a list of n.
+  pure subroutine append(cell, list, n)
+    type(cell_t), intent(in) :: cell
+    integer(int32), intent(inout) :: list(list_capacity)
+    integer(int64), intent(inout) :: n
+
+    list(n + 1:n + count_slot) = cell%slot
+    n = n + cell%in_slots()
+  end subroutine append
+
+  !> Asks for what predictions for some disks will need: what describes a disk, its cells, the disks in them; and of its
+  !> partner, one stage later, the same but for the disks, most of which are among the first ones.
+  subroutine read_ahead(self, disk, tag, stage, disks)
+    class(cells_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: stage
+    integer(int32), intent(in) :: disks(:)
+    integer(int32) :: k, partner
+
+    do k = 1, size(disks)
+      select case (stage)
+      case (1)
+        call fetch(disks(k))
+      case (2)
+        call fetch_cells(self%number(tag(disks(k))%cell))
+        partner = disk(disks(k))%partner
+        if (partner > 0) call fetch(partner)
+      case default
+        call fetch_disks(self%number(tag(disks(k))%cell))
+        partner = disk(disks(k))%partner
+        if (partner > 0) call fetch_cells(self%number(tag(partner)%cell))
+      end select
+    end do
+  contains
+
+    subroutine fetch(i)
+      integer(int32), intent(in) :: i
+
+      call prefetch(tag(i)%species)
+      call prefetch(disk(i)%stamp)
+    end subroutine fetch
+
+    subroutine fetch_cells(c)
+      integer(int32), intent(in) :: c
+      integer(int32) :: m
+
+      do m = c - self%stride, c + self%stride, self%stride
+        call prefetch(self%cell(m - 1)%slot(1))    ! three cells lie on one line or two
+        call prefetch(self%cell(m + 1)%slot(count_slot))
+      end do
+    end subroutine fetch_cells
+
+    subroutine fetch_disks(c)
+      integer(int32), intent(in) :: c
+      integer(int32) :: m, l
+
+      do m = c - self%stride, c + self%stride, self%stride
+        do l = m - 1, m + 1
+          call prefetch(disk(self%cell(l)%slot(1) + 1)%x(1))
+        end do
+      end do
+    end subroutine fetch_disks
+
+  end subroutine read_ahead
+
+end module cells

@@ -1,0 +1,194 @@
+!> The seam between the dynamics and the ways to find what a disk meets next; and the kernel they share.
+module neighbour_search
+  use kinds, only: int32, never, real64
+  use disks, only: disk_t
+  use free_flight, only: flight, flight_velocity
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: neighbour_search_t, earliest_contact, first_crossing
+
+  !> Codes of `disk%partner` from here downwards: the disk leaves its cell to the left, right, bottom, top.
+  integer(int32), parameter :: first_crossing = -2000000000
+  real(real64), parameter :: many = 32*epsilon(1.0_real64)        !! roundings
+
+  type, abstract :: neighbour_search_t
+    logical :: everyone = .false.    !! predict all disks anew after each event, not just those involved
+  contains
+    procedure(build_search), deferred :: build
+    procedure(predict_event), deferred :: predict
+    procedure(cross_cells), deferred :: cross
+    procedure :: predict_both
+    procedure :: read_ahead
+  end type neighbour_search_t
+
+  abstract interface
+    !> Takes in where the disks are now.
+    subroutine build_search(self, sim)
+      import :: neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+    end subroutine build_search
+
+    !> Writes into disk i the earliest event it can expect: a disk, a side, an obstacle, a cell's end. What it expects of
+    !> another disk after that one's own event may be left out: that one predicts anew then. Once all disks have
+    !> been predicted, each contact before all other events of the two is expected by at least one of them.
+    subroutine predict_event(self, sim, i)
+      import :: int32, neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+      integer(int32), intent(in) :: i
+    end subroutine predict_event
+
+    !> Moves disk i over the face that its event names, a crossing or a periodic side, and predicts.
+    subroutine cross_cells(self, sim, i, code)
+      import :: int32, neighbour_search_t, simulation_t
+      class(neighbour_search_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: sim
+      integer(int32), intent(in) :: i
+      integer(int32), intent(in) :: code      !! of the crossing or the side
+    end subroutine cross_cells
+  end interface
+
+contains
+
+  !> Writes into the disks i and j, which have just collided, what they can expect.
+  subroutine predict_both(self, sim, i, j)
+    class(neighbour_search_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+
+    call self%predict(sim, i)
+    call self%predict(sim, j)
+  end subroutine predict_both
+
+  !> Asks for what the next predictions for some disks will need, so that it is in the cache by then. At each stage
+  !> that can be found out from what was asked for at those before.
+  subroutine read_ahead(self, sim, stage, disks)
+    class(neighbour_search_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: stage       !! from 1
+    integer(int32), intent(in) :: disks(:)
+  end subroutine read_ahead
+
+  !> The earliest contact of disk i with the disks listed, if it comes before the event known already.
+  !>
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their
+  !> clocks, and every term changes sign, or nothing, when they trade places. So it comes out the same to
+  !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
+  !> moment the one with the lower disks wins. A contact before `now` is one of rounding: disks that collided
+  !> without rebound stay in contact to the last bits, which a period may change that one of them is moved by.
+  !>
+  !> Most candidates fail one combined test: the root is not real, not before the best so far, or not before the
+  !> candidate's own event, at which that one will predict anew with i among its candidates. A root before t
+  !> needs c < -2 b (t - late), here with a margin above rounding.
+  pure subroutine earliest_contact(disk, i, n, list, now, fresh, falling, gravity, t, partner, shift)
+    type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
+    integer(int32), value :: i
+    integer(int32), value :: n                !! number of candidates
+    integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
+    real(real64), value :: now                !! [time]
+    logical, value :: fresh                   !! nobody has a later clock than i, which is now
+    logical, value :: falling                 !! `gravity` is not zero
+    real(real64), intent(in) :: gravity(2)
+    real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
+    integer(int32), intent(inout) :: partner  !! likewise
+    real(real64), intent(in), optional :: shift(2)  !! of the candidates' image [length]
+    real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
+    real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
+    integer(int32) :: k, j, whom
+
+    call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
+    x = xi; y = yi; u = ui; v = vi; late = clock; best = t; whom = partner
+    margin = many*(abs(clock) + tiny(clock)/epsilon(clock)**2)
+    from = 2*clock - margin
+    do k = 1, n
+      j = list(k)
+      call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
+      if (.not. fresh) then                   ! else the same numbers come out, with si = 0
+        late = merge(clock, clock_j, clock > clock_j)
+        from = 2*late - margin
+        si = late - clock
+        x = moved(xi, ui, gravity(1), si, falling)
+        y = moved(yi, vi, gravity(2), si, falling)
+        u = sped_up(ui, gravity(1), si, falling)
+        v = sped_up(vi, gravity(2), si, falling)
+      end if
+      sj = late - clock_j
+      dx = moved(xj, uj, gravity(1), sj, falling) - x
+      dy = moved(yj, vj, gravity(2), sj, falling) - y
+      du = sped_up(uj, gravity(1), sj, falling) - u
+      dv = sped_up(vj, gravity(2), sj, falling) - v
+      if (present(shift)) dx = dx + shift(1)
+      if (present(shift)) dy = dy + shift(2)
+      sigma2 = (ri + rj)**2
+      b = dx*du + dy*dv
+      c = dx*dx + dy*dy - sigma2
+      disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
+      latest = min(best, disk(j)%event_time)
+      in_time = (from - (2 + many)*latest)*b - c
+      in_time = merge(in_time, disc, in_time < disc)
+      if (in_time > 0) then
+        t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
+        if (b >= 0) cycle
+        if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or else it is now
+          if (b + (du*du + dv*dv)*(now - late) >= 0) cycle
+          t_j = now
+        end if
+        if (.not. t_j < best) then            ! seldom
+          if (t_j > best .or. .not. before(i, j + 1, whom)) cycle
+        end if
+        best = t_j; whom = j + 1
+      end if
+    end do
+    t = best; partner = whom
+  end subroutine earliest_contact
+
+  !> The state of a disk, in numbers.
+  pure subroutine read_state(d, x, y, u, v, clock, radius)
+    type(disk_t), intent(in) :: d
+    real(real64), intent(out) :: x, y, u, v, clock, radius
+
+    x = d%x(1); y = d%x(2)
+    u = d%v(1); v = d%v(2)
+    clock = d%clock; radius = d%radius
+  end subroutine read_state
+
+  !> A coordinate after the time s; on a straight line with fewer steps, to the same number.
+  elemental function moved(x, v, g, s, falling) result(there)
+    real(real64), intent(in) :: x, v, g, s
+    logical, intent(in) :: falling            !! otherwise g is zero
+    real(real64) :: there
+
+    if (falling) then
+      there = flight(x, v, g, s)
+    else
+      there = x + v*s
+    end if
+  end function moved
+
+  !> A velocity after the time s, likewise.
+  elemental function sped_up(v, g, s, falling) result(after)
+    real(real64), intent(in) :: v, g, s
+    logical, intent(in) :: falling
+    real(real64) :: after
+
+    after = v
+    if (falling) after = flight_velocity(v, g, s)
+  end function sped_up
+
+  !> Whether, at the same moment, i meets disk j before its other partner (a disk or, if <= 0, a wall).
+  elemental function before(i, j, other) result(yes)
+    integer(int32), intent(in) :: i, j, other
+    logical :: yes
+
+    if (other <= 0) then
+      yes = j < i
+    else if (min(i, j) /= min(i, other)) then
+      yes = min(i, j) < min(i, other)
+    else
+      yes = max(i, j) < max(i, other)
+    end if
+  end function before
+
+end module neighbour_search

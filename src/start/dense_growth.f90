@@ -1,0 +1,243 @@
+!> Dense random packings: disks start small, move as an elastic gas, and grow until they have their
+!> size (the idea of Lubachevsky and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in
+!> jumps between short runs, each into the gap that it finds at that moment; so the event-driven
+!> dynamics serves as it is.
+module dense_growth
+  use kinds, only: int32, never, pi, real64
+  use box_geometry, only: box_t
+  use cell_grid, only: cell_grid_t
+  use disks, only: species_t
+  use errors, only: error_t, exit_usage, fail
+  use event_driven, only: event_driven_t
+  use evolution, only: limits_t
+  use packing, only: packing_t
+  use random_insertion, only: insert_at_random
+  use random_stream, only: random_stream_t
+  use simulation_state, only: simulation_t
+  use texts, only: written
+  implicit none
+  private
+  public :: grow_disks
+
+  real(real64), parameter :: loose = 0.4_real64         !! packing at which the disks are scattered
+  real(real64), parameter :: lead = 1.02_real64         !! of any disk over the smallest, at most
+  real(real64), parameter :: caution = 0.9_real64       !! part of the gap to take
+  integer, parameter :: run_length = 2                  !! collisions per disk between jumps
+  integer, parameter :: mixing_length = 10              !! collisions per disk at full size
+  integer, parameter :: patience = 50                   !! jumps to gain a tenth of what is lacking
+
+contains
+
+  !> Places disks of several species, side by side, in a box.
+  subroutine grow_disks(box, species, stream, x, error)
+    type(box_t), intent(in) :: box                      !! with its obstacles; gravity is not felt
+    type(species_t), intent(in) :: species(:)           !! counts and radii to reach
+    type(random_stream_t), intent(inout) :: stream
+    real(real64), allocatable, intent(out) :: x(:, :)   !! (2,n) species by species [length]
+    type(error_t), allocatable, intent(out) :: error
+    type(simulation_t) :: sim
+    type(event_driven_t) :: evolution
+    real(real64) :: lack, lack_before
+    integer(int32) :: i
+    integer :: jump
+
+    call scatter(box, species, stream, sim, error)
+    if (allocated(error)) return
+    allocate (cell_grid_t :: evolution%search)
+    lack_before = 1
+    jump = 0
+    do
+      call move(evolution, sim, run_length, error)
+      if (allocated(error)) return
+      lack = 1 - minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
+      if (lack <= 0) exit
+      jump = jump + 1
+      if (modulo(jump, patience) == 0) then
+        if (lack > 0.9_real64*lack_before) then
+          call fail_to_grow(sim, error)
+          return
+        end if
+        lack_before = lack
+      end if
+      call grow(sim, min(1.0_real64, lead*(1 - lack)))
+    end do
+    call move(evolution, sim, mixing_length, error)
+    allocate (x(2, size(sim%disk)))
+    do i = 1, sim%n_disks()
+      x(:, sim%tag(i)%id) = sim%disk(i)%x
+    end do
+  end subroutine grow_disks
+
+  subroutine fail_to_grow(sim, error)
+    type(simulation_t), intent(in) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: reached, wanted
+
+    reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
+    wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
+    call fail(error, exit_usage, "species."//sim%species(1)%name//".placement: dense placement "// &
+      "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; use fewer or smaller disks")
+  end subroutine fail_to_grow
+
+  !> Small disks at random places, with random velocities.
+  subroutine scatter(box, species, stream, sim, error)
+    type(box_t), intent(in) :: box
+    type(species_t), intent(in) :: species(:)
+    type(random_stream_t), intent(inout) :: stream
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    type(packing_t) :: packing
+    real(real64) :: scale, wanted
+    integer :: k, n
+    logical :: complete
+
+    n = sum(species%count)
+    sim%box = box
+    sim%box%gravity = 0
+    sim%species = species
+    sim%species%mass = 1
+    allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
+    allocate (sim%disk(n), sim%tag(n))
+    wanted = pi*sum(species%count*species%radius**2)/product(box%edges())
+    scale = sqrt(min(1.0_real64, loose/wanted))
+    do
+      packing = packing_t(box, n, size(species))
+      call fill(packing, species, scale, stream, complete)
+      if (complete) exit
+      scale = caution*scale
+      if (scale < 1.0e-3_real64) then
+        call fail_to_grow(sim, error)
+        return
+      end if
+    end do
+    do k = 1, n
+      sim%disk(k)%x = packing%disk(k)%x
+      call stream%draw_direction(sim%disk(k)%v)
+      sim%tag(k)%id = int(k, int32)
+      sim%tag(k)%species = packing%disk(k)%species
+      sim%disk(k)%radius = scale*species(sim%tag(k)%species)%radius
+    end do
+  end subroutine scatter
+
+  !> Inserts all disks at random places, the largest first.
+  subroutine fill(packing, species, scale, stream, complete)
+    type(packing_t), intent(inout) :: packing
+    type(species_t), intent(in) :: species(:)
+    real(real64), intent(in) :: scale
+    type(random_stream_t), intent(inout) :: stream
+    logical, intent(out) :: complete
+    logical :: waiting(size(species))
+    real(real64) :: radius, inset(2)
+    integer(int32) :: s, placed, first
+    integer :: k
+
+    waiting = .true.
+    do k = 1, size(species)
+      s = maxloc(species%radius, dim=1, mask=waiting)
+      waiting(s) = .false.
+      radius = scale*species(s)%radius
+      inset = merge(0.0_real64, radius, packing%box%periodic)
+      first = 1 + sum(species(:s - 1)%count)
+      call packing%open_species(s, radius, species(s)%count, packing%box%lower + inset, packing%box%upper - inset)
+      call insert_at_random(packing, s, first, species(s)%count, packing%box%lower + inset, &
+        packing%box%upper - inset, stream, placed)
+      complete = placed == species(s)%count
+      if (.not. complete) return
+    end do
+  end subroutine fill
+
+  !> Lets the disks move for some collisions per disk and brings all of them to the present.
+  subroutine move(evolution, sim, length, error)
+    type(event_driven_t), intent(inout) :: evolution
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: length                       !! collisions per disk
+    type(error_t), allocatable, intent(out) :: error
+    type(limits_t) :: limits
+    integer(int32) :: i
+
+    call evolution%start(sim)
+    limits%collisions = sim%collisions + (length*sim%n_disks() + 1)/2
+    limits%events = sim%events + 4*length*sim%n_disks() ! one may rattle in a hole between obstacles
+    limits%time = sim%time() + maxval(sim%box%edges())  ! few disks may never collide
+    call evolution%advance(sim, limits, error)
+    do i = 1, sim%n_disks()
+      sim%disk(i)%x = sim%position(i)
+      sim%disk(i)%clock = sim%now
+    end do
+  end subroutine move
+
+  !> Lets every disk grow into the gap that it sees, up to the scale `cap`. Disks that see each
+  !> other share the gap so that both reach the same scale, unless one is larger already.
+  subroutine grow(sim, cap)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: cap                     !! part of the full size
+    type(packing_t) :: packing
+    real(real64), allocatable :: scale(:)
+    real(real64) :: room, full
+    integer(int32), allocatable :: list(:)
+    integer(int32) :: i, n, s
+
+    packing = packing_t(sim%box, size(sim%disk), size(sim%species))
+    do s = 1, size(sim%species, kind=int32)
+      call packing%open_species(s, sim%species(s)%radius, sim%species(s)%count, sim%box%lower, sim%box%upper)
+    end do
+    do i = 1, sim%n_disks()
+      call packing%add(i, sim%tag(i)%species, sim%disk(i)%x)
+    end do
+    allocate (list(64))
+    scale = sim%disk%radius/sim%species(sim%tag%species)%radius
+    do i = 1, sim%n_disks()
+      if (scale(i) >= cap) cycle
+      full = sim%species(sim%tag(i)%species)%radius
+      call packing%list_neighbours(sim%disk(i)%x, full, list, n)
+      room = min(wall_distance(packing, sim%disk(i)%x)/full, room_between(packing, sim, scale, i, list(:n)))
+      if (room >= 1) then
+        sim%disk(i)%radius = cap*full
+      else if (room > scale(i)) then
+        sim%disk(i)%radius = full*min(cap, scale(i) + caution*(room - scale(i)))
+      end if
+    end do
+  end subroutine grow
+
+  !> The scale that disk i can reach beside the disks listed.
+  pure function room_between(packing, sim, scale, i, list) result(room)
+    type(packing_t), intent(in) :: packing
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: scale(:)
+    integer(int32), intent(in) :: i, list(:)
+    real(real64) :: room, distance, shared, full_i, full_j
+    integer :: k
+
+    room = 1
+    full_i = sim%species(sim%tag(i)%species)%radius
+    do k = 1, size(list)
+      associate (j => list(k))
+        if (j == i) cycle
+        full_j = sim%species(sim%tag(j)%species)%radius
+        distance = norm2(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
+        shared = distance/(full_i + full_j)
+        if (scale(j) > shared) shared = (distance - scale(j)*full_j)/full_i
+        room = min(room, shared)
+      end associate
+    end do
+  end function room_between
+
+  !> Distance from a point to the nearest wall or obstacle, `never` if there is none.
+  pure function wall_distance(packing, x) result(distance)
+    type(packing_t), intent(in) :: packing
+    real(real64), intent(in) :: x(2)
+    real(real64) :: distance, gap
+    integer :: m
+
+    associate (box => packing%box)
+      distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
+      do m = 1, size(box%obstacle)
+        associate (o => box%obstacle(m))
+          gap = norm2(packing%separation(o%centre, x)) - o%radius
+          distance = min(distance, merge(-gap, gap, o%inside))
+        end associate
+      end do
+    end associate
+  end function wall_distance
+
+end module dense_growth

@@ -1,0 +1,102 @@
+!> The state at the start: what the input describes, with every disk at its place and its velocity
+!> drawn. Positions and velocities of each species have random streams of their own, so that a
+!> change of one leaves what the others draw as it is.
+module initial_state
+  use kinds, only: int32, real64
+  use errors, only: error_t
+  use placement, only: place_disks
+  use random_stream, only: random_stream_t
+  use settings, only: settings_t
+  use simulation_state, only: simulation_t
+  use starting_velocities, only: draw_velocities, remove_drift
+  implicit none
+  private
+  public :: create_simulation, describe_system
+
+  integer, parameter :: purpose = 2                         !! of this module's random streams
+
+contains
+
+  !> Builds the simulation that the settings describe.
+  subroutine create_simulation(settings, sim, error)
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(out) :: sim
+    type(error_t), allocatable, intent(out) :: error
+
+    call describe_system(settings, sim)
+    call list_disks(sim)
+    call place_disks(settings%species, sim%box, settings%run%seed, sim%disk, error)
+    if (allocated(error)) return
+    call set_in_motion(settings, sim)
+    sim%start_energy = sim%kinetic_energy()
+  end subroutine create_simulation
+
+  !> Box, obstacles, contact laws and species.
+  pure subroutine describe_system(settings, sim)
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(inout) :: sim
+    integer :: k
+
+    associate (box => settings%box, contact => settings%contact, o => settings%obstacles, s => settings%species)
+      sim%box%lower = box%lower
+      sim%box%upper = box%upper
+      sim%box%periodic = box%periodic
+      sim%box%gravity = box%gravity
+      sim%law%restitution = contact%restitution
+      sim%law%wall_restitution = contact%wall_restitution
+      sim%law%smooth_walls = contact%smooth_walls
+      sim%law%contact_time = contact%contact_time
+      allocate (sim%box%obstacle(size(o)), sim%species(size(s)))
+      do k = 1, size(o)
+        sim%box%obstacle(k)%name = o(k)%name
+        sim%box%obstacle(k)%centre = o(k)%centre
+        sim%box%obstacle(k)%radius = o(k)%radius
+        sim%box%obstacle(k)%inside = o(k)%inside
+      end do
+      do k = 1, size(s)
+        sim%species(k)%name = s(k)%name
+        sim%species(k)%count = s(k)%count
+        sim%species(k)%mass = s(k)%mass
+        sim%species(k)%radius = s(k)%radius
+      end do
+    end associate
+  end subroutine describe_system
+
+  !> The disks with all that follows from their species, in the order of the input.
+  subroutine list_disks(sim)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32) :: s, i, k
+
+    allocate (sim%disk(sum(sim%species%count)), sim%tag(sum(sim%species%count)))
+    k = 0
+    do s = 1, size(sim%species, kind=int32)
+      do i = 1, sim%species(s)%count
+        k = k + 1
+        sim%disk(k)%radius = sim%species(s)%radius
+        sim%tag(k)%species = s
+        sim%tag(k)%id = k
+      end do
+    end do
+  end subroutine list_disks
+
+  !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero.
+  pure subroutine set_in_motion(settings, sim)
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(inout) :: sim
+    type(random_stream_t) :: stream
+    logical :: balanced
+    integer :: s, first
+
+    balanced = all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. .not. sim%box%falling()
+    first = 1
+    do s = 1, size(settings%species)
+      associate (species => settings%species(s))
+        call stream%seed(settings%run%seed, [s, purpose])
+        call draw_velocities(species, stream, balanced, sim%disk(first:first + species%count - 1))
+        first = first + species%count
+      end associate
+    end do
+    if (balanced) call remove_drift(settings%species, sim)
+  end subroutine set_in_motion
+
+end module initial_state

@@ -1,0 +1,283 @@
+!> Disks being placed, and the question whether another one fits. Each species has its own grid of
+!> cells: the disks of a species share one radius, so a search costs the same whatever the sizes of
+!> the others.
+module packing
+  use kinds, only: int32, real64
+  use box_geometry, only: box_t, obstacle_t
+  implicit none
+  private
+  public :: packing_t
+
+  !> The cells of one species.
+  type :: layer_t
+    real(real64) :: radius = 0.0_real64             !! [length]
+    real(real64) :: lower(2) = 0.0_real64           !! all its centres lie between these [length]
+    real(real64) :: upper(2) = 0.0_real64
+    real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
+    integer(int32), allocatable :: head(:, :)       !! first disk in the cell, 0: none
+  end type layer_t
+
+  !> A disk that is placed; one record, because disks that are near are far apart in memory.
+  type :: placed_t
+    real(real64) :: x(2) = 0.0_real64               !! centre [length]
+    integer(int32) :: species = 0                   !! 0: not placed yet
+    integer(int32) :: next = 0                      !! another disk in the same cell, 0: no more
+  end type placed_t
+
+  type :: packing_t
+    type(box_t) :: box
+    type(placed_t), allocatable :: disk(:)          !! (n)
+    type(layer_t), allocatable :: layer(:)          !! (s)
+  contains
+    procedure :: open_species
+    procedure :: add
+    procedure :: find_blocker
+    procedure :: list_neighbours
+    procedure :: covers
+    procedure :: separation
+  end type packing_t
+
+  interface packing_t
+    module procedure empty_packing
+  end interface packing_t
+
+contains
+
+  pure function empty_packing(box, n_disks, n_species) result(packing)
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: n_disks, n_species
+    type(packing_t) :: packing
+
+    packing%box = box
+    if (.not. allocated(box%obstacle)) allocate (packing%box%obstacle(0))
+    allocate (packing%disk(n_disks), packing%layer(n_species))
+  end function empty_packing
+
+  !> Prepares the cells of a species: their side is the diameter, or more where disks are few.
+  pure subroutine open_species(self, s, radius, count, lower, upper)
+    class(packing_t), intent(inout) :: self
+    integer(int32), intent(in) :: s
+    real(real64), intent(in) :: radius              !! [length]
+    integer, intent(in) :: count                    !! number of disks to come
+    real(real64), intent(in) :: lower(2), upper(2)  !! corners that hold all their centres [length]
+    real(real64) :: side, extent(2), few
+    integer :: n(2)
+
+    extent = upper - lower
+    few = 2.0_real64*count
+    side = max(2*radius, sqrt(extent(1)*extent(2)/few), maxval(extent)/few)
+    n = max(int(extent/side), 1)
+    associate (layer => self%layer(s))
+      layer%radius = radius
+      layer%lower = lower
+      layer%upper = upper
+      layer%density = 0
+      where (extent > 0) layer%density = n/extent
+      if (allocated(layer%head)) deallocate (layer%head)
+      allocate (layer%head(n(1), n(2)), source=0_int32)
+    end associate
+  end subroutine open_species
+
+  !> Adds disk k of species s at the point p, unasked whether it fits.
+  pure subroutine add(self, k, s, p)
+    class(packing_t), intent(inout) :: self
+    integer(int32), intent(in) :: k, s
+    real(real64), intent(in) :: p(2)                !! [length]
+    integer :: c(2)
+
+    c = cell(self%layer(s), p)
+    self%disk(k)%x = p
+    self%disk(k)%species = s
+    self%disk(k)%next = self%layer(s)%head(c(1), c(2))
+    self%layer(s)%head(c(1), c(2)) = k
+  end subroutine add
+
+  !> Who keeps disks of this radius out of the whole rectangle `centre` +- `half`: a disk (its
+  !> number), an obstacle (minus its number), or nobody (0). With half = 0 it tells whether a disk
+  !> fits there.
+  pure subroutine find_blocker(self, centre, half, radius, blocker)
+    class(packing_t), intent(in) :: self
+    real(real64), intent(in) :: centre(2), half(2)  !! [length]
+    real(real64), intent(in) :: radius              !! [length]
+    integer(int32), intent(out) :: blocker
+    real(real64) :: rho
+    integer :: s, kx, ky, first(2), last(2)
+
+    do blocker = -1, -size(self%box%obstacle, kind=int32), -1
+      if (self%covers(blocker, centre, half, radius)) return
+    end do
+    blocker = 0
+    do s = 1, size(self%layer)
+      if (.not. allocated(self%layer(s)%head)) cycle
+      rho = radius + self%layer(s)%radius
+      call range_images(self%box, centre, rho, first, last)
+      do ky = first(2), last(2)
+        do kx = first(1), last(1)
+          call search_layer(self, s, centre + [kx, ky]*self%box%edges(), half, rho, blocker)
+          if (blocker > 0) return
+        end do
+      end do
+    end do
+  end subroutine find_blocker
+
+  !> A disk of species s closer than rho to every point of the rectangle p +- half; 0: none. The
+  !> cell in the middle comes first: there it is most likely.
+  pure subroutine search_layer(packing, s, p, half, rho, blocker)
+    type(packing_t), intent(in) :: packing
+    integer, intent(in) :: s
+    real(real64), intent(in) :: p(2), half(2), rho
+    integer(int32), intent(out) :: blocker
+    integer :: middle(2), low(2), high(2), i, j
+
+    blocker = 0
+    associate (layer => packing%layer(s))
+      if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
+      middle = cell(layer, p)
+      blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, rho)
+      if (blocker > 0) return
+      low = cell(layer, p - rho)
+      high = cell(layer, p + rho)
+      do j = low(2), high(2)
+        do i = low(1), high(1)
+          blocker = blocker_in(packing, layer%head(i, j), p, half, rho)
+          if (blocker > 0) return
+        end do
+      end do
+    end associate
+  end subroutine search_layer
+
+  !> The same among the disks of one cell.
+  pure function blocker_in(packing, head, p, half, rho) result(blocker)
+    type(packing_t), intent(in) :: packing
+    integer(int32), intent(in) :: head
+    real(real64), intent(in) :: p(2), half(2), rho
+    integer(int32) :: blocker
+
+    blocker = head
+    do while (blocker > 0)
+      associate (d => packing%disk(blocker))
+        if ((abs(d%x(1) - p(1)) + half(1))**2 + (abs(d%x(2) - p(2)) + half(2))**2 < rho**2) return
+        blocker = d%next
+      end associate
+    end do
+  end function blocker_in
+
+  !> All disks whose rim comes within `reach` of a point, and some others from the same cells.
+  pure subroutine list_neighbours(self, p, reach, list, n)
+    class(packing_t), intent(in) :: self
+    real(real64), intent(in) :: p(2), reach         !! [length]
+    integer(int32), allocatable, intent(inout) :: list(:)   !! grows when needed
+    integer(int32), intent(out) :: n                !! how many of its elements are meant
+    real(real64) :: rho
+    integer :: s, kx, ky, first(2), last(2)
+
+    n = 0
+    do s = 1, size(self%layer)
+      if (.not. allocated(self%layer(s)%head)) cycle
+      rho = reach + self%layer(s)%radius
+      call range_images(self%box, p, rho, first, last)
+      do ky = first(2), last(2)
+        do kx = first(1), last(1)
+          call append_cells(self, s, p + [kx, ky]*self%box%edges(), rho, list, n)
+        end do
+      end do
+    end do
+  end subroutine list_neighbours
+
+  !> Appends the disks of species s in the cells within rho of a point.
+  pure subroutine append_cells(packing, s, p, rho, list, n)
+    type(packing_t), intent(in) :: packing
+    integer, intent(in) :: s
+    real(real64), intent(in) :: p(2), rho
+    integer(int32), allocatable, intent(inout) :: list(:)
+    integer(int32), intent(inout) :: n
+    integer :: low(2), high(2), i, j
+    integer(int32) :: k
+
+    associate (layer => packing%layer(s))
+      if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
+      low = cell(layer, p - rho)
+      high = cell(layer, p + rho)
+      do j = low(2), high(2)
+        do i = low(1), high(1)
+          k = layer%head(i, j)
+          do while (k > 0)
+            if (n == size(list)) list = [list, list]
+            n = n + 1
+            list(n) = k
+            k = packing%disk(k)%next
+          end do
+        end do
+      end do
+    end associate
+  end subroutine append_cells
+
+  !> Whether one disk, or one obstacle, keeps disks of this radius out of the whole rectangle
+  !> `centre` +- `half`.
+  pure function covers(self, by, centre, half, radius) result(yes)
+    class(packing_t), intent(in) :: self
+    integer(int32), intent(in) :: by                !! > 0: a disk; < 0: minus the obstacle's number
+    real(real64), intent(in) :: centre(2), half(2)  !! [length]
+    real(real64), intent(in) :: radius              !! [length]
+    real(real64) :: corner(2)
+    logical :: yes
+
+    if (by < 0) then
+      yes = bars(self, self%box%obstacle(-by), centre, half, radius)
+    else
+      corner = abs(self%separation(self%disk(by)%x, centre)) + half
+      yes = corner(1)**2 + corner(2)**2 < (self%layer(self%disk(by)%species)%radius + radius)**2
+    end if
+  end function covers
+
+  !> The same for an obstacle.
+  pure function bars(packing, obstacle, centre, half, radius) result(yes)
+    type(packing_t), intent(in) :: packing
+    type(obstacle_t), intent(in) :: obstacle
+    real(real64), intent(in) :: centre(2), half(2), radius
+    real(real64) :: d(2), corner(2)
+    logical :: yes
+
+    d = packing%separation(obstacle%centre, centre)
+    if (obstacle%inside) then
+      corner = max(abs(d) - half, 0.0_real64)
+      yes = radius > obstacle%radius .or. corner(1)**2 + corner(2)**2 > (obstacle%radius - radius)**2
+    else
+      corner = abs(d) + half
+      yes = corner(1)**2 + corner(2)**2 < (obstacle%radius + radius)**2
+    end if
+  end function bars
+
+  !> From a to the nearest image of b.
+  pure function separation(self, a, b) result(d)
+    class(packing_t), intent(in) :: self
+    real(real64), intent(in) :: a(2), b(2)          !! [length]
+    real(real64) :: d(2), edges(2)
+
+    d = b - a
+    edges = self%box%edges()
+    where (self%box%periodic) d = d - edges*anint(d/edges)
+  end function separation
+
+  !> The cell of a point, or the nearest one if the point is outside.
+  pure function cell(layer, p) result(c)
+    type(layer_t), intent(in) :: layer
+    real(real64), intent(in) :: p(2)
+    integer :: c(2)
+    real(real64) :: column_row(2)
+
+    column_row = max((p - layer%lower)*layer%density, 0.0_real64)
+    c = 1 + int(min(column_row, shape(layer%head) - 1.0_real64))
+  end function cell
+
+  !> Which images of a point, in periods, have disks of the box within rho.
+  pure subroutine range_images(box, p, rho, first, last)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: p(2), rho
+    integer, intent(out) :: first(2), last(2)
+
+    first = merge(-1, 0, box%periodic .and. p + rho > box%upper)
+    last = merge(1, 0, box%periodic .and. p - rho < box%lower)
+  end subroutine range_images
+
+end module packing

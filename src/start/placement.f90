@@ -1,0 +1,269 @@
+!> Finds a place for every disk.
+!>
+!> First come those that are fixed ('explicit', 'file', 'grid', 'lattice') in the order of the
+!> input; then 'random', the species with the largest disks first; then 'dense', where species with
+!> the same region grow together around the disks that are there already.
+module placement
+  use kinds, only: int32, int64, pi, real64
+  use box_geometry, only: box_t, obstacle_t
+  use dense_growth, only: grow_disks
+  use disks, only: disk_t, species_t
+  use errors, only: error_t, exit_usage, fail
+  use last_frame, only: read_last_frame
+  use packing, only: packing_t
+  use position_file, only: read_positions
+  use random_insertion, only: insert_at_random
+  use random_stream, only: random_stream_t
+  use regular_places, only: centre_range, grid_positions, lattice_positions, spans
+  use settings, only: species_settings_t
+  use texts, only: written
+  implicit none
+  private
+  public :: place_disks
+
+  integer, parameter :: purpose = 1                         !! of this module's random streams
+  real(real64), parameter :: rounding = 1.0e-12_real64      !! relative, of disks that touch
+  integer(int32), parameter :: many_trials = 500000         !! disks placed in all trials of 'random'
+  integer(int32), parameter :: few = 5                      !! disks, the same where there are few of them
+  real(real64), parameter :: nearly = 1.25_real64           !! so many times more may fit at another trial
+  real(real64), parameter :: denser = 1.5_real64            !! 'dense' packs so much more than 'random'
+
+contains
+
+  !> Writes positions into the disks; with them come the velocities that a file holds.
+  subroutine place_disks(species, box, seed, disk, error)
+    type(species_settings_t), intent(in) :: species(:)
+    type(box_t), intent(in) :: box
+    integer(int64), intent(in) :: seed
+    type(disk_t), intent(inout) :: disk(:)                  !! (n) in the order of the input
+    type(error_t), allocatable, intent(out) :: error
+    type(packing_t) :: packing
+    logical, dimension(size(species)) :: random, dense, together
+    integer :: s, k
+
+    packing = packing_t(box, size(disk), size(species))
+    random = [(species(k)%placement == "random", k=1, size(species))]
+    dense = [(species(k)%placement == "dense", k=1, size(species))]
+    do s = 1, size(species)
+      if (.not. (random(s) .or. dense(s))) call place_fixed(packing, species, s, disk, error)
+      if (allocated(error)) return
+    end do
+    do while (any(random))
+      s = maxloc(species%radius, dim=1, mask=random)
+      call place_at_random(packing, species, s, seed, error)
+      if (allocated(error)) return
+      random(s) = .false.
+    end do
+    do s = 1, size(species)
+      if (.not. dense(s)) cycle
+      together = dense .and. [(all(species(k)%region <= species(s)%region .and. &
+        species(k)%region >= species(s)%region), k=1, size(species))]
+      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, error)
+      if (allocated(error)) return
+      dense = dense .and. .not. together
+    end do
+    do k = 1, size(disk)
+      disk(k)%x = packing%disk(k)%x
+    end do
+  end subroutine place_disks
+
+  !> Number of the disk before the first one of species s.
+  pure function offset(species, s) result(n)
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer :: n
+
+    n = sum(species(:s - 1)%count)
+  end function offset
+
+  subroutine place_fixed(packing, species, s, disk, error)
+    type(packing_t), intent(inout) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    type(disk_t), intent(inout) :: disk(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: x(:, :)
+    integer :: k, columns
+
+    select case (species(s)%placement)
+    case ("explicit")
+      x = species(s)%position
+    case ("grid")
+      call grid_positions(species(s), x, error)
+    case ("lattice")
+      call lattice_positions(species(s), packing%box, x, error)
+    case default                                            ! 'file'
+      columns = merge(4, 2, species(s)%velocities == "file")
+      if (is_run(species(s)%file)) then
+        call read_last_frame(species(s)%file, species(s)%name, species(s)%count, columns, x, error)
+      else
+        call read_positions(species(s)%file, species(s)%count, columns, x, error)
+      end if
+      if (allocated(error)) return
+      do k = 1, merge(species(s)%count, 0, columns == 4)
+        disk(offset(species, s) + k)%v = x(3:4, k)
+      end do
+    end select
+    if (.not. allocated(error)) call add_checked(packing, species, s, x, error)
+  end subroutine place_fixed
+
+  !> Whether the file is the output of a run, finished or not.
+  pure function is_run(path) result(yes)
+    character(len=*), intent(in) :: path
+    logical :: yes
+
+    yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
+  end function is_run
+
+  !> Adds a species at known places, if they are free and in its region.
+  subroutine add_checked(packing, species, s, x, error)
+    type(packing_t), intent(inout) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: lower(2), upper(2), slack
+    integer(int32) :: k, blocker
+
+    slack = rounding*(species(s)%radius + maxval(species%radius))
+    call centre_range(species(s)%region, packing%box, species(s)%radius, lower, upper)
+    call packing%open_species(int(s, int32), species(s)%radius, species(s)%count, &
+      minval(x(1:2, :), dim=2), maxval(x(1:2, :), dim=2))
+    do k = 1, species(s)%count
+      if (any(x(1:2, k) < lower - slack .or. x(1:2, k) > upper + slack)) then
+        call fail(error, exit_usage, called(species, s, k)//" is not wholly in its region")
+        return
+      end if
+      call packing%find_blocker(x(1:2, k), [0.0_real64, 0.0_real64], species(s)%radius - slack, blocker)
+      if (blocker /= 0) then
+        call fail_overlap(packing, species, s, k, blocker, error)
+        return
+      end if
+      call packing%add(offset(species, s) + k, int(s, int32), x(1:2, k))
+    end do
+  end subroutine add_checked
+
+  !> A disk by its species and its number there, for messages.
+  pure function called(species, s, k) result(text)
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer(int32), intent(in) :: k
+    character(len=:), allocatable :: text
+
+    text = "species."//species(s)%name//".placement: disk "//written(k)
+  end function called
+
+  subroutine fail_overlap(packing, species, s, k, blocker, error)
+    type(packing_t), intent(in) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer(int32), intent(in) :: k, blocker
+    type(error_t), allocatable, intent(out) :: error
+    integer :: other
+
+    if (blocker < 0) then
+      call fail(error, exit_usage, called(species, s, k)//" is on the wrong side of obstacle """// &
+        packing%box%obstacle(-blocker)%name//'"')
+    else
+      other = packing%disk(blocker)%species
+      call fail(error, exit_usage, called(species, s, k)//" overlaps disk "// &
+        written(blocker - offset(species, other))//" of """//species(other)%name//'"')
+    end if
+  end subroutine fail_overlap
+
+  subroutine place_at_random(packing, species, s, seed, error)
+    type(packing_t), intent(inout) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer(int64), intent(in) :: seed
+    type(error_t), allocatable, intent(out) :: error
+    type(random_stream_t) :: stream
+    real(real64) :: lower(2), upper(2), disk_packing
+    character(len=:), allocatable :: advice
+    integer(int32) :: placed, trial
+
+    associate (me => species(s))
+      call stream%seed(seed, [s, purpose])
+      call centre_range(me%region, packing%box, me%radius, lower, upper)
+      ! Where room ends differs from trial to trial, the more so the fewer the disks.
+      do trial = 1, max(1, many_trials/me%count)
+        call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
+        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), me%count, lower, upper, stream, placed)
+        if (placed == me%count) return
+        if (me%count > nearly*placed + few) exit
+      end do
+      disk_packing = pi*me%radius**2/product(me%region([2, 4]) - me%region([1, 3]))
+      advice = "use fewer or smaller disks"
+      if (me%count < denser*placed) advice = "use placement = 'dense'"
+      call fail(error, exit_usage, "species."//me%name//".placement: no more room after "// &
+        written(placed)//" of "//written(me%count)//" random disks: reached "// &
+        written(placed*disk_packing)//" of the wanted packing "//written(me%count*disk_packing)//"; "//advice)
+    end associate
+  end subroutine place_at_random
+
+  !> Grows species that share a region, in a box of its shape.
+  subroutine place_densely(packing, species, group, seed, error)
+    type(packing_t), intent(inout) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: group(:)                         !! their numbers
+    integer(int64), intent(in) :: seed
+    type(error_t), allocatable, intent(out) :: error
+    type(random_stream_t) :: stream
+    real(real64), allocatable :: x(:, :)
+    type(species_t) :: member(size(group))
+    integer :: k, first
+
+    do k = 1, size(group)
+      member(k)%name = species(group(k))%name
+      member(k)%count = species(group(k))%count
+      member(k)%radius = species(group(k))%radius
+    end do
+    call stream%seed(seed, [group(1), purpose])
+    call grow_disks(growth_box(packing, species(group(1))%region), member, stream, x, error)
+    first = 1
+    do k = 1, size(group)
+      if (allocated(error)) return
+      associate (n => species(group(k))%count)
+        call add_checked(packing, species, group(k), x(:, first:first + n - 1), error)
+        first = first + n
+      end associate
+    end do
+  end subroutine place_densely
+
+  !> The region as a box, in which the disks that reach into it are obstacles, as are their images.
+  pure function growth_box(packing, region) result(box)
+    type(packing_t), intent(in) :: packing
+    real(real64), intent(in) :: region(4)
+    type(box_t) :: box
+    type(obstacle_t), allocatable :: obstacle(:)
+    real(real64) :: centre(2), radius
+    integer :: k, i, j, n, pass, images(2)
+
+    box%lower = region([1, 3])
+    box%upper = region([2, 4])
+    box%periodic = spans(region, packing%box)
+    images = merge(1, 0, packing%box%periodic)
+    do pass = 1, 2                                          ! count, then fill
+      n = size(packing%box%obstacle)
+      do k = 1, size(packing%disk)
+        if (packing%disk(k)%species == 0) cycle
+        radius = packing%layer(packing%disk(k)%species)%radius
+        do j = -images(2), images(2)
+          do i = -images(1), images(1)
+            centre = packing%disk(k)%x + [i, j]*packing%box%edges()
+            if (any(centre < box%lower - radius .or. centre > box%upper + radius)) cycle
+            n = n + 1
+            if (pass == 1) cycle
+            obstacle(n)%name = "a disk"
+            obstacle(n)%centre = centre
+            obstacle(n)%radius = radius
+          end do
+        end do
+      end do
+      if (pass == 1) allocate (obstacle(n))
+    end do
+    obstacle(:size(packing%box%obstacle)) = packing%box%obstacle
+    call move_alloc(obstacle, box%obstacle)
+  end function growth_box
+
+end module placement

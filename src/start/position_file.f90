@@ -1,0 +1,96 @@
+!> Disks from a text file: a line `x y` or `x y vx vy` for each; empty lines and what follows a #
+!> are comments.
+module position_file
+  use kinds, only: real64
+  use errors, only: error_t, exit_files, exit_usage, fail
+  use input_values, only: read_real
+  use texts, only: shown, written
+  implicit none
+  private
+  public :: read_positions
+
+  integer, parameter :: longest_line = 1024
+
+contains
+
+  !> Reads `count` disks, no more and no less.
+  subroutine read_positions(path, count, n_columns, table, error)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: count
+    integer, intent(in) :: n_columns                        !! needed: 2, or 4 with velocities
+    real(real64), allocatable, intent(out) :: table(:, :)   !! (n_columns,count)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=longest_line) :: line
+    character(len=256) :: reason
+    character(len=:), allocatable :: problem
+    integer :: unit, status, number, n
+
+    open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
+    if (status /= 0) then
+      call fail(error, exit_files, path//": "//trim(reason))
+      return
+    end if
+    allocate (table(n_columns, count))
+    n = 0
+    number = 0
+    do
+      read (unit, "(a)", iostat=status, iomsg=reason) line
+      if (status /= 0) exit
+      number = number + 1
+      if (len_trim(line) == longest_line) then
+        problem = "the line is too long"
+      else
+        call read_line(line, n, table, problem)
+      end if
+      if (problem == "") cycle
+      call fail(error, exit_usage, path//":"//written(number)//": "//problem)
+      exit
+    end do
+    close (unit)
+    if (allocated(error)) return
+    if (.not. is_iostat_end(status)) then
+      call fail(error, exit_files, path//": "//trim(reason))
+    else if (n /= count) then
+      call fail(error, exit_usage, path//": "//written(n)//" disks, but species.count is "//written(count))
+    end if
+  end subroutine read_positions
+
+  !> Appends the disk in a line, if there is one, to the table. Columns that are not needed are
+  !> checked, too.
+  subroutine read_line(line, n, table, problem)
+    character(len=*), intent(in) :: line
+    integer, intent(inout) :: n                             !! disks so far, whether they fit or not
+    real(real64), intent(inout) :: table(:, :)
+    character(len=:), allocatable, intent(out) :: problem
+    character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
+    real(real64) :: value(4)
+    integer :: first, past, last, columns
+
+    last = index(line//"#", "#") - 1
+    columns = 0
+    first = 1
+    problem = ""
+    value = 0
+    do
+      first = first - 1 + verify(line(first:last)//"x", blanks)
+      if (first > last) exit
+      past = first - 1 + scan(line(first:last)//" ", blanks)
+      columns = columns + 1
+      if (columns <= 4) call read_real(line(first:past - 1), value(columns), problem)
+      if (problem /= "") then
+        problem = shown(line(first:past - 1))//" "//problem
+        return
+      end if
+      first = past
+    end do
+    if (columns == 0) return
+    if (columns /= 2 .and. columns /= 4) then
+      problem = written(columns)//" numbers; allowed: x y, or x y vx vy"
+    else if (columns < size(table, 1)) then
+      problem = "there are no velocities; velocities = 'file' needs x y vx vy"
+    end if
+    n = n + 1
+    if (n <= size(table, 2)) table(:, n) = value(:size(table, 1))
+  end subroutine read_line
+
+end module position_file

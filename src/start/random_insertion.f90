@@ -1,0 +1,148 @@
+!> Random sequential insertion: each disk at a point uniform among all those where it fits beside
+!> the disks placed before. Attempts are drawn only from the voxels (small rectangles) of the region
+!> that no single disk covers, and voxels are halved when attempts fail too often; the points that
+!> are left out would be rejected anyway, so the distribution is that of plain insertion, up to
+!> saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)).
+module random_insertion
+  use kinds, only: int32, real64
+  use packing, only: packing_t
+  use random_stream, only: random_stream_t
+  implicit none
+  private
+  public :: insert_at_random
+
+  !> Where a centre may still fit.
+  type :: voxels_t
+    real(real64) :: origin(2) = 0.0_real64          !! [length]
+    real(real64) :: side(2) = 0.0_real64            !! [length]
+    integer(int32) :: n = 0                         !! how many are left
+    integer(int32), allocatable :: column_row(:, :) !! (2,n) counted from 0
+  end type voxels_t
+
+contains
+
+  !> Inserts disks first, first + 1, ... of a species with centres in a rectangle, until `count` are
+  !> placed or no room is left.
+  pure subroutine insert_at_random(packing, s, first, count, lower, upper, stream, placed)
+    type(packing_t), intent(inout) :: packing
+    integer(int32), intent(in) :: s                 !! a species that is open
+    integer(int32), intent(in) :: first, count
+    real(real64), intent(in) :: lower(2), upper(2)  !! corners of the rectangle [length]
+    type(random_stream_t), intent(inout) :: stream
+    integer(int32), intent(out) :: placed
+    type(voxels_t) :: voxels
+    integer(int32) :: k, blocker, failures
+    real(real64) :: p(2), radius
+
+    radius = packing%layer(s)%radius
+    call tile(voxels, lower, upper, shape(packing%layer(s)%head))
+    placed = 0
+    failures = 0
+    do while (placed < count .and. voxels%n > 0)
+      call draw_point(stream, voxels, k, p)
+      p = min(max(p, lower), upper)
+      call packing%find_blocker(p, [0.0_real64, 0.0_real64], radius, blocker)
+      if (blocker == 0) then
+        blocker = first + placed
+        call packing%add(blocker, s, p)
+        placed = placed + 1
+      else
+        failures = failures + 1
+      end if
+      if (covered(voxels, k, packing, radius, blocker)) call drop_voxel(voxels, k)
+      ! Halving costs four searches per voxel; half as many attempts in vain are a sign for it.
+      if (failures > 2*voxels%n) then
+        call halve(voxels, packing, radius)
+        failures = 0
+      end if
+    end do
+  end subroutine insert_at_random
+
+  !> Covers the rectangle with voxels.
+  pure subroutine tile(voxels, lower, upper, n)
+    type(voxels_t), intent(out) :: voxels
+    real(real64), intent(in) :: lower(2), upper(2)
+    integer, intent(in) :: n(2)                     !! columns, rows
+    integer(int32) :: i, j
+
+    voxels%origin = lower
+    voxels%side = (upper - lower)/n
+    allocate (voxels%column_row(2, n(1)*n(2)))
+    do j = 0, n(2) - 1
+      do i = 0, n(1) - 1
+        voxels%n = voxels%n + 1
+        voxels%column_row(:, voxels%n) = [i, j]
+      end do
+    end do
+  end subroutine tile
+
+  !> A point uniform in the voxels, and the voxel it is in.
+  pure subroutine draw_point(stream, voxels, k, p)
+    type(random_stream_t), intent(inout) :: stream
+    type(voxels_t), intent(in) :: voxels
+    integer(int32), intent(out) :: k
+    real(real64), intent(out) :: p(2)
+
+    call stream%draw_index(voxels%n, k)
+    call stream%draw_uniform(p(1))
+    call stream%draw_uniform(p(2))
+    p = voxels%origin + (voxels%column_row(:, k) + p)*voxels%side
+  end subroutine draw_point
+
+  !> Whether a disk, or an obstacle, leaves no room in voxel k.
+  pure function covered(voxels, k, packing, radius, by) result(yes)
+    type(voxels_t), intent(in) :: voxels
+    integer(int32), intent(in) :: k
+    type(packing_t), intent(in) :: packing
+    real(real64), intent(in) :: radius
+    integer(int32), intent(in) :: by
+    logical :: yes
+
+    yes = packing%covers(by, middle(voxels, k), 0.5_real64*voxels%side, radius)
+  end function covered
+
+  pure function middle(voxels, k) result(p)
+    type(voxels_t), intent(in) :: voxels
+    integer(int32), intent(in) :: k
+    real(real64) :: p(2)
+
+    p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
+  end function middle
+
+  !> Forgets voxel k; the last one takes its number.
+  pure subroutine drop_voxel(voxels, k)
+    type(voxels_t), intent(inout) :: voxels
+    integer(int32), intent(in) :: k
+
+    voxels%column_row(:, k) = voxels%column_row(:, voxels%n)
+    voxels%n = voxels%n - 1
+  end subroutine drop_voxel
+
+  !> Cuts every voxel in four and keeps the quarters that nothing covers.
+  pure subroutine halve(voxels, packing, radius)
+    type(voxels_t), intent(inout) :: voxels
+    type(packing_t), intent(in) :: packing
+    real(real64), intent(in) :: radius
+    integer(int32), allocatable :: parent(:, :)
+    integer(int32) :: k, quarter, n, blocker
+
+    n = voxels%n
+    if (maxval(voxels%column_row(:, :n)) >= ishft(huge(n), -1)) then
+      voxels%n = 0                                  ! too small to hold a point of their own
+      return
+    end if
+    call move_alloc(voxels%column_row, parent)
+    allocate (voxels%column_row(2, 4*n))
+    voxels%n = 0
+    voxels%side = 0.5_real64*voxels%side
+    do k = 1, n
+      do quarter = 0, 3
+        voxels%n = voxels%n + 1
+        voxels%column_row(:, voxels%n) = 2*parent(:, k) + [modulo(quarter, 2), quarter/2]
+        call packing%find_blocker(middle(voxels, voxels%n), 0.5_real64*voxels%side, radius, blocker)
+        if (blocker /= 0) voxels%n = voxels%n - 1
+      end do
+    end do
+  end subroutine halve
+
+end module random_insertion

@@ -1,0 +1,131 @@
+!> Regular places for disks in a region: a grid, and a triangular lattice.
+module regular_places
+  use kinds, only: real64
+  use box_geometry, only: box_t
+  use errors, only: error_t, exit_usage, fail
+  use settings, only: species_settings_t
+  use texts, only: written
+  implicit none
+  private
+  public :: centre_range, grid_positions, lattice_positions, spans
+
+contains
+
+  !> Whether the region reaches from side to side of a periodic axis, so that disks may poke
+  !> through.
+  pure function spans(region, box) result(yes)
+    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
+    type(box_t), intent(in) :: box
+    logical :: yes(2)
+
+    yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
+  end function spans
+
+  !> Corners of the rectangle in which the centres of disks lie that are wholly inside the region.
+  pure subroutine centre_range(region, box, radius, lower, upper)
+    real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius              !! [length]
+    real(real64), intent(out) :: lower(2), upper(2)
+    real(real64) :: inset(2)
+
+    inset = merge(0.0_real64, radius, spans(region, box))
+    lower = region([1, 3]) + inset
+    upper = max(region([2, 4]) - inset, lower)      ! a disk may fill its region but for rounding
+  end subroutine centre_range
+
+  !> A disk in the middle of each of nx x ny equal cells of the region, row by row from the bottom.
+  subroutine grid_positions(species, x, error)
+    type(species_settings_t), intent(in) :: species
+    real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: side(2)
+    integer :: k
+
+    associate (n => species%grid, region => species%region)
+      if (product(n) /= species%count) then
+        call fail(error, exit_usage, "species."//species%name//".grid: "//written(n(1))//" x "// &
+          written(n(2))//" places for "//written(species%count)//" disks")
+        return
+      end if
+      side = (region([2, 4]) - region([1, 3]))/n
+      allocate (x(2, species%count))
+      do k = 1, species%count
+        x(:, k) = region([1, 3]) + ([modulo(k - 1, n(1)), (k - 1)/n(1)] + 0.5_real64)*side
+      end do
+      if (any(side < 2*species%radius)) call fail(error, exit_usage, "species."//species%name// &
+        ".grid: disks of diameter "//written(2*species%radius)//" do not fit into cells of "// &
+        written(side(1))//" x "//written(side(2)))
+    end associate
+  end subroutine grid_positions
+
+  !> Places on a triangular lattice that fills the region, stretched to its shape, row by row from
+  !> the bottom. Of all numbers of rows it takes the one that keeps neighbours farthest apart. The
+  !> last places stay empty if the rows hold more than `count`.
+  subroutine lattice_positions(species, box, x, error)
+    type(species_settings_t), intent(in) :: species
+    type(box_t), intent(in) :: box
+    real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: lower(2), upper(2), step(2), best_step(2), distance, best
+    logical :: periodic(2)
+    integer :: rows, columns, best_columns
+
+    periodic = spans(species%region, box)
+    call centre_range(species%region, box, species%radius, lower, upper)
+    best = -1
+    best_columns = 0
+    best_step = 0
+    do rows = 1, species%count
+      if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
+      columns = 1 + (species%count - 1)/rows
+      call measure_lattice(columns, rows, upper - lower, periodic, step, distance)
+      if (distance <= best) cycle
+      best = distance
+      best_columns = columns
+      best_step = step
+    end do
+    x = lattice(species%count, best_columns, lower, best_step, periodic)
+    if (best < 2*species%radius*(1 - 2*epsilon(best))) call fail(error, exit_usage, "species."// &
+      species%name//".placement: "//written(species%count)//" disks of diameter "// &
+      written(2*species%radius)//" do not fit; on the lattice their centres are "//written(best)//" apart")
+  end subroutine lattice_positions
+
+  !> Steps of a lattice from column to column and from row to row, and its shortest distance.
+  pure subroutine measure_lattice(columns, rows, extent, periodic, step, distance)
+    integer, intent(in) :: columns, rows
+    real(real64), intent(in) :: extent(2)           !! for the centres [length]
+    logical, intent(in) :: periodic(2)
+    real(real64), intent(out) :: step(2), distance  !! [length]
+    real(real64) :: gaps(2)
+
+    gaps = [columns - 1, rows - 1]
+    if (rows > 1) gaps(1) = gaps(1) + 0.5_real64    ! every other row begins half a step later
+    gaps = merge(real([columns, rows], real64), gaps, periodic)
+    distance = huge(distance)
+    step = extent
+    where (gaps > 0) step = extent/gaps
+    if (columns > 1 .or. periodic(1)) distance = step(1)
+    if (rows > 1) then
+      distance = min(distance, norm2([0.5_real64*step(1), step(2)]))
+      if (rows > 2) distance = min(distance, 2*step(2))
+    else if (periodic(2)) then
+      distance = min(distance, step(2))
+    end if
+  end subroutine measure_lattice
+
+  pure function lattice(n, columns, lower, step, periodic) result(x)
+    integer, intent(in) :: n, columns
+    real(real64), intent(in) :: lower(2), step(2)
+    logical, intent(in) :: periodic(2)
+    real(real64) :: x(2, n), first(2)
+    integer :: k, row
+
+    first = lower + merge([0.25_real64, 0.5_real64]*step, [0.0_real64, 0.0_real64], periodic)
+    do k = 1, n
+      row = (k - 1)/columns
+      x(:, k) = first + [modulo(k - 1, columns) + 0.5_real64*modulo(row, 2), real(row, real64)]*step
+    end do
+  end function lattice
+
+end module regular_places

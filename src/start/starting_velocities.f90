@@ -1,0 +1,100 @@
+!> How disks start to move, by the rule of their species.
+module starting_velocities
+  use kinds, only: real64
+  use disks, only: disk_t
+  use random_stream, only: random_stream_t
+  use settings, only: species_settings_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: draw_velocities, remove_drift
+
+contains
+
+  !> Gives the disks of one species their velocities. `balanced` asks for zero total momentum: equal
+  !> speeds then come in opposite pairs (and one star of three if the number is odd), so that they
+  !> stay equal; the other rules leave it to `remove_drift`.
+  pure subroutine draw_velocities(species, stream, balanced, disk)
+    type(species_settings_t), intent(in) :: species
+    type(random_stream_t), intent(inout) :: stream
+    logical, intent(in) :: balanced
+    type(disk_t), intent(inout) :: disk(:)          !! (count)
+    integer :: i
+
+    select case (species%velocities)
+    case ("equal_speed")
+      call draw_directions(stream, balanced .and. size(disk) > 1, disk)
+      do i = 1, size(disk)
+        disk(i)%v = species%speed*disk(i)%v
+      end do
+    case ("uniform")
+      do i = 1, size(disk)
+        call stream%draw_uniform(disk(i)%v(1))
+        call stream%draw_uniform(disk(i)%v(2))
+        disk(i)%v = species%speed*(2*disk(i)%v - 1)
+      end do
+    case ("maxwell")
+      do i = 1, size(disk)
+        call stream%draw_normals(disk(i)%v)
+        disk(i)%v = sqrt(species%temperature/species%mass)*disk(i)%v
+      end do
+    case ("explicit")
+      do i = 1, size(disk)
+        disk(i)%v = species%velocity(:, min(i, size(species%velocity, 2)))   ! one holds for all
+      end do
+    case default                                    ! 'rest'; 'file': they came with the positions
+    end select
+  end subroutine draw_velocities
+
+  !> Unit vectors. Balanced, the partner is half the list away, not a neighbour on a grid.
+  pure subroutine draw_directions(stream, balanced, disk)
+    type(random_stream_t), intent(inout) :: stream
+    logical, intent(in) :: balanced
+    type(disk_t), intent(inout) :: disk(:)
+    real(real64), parameter :: turn = 0.5_real64*sqrt(3.0_real64)     ! sine of 120 degrees
+    integer :: i, n, half
+
+    n = size(disk)
+    half = 0
+    if (balanced) half = (n - merge(3, 0, modulo(n, 2) == 1))/2
+    do i = 1, half
+      call stream%draw_direction(disk(i)%v)
+      disk(i + half)%v = -disk(i)%v
+    end do
+    do i = 2*half + 1, n
+      call stream%draw_direction(disk(i)%v)
+    end do
+    if (.not. balanced .or. modulo(n, 2) == 0) return
+    associate (e => disk(n)%v)
+      disk(n - 1)%v = -0.5_real64*e + turn*[-e(2), e(1)]
+      disk(n - 2)%v = -0.5_real64*e - turn*[-e(2), e(1)]
+    end associate
+  end subroutine draw_directions
+
+  !> Makes the total momentum of all velocities that a rule has generated zero. What is shifted are
+  !> those of 'uniform' and 'maxwell'; equal speeds are balanced among themselves, a single one
+  !> excepted.
+  pure subroutine remove_drift(species, sim)
+    type(species_settings_t), intent(in) :: species(:)
+    type(simulation_t), intent(inout) :: sim
+    logical, dimension(size(species)) :: shifted, generated
+    real(real64) :: momentum(2), mass
+    integer :: i
+
+    shifted = [(species(i)%velocities == "uniform" .or. species(i)%velocities == "maxwell", i=1, size(species))]
+    generated = [(shifted(i) .or. species(i)%velocities == "equal_speed", i=1, size(species))]
+    momentum = 0
+    mass = 0
+    do i = 1, size(sim%disk)
+      associate (s => sim%tag(i)%species)
+        if (generated(s)) momentum = momentum + species(s)%mass*sim%disk(i)%v
+        if (shifted(s)) mass = mass + species(s)%mass
+      end associate
+    end do
+    if (.not. mass > 0) return
+    do i = 1, size(sim%disk)
+      if (shifted(sim%tag(i)%species)) sim%disk(i)%v = sim%disk(i)%v - momentum/mass
+    end do
+  end subroutine remove_drift
+
+end module starting_velocities

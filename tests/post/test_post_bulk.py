@@ -1,0 +1,272 @@
+"""Pressure, correlations and cooling in post/: closed formulas, and each figure drawn once."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_run import run_script, write_run
+
+import correlations
+import equation_of_state
+import haff
+import hard_disks as hd
+import rates
+import thermodynamics
+from read_run import Events, RunError, read_run
+
+BULK = Path(__file__).resolve().parents[2] / "input" / "bulk.nml"
+PERIODIC = (True, True)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(8)
+
+
+def written(path, position, velocity, **options):
+    """A run read back."""
+    return read_run(write_run(path, position, velocity, **options))
+
+
+# --- formulas ---
+
+
+def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
+    eta = 1e-4
+    for law in (hd.henderson, hd.luding):
+        assert (law(eta) - 1) / eta == pytest.approx(2, rel=1e-3)
+    reduced = [1, 1, 0.78200444, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930, 0.0362193]
+    virial = [b * 2**k for k, b in enumerate(reduced)]
+    for eta in (0.075, 0.125, 0.175):
+        series = np.polyval(virial[::-1], eta)
+        assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
+    np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
+    np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.luding(hd.FLUID[:, 0]), rtol=2e-3)
+    assert hd.crystal(0.8) - hd.crystal(0.8, 100) == pytest.approx((hd.crystal(0.8) - 1) / 100)
+    assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
+
+
+def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
+    diameter, count = 0.02, 1000
+    eta = count * np.pi * diameter**2 / 4
+    rates = hd.mixture_rates([diameter, diameter], [300, 700], [1.0, 1.0])
+    one = hd.collision_rate(hd.simulated(eta), diameter, 10**8)
+    np.testing.assert_allclose(rates.sum(axis=1), one, rtol=1e-6)
+    np.testing.assert_allclose(rates[:, 1] / rates[:, 0], 7 / 3)
+    unequal = hd.mixture_rates([0.02, 0.04], [300, 200], [1.0, 4.0])
+    assert 300 * unequal[0, 1] == pytest.approx(200 * unequal[1, 0])
+    assert hd.mixture_z([diameter, diameter], [300, 700]) == pytest.approx(hd.simulated(eta))
+
+
+def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():
+    assert hd.haff_by_time(0.01, 0.9) == pytest.approx(hd.haff_by_collisions(0.01, 0.9), rel=1e-4)
+    assert hd.haff_by_time(5.0, 1.0) == hd.haff_by_collisions(5.0, 1.0) == 1
+    assert hd.cooling_ratio(1, 0.7) == pytest.approx(1) == hd.cooling_ratio(4, 1.0)
+    assert hd.cooling_ratio(4, 0.8) > hd.cooling_ratio(4, 0.9) > 1
+    assert hd.cooling_ratio(0.25, 0.8) == pytest.approx(1 / hd.cooling_ratio(4, 0.8))
+
+
+# --- pressure ---
+
+
+def steady(path, periodic, **parameters):
+    """100 disks with kT = 2; all sums grow linearly in time."""
+    time = np.arange(201.0)
+    v = np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
+    x = np.full_like(v, 0.5)
+    observables = {
+        "collisions": (500 * time).astype(int),
+        "virial": 300 * time,
+        "wall_collisions": np.outer(time, (3, 3, 4, 4)).astype(int),
+        "wall_impulse": np.outer(time, (400.0, 400.0, 500.0, 500.0)),
+    }
+    return written(
+        path,
+        x,
+        v,
+        time=[0, 200],
+        periodic=periodic,
+        observables=observables,
+        observable_time=time,
+        parameters=parameters or None,
+    )
+
+
+def test_three_pressures_of_a_steady_run(tmp_path):
+    walled = steady(tmp_path / "walls.h5", (False, False))
+    assert thermodynamics.temperature(walled) == 2
+    z = thermodynamics.z_virial(walled)
+    assert z.mean == pytest.approx(1 + 300 / 400) and z.error == pytest.approx(0, abs=1e-12)
+    assert thermodynamics.z_wall(walled).mean == pytest.approx(900 * 0.98 / 400)
+    assert thermodynamics.collision_rate(walled).mean == pytest.approx(10)
+    assert thermodynamics.hit_rate(walled).mean == pytest.approx(14)
+    assert thermodynamics.force(walled).mean == pytest.approx(450)
+    unit = hd.collision_rate(2.0, 0.02, 100, 2.0)
+    assert thermodynamics.z_rate(walled).mean == pytest.approx(1 + 10 / unit)
+    bulk = steady(tmp_path / "bulk.h5", PERIODIC)
+    assert thermodynamics.temperature(bulk) == pytest.approx(200 / 99)
+    assert thermodynamics.z_virial(bulk).mean == pytest.approx(1 + 300 / (2 * 100 * 200 / 99))
+    assert np.isnan(equation_of_state.pressures(bulk)[2].mean)
+
+
+def test_errors_come_from_the_scatter_of_blocks(rng):
+    amount = rng.poisson(1000, 2000).astype(float)
+    found = thermodynamics.ratio(amount, np.full(2000, 2.0))
+    assert found.mean == pytest.approx(500, rel=0.01)
+    assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(2000), rel=0.1)
+
+
+def test_inelastic_runs_have_no_equation_of_state(tmp_path):
+    run = steady(tmp_path / "run.h5", PERIODIC, contact={"restitution": 0.9})
+    with pytest.raises(RunError, match="not elastic"):
+        equation_of_state.pressures(run)
+
+
+# --- rates and free paths ---
+
+
+def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path):
+    """A disk that flies 1, 1, 4, 1, 1, 4, ... time units between hits; another one without hits."""
+    hits = np.cumsum(np.tile([1.0, 1.0, 4.0], 40))
+    time = np.linspace(0.05, hits[-1] - 0.05, 2400)
+    v = np.tile([[0.5, 0.0], [1.0, 0.0]], (len(time), 1, 1))
+    run = written(
+        tmp_path / "run.h5", np.full_like(v, 0.5), v, time=time,
+        observables={"collisions": np.zeros(len(time), int)},
+    )  # fmt: skip
+    zero = np.zeros(len(hits), int)
+    run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
+    path, weight = rates.free_paths(run)
+    assert set(np.round(path, 9)) == {0.5, 2.0}
+    assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
+
+
+def test_free_paths_without_memory_have_the_mean_one():
+    x = np.linspace(0, 40, 20001)
+    density = rates.path_density(x)
+    assert np.trapezoid(density, x) == pytest.approx(1, rel=1e-3)
+    assert np.trapezoid(x * density, x) == pytest.approx(1, rel=1e-3)
+
+
+# --- correlations ---
+
+
+def test_velocities_that_turn_are_remembered_as_a_cosine(tmp_path):
+    time = np.arange(101) * 0.1
+    v = np.stack([np.cos(time), np.sin(time)], axis=1)[:, None].repeat(3, axis=1)
+    observables = {"collisions": np.zeros(101, int)}
+    run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=observables)
+    at = correlations.lags(100)
+    assert at[0] == 1 and at[-1] == 50 and np.all(np.diff(at) > 0)
+    np.testing.assert_allclose(correlations.velocity_memory(run, at), np.cos(0.1 * at), atol=1e-12)
+
+
+def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
+    time = np.arange(51) * 0.1
+    v = np.array([[1.0, 0.0], [-1.0, 0.0]])[None].repeat(51, axis=0)
+    flight = 0.5 + v * time[:, None, None]
+    image = np.floor(flight).astype(int)
+    observables = {"collisions": np.zeros(51, int)}
+    run = written(
+        tmp_path / "run.h5",
+        flight - image,
+        v,
+        image=image,
+        time=time,
+        periodic=PERIODIC,
+        observables=observables,
+    )
+    at = np.array([1, 5, 20])
+    np.testing.assert_allclose(correlations.displacement(run, at), (0.1 * at) ** 2)
+
+
+@pytest.mark.parametrize("periodic", [PERIODIC, (False, False), (True, False)])
+def test_points_at_random_are_not_correlated(tmp_path, rng, periodic):
+    x = rng.uniform(size=(60, 1000, 2))
+    run = written(tmp_path / "run.h5", x, x, periodic=periodic)
+    g = correlations.pair_correlation(run, np.linspace(1, 6, 6))
+    np.testing.assert_allclose(g, 1, atol=0.05)
+
+
+def triangular(columns, rows):
+    """A perfect crystal in its periodic box."""
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    x = np.stack([i + 0.5 * (j % 2), j * np.sqrt(0.75)], axis=-1).reshape(-1, 2) + 0.2
+    return x, (columns, rows * np.sqrt(0.75))
+
+
+def test_a_crystal_is_in_order_and_points_at_random_are_not(tmp_path, rng):
+    x, edges = triangular(12, 14)
+    # Shaken a little: in a perfect one the triangulation of the copies is not unique.
+    x = x + rng.normal(0, 1e-6, x.shape)
+    frames = np.stack([x, x])
+    crystal = written(tmp_path / "c.h5", frames, frames, edges=edges, periodic=PERIODIC)
+    np.testing.assert_allclose(correlations.bond_order(crystal, 0), 1, atol=1e-4)
+    turned = written(
+        tmp_path / "t.h5", frames[..., ::-1], frames, edges=edges[::-1], periodic=PERIODIC
+    )
+    np.testing.assert_allclose(correlations.bond_order(turned, 0), -1, atol=1e-4)
+    x = rng.uniform(size=(2, 2000, 2))
+    gas = written(tmp_path / "g.h5", x, x, periodic=PERIODIC)
+    local, of_all = correlations.order(gas)
+    assert 0.3 < local < 0.45 and of_all < 0.1
+
+
+# --- the scripts, on runs of the program ---
+
+RUNS = (
+    ("species.disks.packing_fraction=0.05",),
+    ("species.disks.packing_fraction=0.3",),
+    ("species.disks.packing_fraction=0.02", "contact.restitution=0.9"),
+)
+
+
+@pytest.fixture
+def bulk(ricochet, tmp_path):
+    """Small gases at two packing fractions, and one that cools."""
+    settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
+    settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
+    settings += ["output.event_log=true"]
+    paths = [tmp_path / f"{k}.h5" for k in range(len(RUNS))]
+    for path, more in zip(paths, RUNS, strict=True):
+        options = [word for value in (*settings, *more) for word in ("--set", value)]
+        done = ricochet(BULK, *options, "--quiet", "-o", path)
+        assert done.returncode == 0, done.stderr
+    return paths
+
+
+def test_scripts_draw(bulk, tmp_path):
+    scripts = {"equation_of_state": bulk[:2], "correlations": bulk[:2], "haff": bulk[2:]}
+    scripts["rates"] = bulk[:1]
+    for script, runs in scripts.items():
+        figure, csv = tmp_path / f"{script}.png", tmp_path / f"{script}.csv"
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert run_script(script, *runs, "-o", figure, "--csv", csv) == 0
+        assert figure.stat().st_size > 10000
+        assert len(csv.read_text().splitlines()) > 2
+    for script, runs in (("equation_of_state", bulk[2:]), ("rates", bulk[2:])):
+        assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+
+
+def test_rates_of_a_gas_agree_with_each_other(bulk):
+    run = read_run(bulk[0])
+    found = rates.quantities(run)
+    per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
+    assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
+    assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
+    mean, density = rates.histogram([run])
+    speed = np.mean(run.speed(slice(None)))
+    assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
+    assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
+
+
+def test_a_gas_cools_by_haff(bulk):
+    found = haff.curves([read_run(bulk[2])])
+    for x, y, law in (
+        (found["time"], found["by_time"].mean, hd.haff_by_time),
+        (found["tau"], found["by_collisions"].mean, hd.haff_by_collisions),
+    ):
+        early = law(x, 0.9) > 0.1
+        np.testing.assert_allclose(y[early], law(x, 0.9)[early], rtol=0.2)

@@ -1,0 +1,128 @@
+"""The pages say what is there: current reference, no dead links, commands that exist."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+from synthetic_run import ROOT, write_run
+
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
+PROMISES = ROOT / "docs" / "reliability.md"
+ELSEWHERE = ("http://", "https://", "mailto:", "#")
+
+
+def test_the_input_page_is_current(program):
+    source = importlib.util.spec_from_file_location("input_page", ROOT / "docs" / "input_page.py")
+    module = importlib.util.module_from_spec(source)
+    source.loader.exec_module(module)
+    message = "make it anew: python docs/input_page.py build/ricochet > docs/input.md"
+    assert (ROOT / "docs" / "input.md").read_text() == module.page(program), message
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    links = re.findall(r"\]\(([^)\s]+)\)", page.read_text())
+    local = [link.split("#")[0] for link in links if not link.startswith(ELSEWHERE)]
+    assert [link for link in local if not (page.parent / link).exists()] == []
+
+
+def test_the_readme_leads_to_every_page():
+    readme = (ROOT / "README.md").read_text()
+    assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
+
+
+def test_promises_are_held_by_tests_that_exist():
+    """In the tables of docs/reliability.md the second column names files and tests."""
+    sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
+    known = re.findall(
+        r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
+    )
+    known = {name for pair in known for name in pair}
+    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", PROMISES.read_text(), re.M)
+    named = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
+    assert len(named) > 20
+    assert [word for word in named if word not in known] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_scripts_and_inputs_that_are_named_exist(page):
+    folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
+    named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", page.read_text())
+    mine = {"runs/mine.nml"}
+    missing = [name for name in named if not (ROOT / name).exists()]
+    assert [name for name in missing if name not in mine and name == name.lower()] == []
+
+
+def test_options_that_are_named_exist(program):
+    """Options of ricochet in code blocks of the pages."""
+    known = subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout
+    for page in PAGES:
+        for line in page.read_text().splitlines():
+            if re.match(r"    (build/)?ricochet ", line):
+                for option in re.findall(r"\s(--[a-z-]+)", line.split("#")[0]):
+                    assert option in known, f"{page.name}: {line}"
+
+
+def test_make_lists_its_targets_in_one_screen_and_suggests_them():
+    def make(target):
+        return subprocess.run(["make", target], capture_output=True, text=True, cwd=ROOT)
+
+    screen = make("help").stdout.splitlines()
+    assert len(screen) <= 24 and max(map(len, screen)) <= 80
+    for target in ("demo", "test", "figures", "check", "bench", "lint", "docs", "clean"):
+        assert any(line.startswith(f"  make {target} ") for line in screen)
+    wrong = make("tset")
+    assert wrong.returncode == 2 and "no file tset; did you mean test?" in wrong.stderr
+
+
+def test_every_script_of_post_is_in_the_list():
+    page = (ROOT / "docs" / "getting-started.md").read_text()
+    scripts = [p.name for p in ROOT.glob("post/*.py") if "def main()" in p.read_text()]
+    assert [name for name in scripts if not re.search(rf"^\|.*`{name}`.*\| ", page, re.M)] == []
+
+
+def test_the_script_that_the_page_on_extending_shows_works(tmp_path):
+    page = (ROOT / "docs" / "extending.md").read_text()
+    script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
+    (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
+    still = np.zeros((2, 3, 2))
+    command = [sys.executable, "fastest.py", write_run(tmp_path / "run.h5", still, still)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    assert (tmp_path / "fastest.png").exists()
+
+
+def completed(program, *words):
+    """What bash proposes for the last word."""
+    script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
+    printf '%s\\n' "${COMPREPLY[@]}" """
+    source = ROOT / "docs" / "ricochet-completion.bash"
+    command = ["bash", "-c", script, "bash", source, program, *words]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    assert result.stderr == ""
+    return result.stdout.split()
+
+
+def test_completion_knows_options_variables_values_and_files(program):
+    assert completed(program, "--res") == ["--resume"]
+    assert completed(program, "input/gas") == ["input/gas.nml"]
+    assert completed(program, "inp") == ["input"]
+    assert completed(program, "--explain", "restit") == ["restitution"]
+    assert {"contact", "contact_time", "contact.wall_rule"} <= {
+        *completed(program, "--explain", "con")
+    }
+    assert completed(program, "--explain", "stop.wa") == ["stop.wall_clock"]
+    assert completed(program, "input/gas.nml", "--set", "run.s") == ["run.seed=", "run.search="]
+    assert completed(program, "--set", "run.queue", "=", "he") == ["heap"]
+    assert completed(program, "--set", "run.queue", "=") == ["calendar", "heap"]
+    assert completed(program, "--set", "output.event_log", "=", ".t") == [".true."]
+    assert completed(program, "--set", "run.seed", "=") == []
+    named = completed(program, "input/crater.nml", "--set", "species.projectile.v")
+    assert named == ["species.projectile.velocities=", "species.projectile.velocity="]
+    placement = ["--set", "species.bed.placement", "="]
+    assert completed(program, "input/crater.nml", *placement, "d") == ["dense"]

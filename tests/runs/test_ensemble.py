@@ -1,0 +1,343 @@
+"""runs/ensemble.sh with a stand-in for the program: what is run, skipped, resumed and reported.
+
+With the program itself: neither faults nor the order of the work show in the results.
+"""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from whole_runs import MIXTURE, differences, wait_for, write_input
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "runs" / "ensemble.sh"
+
+# Notes each start in OUT.starts; sleeps; TERM makes a checkpoint.  `outcome.exit=N` fails with N.
+PROGRAM = """#!/usr/bin/env bash
+while (($#)); do
+  case $1 in
+  -o) out=${2%.h5} && shift ;;
+  --set) sets+="$2|" && [[ $2 != outcome.exit=* ]] || outcome=${2#*=} && shift ;;
+  --resume) resumed=resumed ;;
+  esac
+  shift
+done
+trap 'echo TERM >>"$out.signals"; touch "$out.chk.h5"; exit 75' TERM INT
+echo "${resumed:-anew} $sets" >>"$out.starts"
+[[ -z ${outcome:-} ]] || { echo "reason of the failure" >&2; exit "$outcome"; }
+for ((k = 0; k < ${PAUSE:-0}; k++)); do sleep 0.05; done
+rm -f -- "$out.chk.h5"
+[[ ! -e $out.h5 ]] || exit 3
+echo data >"$out.h5"
+"""
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """A folder with the stand-in and an input file, with a blank in its name."""
+    folder = tmp_path / "a lab"
+    folder.mkdir()
+    program = folder / "program"
+    program.write_text(PROGRAM)
+    program.chmod(0o755)
+    (folder / "gas.nml").write_text("&run\n/\n")
+    return folder
+
+
+def command(lab, *options):
+    return [str(SCRIPT), str(lab / "gas.nml"), "-d", str(lab / "out"), *options]
+
+
+def environment(lab, pause=0):
+    return {**os.environ, "RICOCHET": str(lab / "program"), "PAUSE": str(pause)}
+
+
+def ensemble(lab, *options, pause=0):
+    return subprocess.run(
+        command(lab, *options),
+        env=environment(lab, pause),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def starts(lab):
+    """Member -> one line per start, 'anew' or 'resumed' and the overrides."""
+    return {
+        path.stem: path.read_text().splitlines() for path in sorted((lab / "out").glob("*.starts"))
+    }
+
+
+def test_members_are_seeds_times_values(lab):
+    result = ensemble(
+        lab,
+        "--seeds",
+        "1-2,5",
+        "--scan",
+        "species.ball.mass=1,2.5",
+        "--set",
+        "contact.restitution=0.5",
+    )
+    assert result.returncode == 0
+    assert starts(lab) == {
+        f"ball.mass_{mass}_seed_{seed}": [
+            f"anew contact.restitution=0.5|species.ball.mass={mass}|run.seed={seed}|"
+        ]
+        for mass in ("1", "2.5")
+        for seed in (1, 2, 5)
+    }
+    assert "6 of 6 members finished, 0 failed" in result.stderr
+
+
+def test_vector_values_are_separated_by_semicolons(lab):
+    assert ensemble(lab, "--scan", "species.ball.velocity=0,-1;0,-2").returncode == 0
+    assert [lines[0] for lines in starts(lab).values()] == [
+        "anew species.ball.velocity=0,-1|",
+        "anew species.ball.velocity=0,-2|",
+    ]
+
+
+def test_manifest_takes_names_and_values_with_blanks(lab):
+    manifest = lab / "members.txt"
+    manifest.write_text(
+        "# two members\n\none two\t--set run.title=a b --set run.seed=3\n"
+        "plain --set run.seed=4\nbare\n"
+    )
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
+    assert starts(lab) == {
+        "one two": ["anew run.title=a b|run.seed=3|"],
+        "plain": ["anew run.seed=4|"],
+        "bare": ["anew "],
+    }
+
+
+def test_manifest_of_the_folder_repeats_the_ensemble(lab):
+    ensemble(lab, "--seeds", "1-3", "--set", "run.title=a b")
+    first = starts(lab)
+    (lab / "again").mkdir()
+    manifest = shutil.move(lab / "out" / "manifest.txt", lab / "manifest.txt")
+    shutil.rmtree(lab / "out")
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
+    assert starts(lab) == first
+
+
+def test_finished_members_are_skipped_and_checkpoints_resumed(lab):
+    (lab / "out").mkdir()
+    (lab / "out" / "seed_1.h5").write_text("done before")
+    (lab / "out" / "seed_2.chk.h5").touch()
+    result = ensemble(lab, "--seeds", "1-3")
+    assert result.returncode == 0
+    assert starts(lab) == {"seed_2": ["resumed run.seed=2|"], "seed_3": ["anew run.seed=3|"]}
+    assert (lab / "out" / "seed_1.h5").read_text() == "done before"
+    assert "1 of them before" in result.stderr
+
+
+def test_one_failure_does_not_stop_the_others(lab):
+    result = ensemble(lab, "--scan", "outcome.exit=4", "--seeds", "1", "-j", "1")
+    assert result.returncode == 1
+    manifest = lab / "members.txt"
+    manifest.write_text("a\nb\t--set outcome.exit=4\nc\n")
+    result = ensemble(lab, "--manifest", str(manifest), "-j", "1")
+    assert result.returncode == 1
+    assert "2 of 3 members finished, 1 failed" in result.stderr
+    assert "failed: b (exit 4): reason of the failure" in result.stderr
+    assert starts(lab)["b"] == ["anew outcome.exit=4|"], "tried once, not by every worker"
+
+
+def test_failed_members_are_tried_once_by_several_workers(lab):
+    ensemble(lab, "--scan", "outcome.exit=4", "--seeds", "1-6", "-j", "3")
+    assert all(len(lines) == 1 for lines in starts(lab).values())
+
+
+def test_exit_75_is_not_done(lab):
+    result = ensemble(lab, "--scan", "outcome.exit=75")
+    assert result.returncode == 75
+    assert "0 of 1 members finished, 0 failed" in result.stderr
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
+    with subprocess.Popen(
+        command(lab, "--seeds", "1-6", "-j", "2"),
+        env=environment(lab, 200),
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+    ) as process:
+        wait_for(lambda: len(starts(lab)) == 2 if (lab / "out").exists() else False)
+        time.sleep(0.2)
+        os.killpg(process.pid, how)  # as a terminal does
+        assert process.wait(timeout=20) == 75
+    assert len(list((lab / "out").glob("*.chk.h5"))) == 2
+    assert [p.read_text() for p in (lab / "out").glob("*.signals")] == ["TERM\n"] * 2
+    assert ensemble(lab, "--seeds", "1-6").returncode == 0
+    assert (
+        sorted(lines[-1].split()[0] for lines in starts(lab).values())
+        == ["anew"] * 4 + ["resumed"] * 2
+    )
+
+
+def test_two_copies_share_the_members(lab):
+    line = command(lab, "--seeds", "1-8", "-j", "2")
+    copies = [
+        subprocess.Popen(line, env=environment(lab, 4), stderr=subprocess.DEVNULL) for _ in range(2)
+    ]
+    codes = [copy.wait(timeout=60) for copy in copies]
+    assert set(codes) <= {0, 75} and 0 in codes
+    assert len(starts(lab)) == 8
+    assert all(len(lines) == 1 for lines in starts(lab).values()), "no member ran twice"
+    assert ensemble(lab, "--seeds", "1-8").returncode == 0
+
+
+def test_members_run_at_the_same_time(lab):
+    begin = time.monotonic()
+    assert ensemble(lab, "--seeds", "1-8", "-j", "8", pause=10).returncode == 0
+    assert time.monotonic() - begin < 8 * 0.5, "half a second each"
+
+
+def test_results_of_other_settings_are_not_mixed(lab):
+    assert ensemble(lab, "--seeds", "1").returncode == 0
+    result = ensemble(lab, "--seeds", "1", "--set", "contact.restitution=0.9")
+    assert result.returncode == 2 and "other settings" in result.stderr
+    (lab / "gas.nml").write_text("&run\n  title = 'new'\n/\n")
+    result = ensemble(lab, "--seeds", "1")
+    assert result.returncode == 2 and "another version" in result.stderr
+
+
+def test_settings_of_a_failed_member_may_be_mended(lab):
+    manifest = lab / "members.txt"
+    manifest.write_text("a\t--set outcome.exit=2 \n")
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 1
+    (lab / "gas.nml").write_text("&run\n  title = 'mended'\n/\n")
+    manifest.write_text("a\t--set run.seed=1 \n")
+    assert ensemble(lab, "--manifest", str(manifest)).returncode == 0
+    assert starts(lab)["a"] == ["anew outcome.exit=2|", "anew run.seed=1|"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "no members"),
+        (["--seeds", "1-"], "neither a number nor a range"),
+        (["--seeds", "3-1"], "neither a number nor a range"),
+        (["--scan", "mass"], "write VARIABLE=VALUE"),
+        (["--seeds", "1", "-j", "0"], "-j 0"),
+        (["--frobnicate"], "unknown option --frobnicate, see --help"),
+        (["--sedes", "1"], "unknown option --sedes; did you mean --seeds?"),
+        (["--seeds"], "needs a value"),
+        (["--seeds", "1", "--manifest", "x"], "either"),
+        (["--manifest", "/nowhere"], "cannot read"),
+        (["--seeds", "1,1"], "two members are called"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):
+    result = ensemble(lab, *options)
+    assert result.returncode == 2
+    assert message in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_dry_run_starts_nothing(lab):
+    result = ensemble(lab, "--seeds", "1-2", "--dry-run")
+    assert result.stdout == "seed_1\t--set run.seed=1\nseed_2\t--set run.seed=2\n"
+    assert not (lab / "out").exists()
+
+
+@pytest.fixture
+def real(program, tmp_path):
+    """`real(folder, *options)` starts an ensemble of the program itself, six members by default."""
+    text = MIXTURE.replace("event_log", "checkpoint_every = 0.05 event_log")
+    input_file = write_input(tmp_path, text.replace("time = 4", "time = 80"))
+
+    def start(folder, *options, members=("--seeds", "1-6")):
+        return subprocess.Popen(
+            [SCRIPT, input_file, "-d", tmp_path / folder, *members, *options],
+            env={**os.environ, "RICOCHET": str(program)},
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            text=True,
+        )
+
+    return start
+
+
+def finish(process) -> int:
+    """The exit code of an ensemble, when it has come to its end."""
+    process.communicate(timeout=120)
+    return process.returncode
+
+
+def members_in(folder) -> list[int]:
+    """Process ids of the programs that write into a folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().split(b"\0")
+        except OSError:  # gone
+            continue
+        if any(word.startswith(f"{folder}/".encode()) for word in words) and b"-o" in words:
+            found.append(int(path.parent.name))
+    return found
+
+
+def disturb(process, folder, rng):
+    """TERM or KILL, for the launcher or a member."""
+    how = rng.choice([signal.SIGTERM, signal.SIGKILL])
+    members = members_in(folder)
+    victim = rng.choice(members) if members and rng.random() < 0.5 else process.pid
+    try:
+        os.kill(victim, how)
+    except ProcessLookupError:
+        return  # it has just ended
+
+
+def differences_of(one, other) -> list[str]:
+    """What is not the same in the six members of two ensembles."""
+    names = [f"seed_{k}.h5" for k in range(1, 7)]
+    return [f"{name}: {what}" for name in names for what in differences(one / name, other / name)]
+
+
+@pytest.mark.parametrize("times", [5, pytest.param(20, marks=pytest.mark.check)])
+def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
+    """TERM and KILL to launcher and members at random moments, and the command given again."""
+    begin = time.monotonic()
+    assert finish(real("calm", "-j", "2")) == 0
+    duration = time.monotonic() - begin
+    rng, disturbed = random.Random(times), 0
+    while disturbed < times:
+        process = real("rough", "-j", "2")
+        time.sleep(rng.uniform(0, duration / 2))
+        disturb(process, tmp_path / "rough", rng)
+        code = finish(process)
+        assert code in (0, 1, 75, -signal.SIGTERM, -signal.SIGKILL)
+        disturbed += 1
+        if code == 0:
+            assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
+            shutil.rmtree(tmp_path / "rough")
+    wait_for(lambda: members_in(tmp_path / "rough") == [])
+    assert finish(real("rough", "-j", "2")) == 0
+    assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
+
+
+def test_members_depend_neither_on_order_nor_on_jobs_nor_on_company(real, ricochet, tmp_path):
+    assert finish(real("one", "-j", "1")) == 0
+    lines = (tmp_path / "one" / "manifest.txt").read_text().splitlines(keepends=True)
+    (tmp_path / "backwards.txt").write_text("".join(reversed(lines)))
+    assert finish(real("two", "-j", "3", members=("--manifest", tmp_path / "backwards.txt"))) == 0
+    assert differences_of(tmp_path / "one", tmp_path / "two") == []
+    run = ricochet("gas.nml", "-o", "alone.h5", "--set", "run.seed=4")
+    assert run.returncode == 0
+    assert differences(tmp_path / "alone.h5", tmp_path / "one" / "seed_4.h5") == []
+    assert "/parameters/seed" in differences(tmp_path / "alone.h5", tmp_path / "one" / "seed_5.h5")
+
+
+@pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")
+def test_scripts_pass_shellcheck():
+    scripts = sorted((ROOT / "runs").glob("*.sh"))
+    result = subprocess.run(["shellcheck", *scripts], capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout

@@ -1,0 +1,307 @@
+"""What the program makes of input files, good, bad and absurd, and of its command line."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fuzz_input
+
+ROOT = Path(__file__).resolve().parents[2]
+INPUTS = sorted((ROOT / "input").glob("*.nml"))
+GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
+&stop time = 0.1 /
+"""
+SIGNED = "gravity|centre|lower|upper|region|position|velocity"
+USAGE, FILES = 2, 3
+
+
+@pytest.fixture
+def checked(ricochet, tmp_path):
+    """`checked(bytes or text, *options)` runs --check on a file named gas.nml."""
+
+    def run(content, *options, **more):
+        data = content.encode() if isinstance(content, str) else content
+        (tmp_path / "gas.nml").write_bytes(data)
+        return ricochet("gas.nml", "--check", *options, timeout=5, errors="replace", **more)
+
+    return run
+
+
+def lines_of(run) -> list[str]:
+    """Lines on stderr, which must be free of traces of the run-time library."""
+    assert not re.search(r"backtrace|SIG[A-Z]{3}|libgfortran|Fortran runtime", run.stderr)
+    return run.stderr.splitlines()
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.name)
+def test_every_input_file_is_valid_and_short_lined(ricochet, path):
+    run = ricochet(path, "--check")
+    assert (run.returncode, run.stderr) == (0, "")
+    text = path.read_text()
+    assert text.endswith("/\n"), "tools for namelists want a line end after the last /"
+    assert path.name == "reference.nml" or max(map(len, text.splitlines())) <= 100
+
+
+def test_the_reference_file_is_what_print_defaults_prints(ricochet):
+    run = ricochet("--print-defaults")
+    assert run.returncode == 0
+    assert run.stdout == (ROOT / "input" / "reference.nml").read_text()
+
+
+def test_the_readme_of_the_inputs_lists_every_file():
+    listed = re.findall(r"^\| `(\w+\.nml)`", (ROOT / "input" / "README.md").read_text(), re.M)
+    assert sorted([*listed, "reference.nml"]) == [path.name for path in INPUTS]
+
+
+def test_the_output_file_holds_every_value_as_used(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    sets = ["species.gas.packing_fraction=0.1", "species.gas.radius=", "run.title=it's"]
+    run = ricochet("gas.nml", "-o", "a.h5", *(word for s in sets for word in ("--set", s)))
+    assert run.returncode == 0
+    values = fuzz_input.used_values(tmp_path / "a.h5")
+    assert values["run.seed"] == [1]
+    assert values["run.title"] == ["it's"]
+    assert values["box.boundary"] == ["wall", "wall"]
+    assert values["species.gas.radius"][0] == pytest.approx((0.1 / 20 / 3.141592653589793) ** 0.5)
+    assert values["species.gas.velocities"] == ["equal_speed"]
+    assert "species.gas.temperature" not in values
+
+
+def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
+    run = checked("&species massa = 1 radius = -1 count = 2 /\n&stop tme = 1 /\n", "--set", "a=b")
+    lines = lines_of(run)
+    assert run.returncode == USAGE
+    assert lines[:3] == [
+        'gas.nml:1: species.massa: unknown variable; did you mean "mass"?',
+        'gas.nml:1: species.radius: "-1" is out of range; allowed: a number > 0',
+        'gas.nml:2: stop.tme: unknown variable; did you mean "time"?',
+    ]
+    assert lines[-1].startswith("--set a=b: ")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
+        (b"\n", "gas.nml: species: there is none"),
+        (bytes(range(256)), "is not a text file: byte 1"),
+        (GOOD.encode() + b"\0", "is not a text file"),
+        (b"\x7fELF\x02\x01", "is not a text file"),
+        (GOOD.encode("utf-16"), "is not a text file"),
+        (b"\xff\xfe" + GOOD.encode(), "text outside a group"),
+        (b"! " + b"x" * 5_000_000, "has 5000002 bytes; an input file has at most 4194304"),
+        (b"&run " + b"x" * 1_000_000 + b" = 1 /", "gas.nml:1: run."),
+        (b"&" + b"x" * 1_000_000 + b" /", "unknown group"),
+        (b"&run title = '" + b"x" * 1_000_000 + b"' /", "the text has 1000000 bytes"),
+        (b"&run seed = " + b"1" * 1_000_000 + b" /", "is out of range"),
+        (b"&run seed = " + b"1 " * 1_000_000 + b" /", "1000000 values instead of 1"),
+        (b"&species position = 9999999*1 /", "9999999 values; allowed"),
+        (b"&species /" * 6000, "species"),
+        (b"&run " + b"seed = 1 " * 100_000 + b" /", "a second time"),
+        (b"(" * 1_000_000, "text outside a group"),
+        (b"&run " + b"(" * 1_000_000, "unexpected"),
+        (b"&run seed(\n)=1 /", "in brackets stands the number of one value"),
+    ],
+    ids=lambda value: "" if isinstance(value, bytes) else value[:30],
+)
+def test_absurd_files_are_refused_in_time_with_short_messages(checked, content, said):
+    run = checked(content)
+    assert run.returncode == USAGE
+    assert said in run.stderr
+    assert all(len(line) < 400 for line in lines_of(run))
+
+
+def test_four_megabytes_of_positions_are_read_in_time(checked, tmp_path):
+    side = 400
+    places = ", ".join(
+        f"{(column + 0.5) / side:.5f},{(row + 0.5) / side:.5f}"
+        for row in range(side)
+        for column in range(side)
+    )
+    text = f"&species radius = 0.001 position = {places} /\n&stop time = 0 /\n"
+    run = checked(text)
+    assert run.returncode == 0, run.stderr[:500]
+    assert str(side**2) in run.stdout
+
+
+@pytest.mark.parametrize("kind", ["missing", "folder", "pipe", "device", "link to nothing"])
+def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
+    path = tmp_path / "thing.nml"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path = Path("/dev/zero")
+    elif kind == "link to nothing":
+        path.symlink_to(tmp_path / "nothing")
+    run = ricochet(path, "--check", timeout=5)
+    assert run.returncode in (USAGE, FILES)
+    assert [str(path) in line for line in lines_of(run)] == [True]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_without_permission_is_refused(ricochet, tmp_path):
+    path = tmp_path / "secret.nml"
+    path.write_text(GOOD)
+    path.chmod(0)
+    run = ricochet(path, "--check")
+    assert run.returncode == FILES
+    assert len(lines_of(run)) == 1
+
+
+@pytest.mark.parametrize(
+    "name", ["two words.nml", "größe.nml", "-odd.nml", "x" * 251 + ".nml", "a'b\"c.nml", "&.nml"]
+)
+def test_files_may_have_any_name(ricochet, tmp_path, name):
+    (tmp_path / name).write_text(GOOD)
+    run = ricochet("--check", "--", name)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_names_too_long_for_the_system_are_reported(ricochet):
+    run = ricochet("x" * 5000, "--check")
+    assert run.returncode == FILES
+    assert len(lines_of(run)) == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        ("my/gass.nml", "my/gas.nml"),  # a slip
+        ("my/gas", "my/gas.nml"),  # the ending is missing
+        ("cratre.nml", "input/crater.nml"),  # the folder, too
+        ("nowhere/crater.nml", "input/crater.nml"),
+    ],
+)
+def test_a_file_that_is_not_there_suggests_the_right_one(ricochet, tmp_path, asked, meant):
+    for path in ("my/gas.nml", "my/gas.txt", "input/crater.nml"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
+    run = ricochet(asked)
+    assert run.returncode == FILES
+    assert lines_of(run) == [f"{asked}: there is no such file; did you mean {meant}?"]
+    assert lines_of(ricochet("other.nml")) == ["other.nml: there is no such file"]
+
+
+@pytest.mark.parametrize("command", [["--help"], ["--check", "gas.nml"], ["--quiet", "gas.nml"]])
+def test_a_full_disk_behind_stdout_is_reported(ricochet, tmp_path, command):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    with Path("/dev/full").open("w") as full:
+        run = ricochet(*command, capture_output=False, stdout=full, stderr=subprocess.PIPE)
+    assert run.returncode == FILES
+    assert lines_of(run) == ["standard output: cannot be written: No space left on device"]
+
+
+@pytest.mark.parametrize("command", [["--help"], ["--version"], ["--explain", "restitution"]])
+def test_questions_are_answered_on_stdout(ricochet, command):
+    run = ricochet(*command)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "ricochet" in run.stdout or "contact.restitution" in run.stdout
+
+
+@pytest.mark.parametrize("command", [[], ["--resum", "a.nml"], ["a", "b"], ["--explain", "tiem"]])
+def test_wrong_usage_is_one_line(ricochet, command):
+    run = ricochet(*command)
+    assert run.returncode == USAGE
+    assert len(lines_of(run)) == 1
+
+
+def numbers() -> list[str]:
+    """Names of all integer and real variables of the reference file, as --set wants them."""
+    text = (ROOT / "input" / "reference.nml").read_text()
+    names, group = [], ""
+    for line in text.splitlines():
+        if found := re.match(r"(?:! )?&(\w+)", line):
+            group = found[1]
+        elif found := re.match(r"[ !]+(\w+) = +(\d[^!]*)", line):
+            count = found[2].count(",") + 1
+            prefix = {"species": "species.gas", "obstacle": "obstacle.pin"}.get(group, group)
+            names.append(f"{prefix}.{found[1]} {count}")
+    return names
+
+
+def test_all_numbers_of_the_reference_are_tried():
+    assert len(numbers()) == 34
+
+
+@pytest.mark.parametrize("variable", numbers())
+def test_numbers_that_are_none_are_refused(checked, variable):
+    name, count = variable.split()
+    pin = "&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /\n"
+    for value in ["nan", "inf", "-inf", "1e999", "1e-320", "1e-400", "1d", "0x1", "1e101", "''"]:
+        run = checked(GOOD + pin, "--set", f"{name}=" + ",".join([value] * int(count)))
+        assert run.returncode == USAGE, value
+        assert any(name.split(".")[-1] in line for line in lines_of(run))
+
+
+@pytest.mark.parametrize("variable", numbers())
+def test_numbers_that_mean_nothing_are_refused(checked, variable):
+    name, count = variable.split()
+    pin = "&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /\n"
+    for value in ["0", "-1", "1e-99", "1e99"]:
+        run = checked(GOOD + pin, "--set", f"{name}=" + ",".join([value] * int(count)))
+        assert run.returncode in (0, USAGE), (value, run.stderr)
+        assert bool(lines_of(run)) == (run.returncode == USAGE)
+        if value == "-1" and not re.search(SIGNED, name):
+            assert run.returncode == USAGE
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "&specis count = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species name = 'gas count = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species /\ncount = 20 radius = 0.02 /\n&stop time = 1 /\n",
+        "&species count 20\n radius = 0.02 /\n&stop time = 1 /\n",
+        "&species count = 20 radius = 0.02\n&stop time = 1 /\n",
+        "&species count = 20 radius = 0.02 /\n&stop time = 1\n",
+    ],
+)
+def test_what_follows_from_a_slip_of_the_pen_is_not_reported(checked, content):
+    run = checked(content)
+    assert run.returncode == USAGE
+    assert len(lines_of(run)) == 1, run.stderr
+
+
+def test_the_last_override_of_a_variable_counts(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    run = ricochet("gas.nml", "-o", "a.h5", "--set", "run.seed=2", "--set", "run.seed=3")
+    assert run.returncode == 0
+    assert fuzz_input.used_values(tmp_path / "a.h5")["run.seed"] == [3]
+    assert "the last one for a variable counts" in ricochet("--help").stdout
+
+
+@pytest.mark.parametrize("radius", [0.8, 0.45])
+def test_dense_placement_is_only_advised_where_it_helps(checked, radius):
+    pin = f"&obstacle centre = 0.5, 0.5 radius = {radius} /\n"
+    run = checked(pin + "&species count = 200 radius = 0.01 /\n&stop time = 1 /\n")
+    assert ("no more room" in run.stderr) == (radius == 0.8)
+    assert "dense" not in run.stderr
+    pin = "&obstacle centre = 0.5, 0.5 radius = 0.2 /\n"
+    crowd = pin + "&species count = 2000 radius = 0.009 /\n&stop time = 1 /\n"
+    assert "use placement = 'dense'" in checked(crowd).stderr
+
+
+@pytest.mark.parametrize("option", ["run.seed", "rum.seed=1", "species.x.mass=1", "=", "run.=1"])
+def test_wrong_overrides_are_named(checked, option):
+    run = checked(GOOD, "--set", option)
+    assert run.returncode == USAGE
+    assert [line.startswith(f"--set {option}: ") for line in lines_of(run)] == [True]
+
+
+def test_damaged_files_never_harm(program):
+    verdicts = fuzz_input.fuzz(str(program), 300, seed=2)
+    assert set(verdicts) == {"accepted", "refused"}
+    assert verdicts["accepted"] > 30
+
+
+@pytest.mark.check
+def test_ten_thousand_damaged_files_never_harm(program):
+    command = [sys.executable, fuzz_input.__file__, "--program", program, "--count", "10000"]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-5000:]

@@ -1,0 +1,81 @@
+"""The scripts of the systems in runs/, in a copy where stand-ins note what would be done."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NO_SYSTEM = ("common", "ensemble", "figures", "bench")
+SYSTEMS = sorted(p.stem for p in (ROOT / "runs").glob("*.sh") if p.stem not in NO_SYSTEM)
+
+
+@pytest.fixture
+def study(tmp_path):
+    """`study(script, *options)` runs a script of the copy; nothing is simulated or drawn."""
+    for folder in ("runs", "input"):
+        (tmp_path / folder).mkdir()
+        for path in (ROOT / folder).iterdir():
+            if path.is_file():
+                shutil.copy(path, tmp_path / folder)
+    stand_in(tmp_path / "ricochet", "exit 4")
+    stand_in(tmp_path / "python", f"echo \"$@\" >>'{tmp_path}/drawn.txt'")
+    stand_in(
+        tmp_path / "bin" / "awk",
+        f"echo \"$LC_ALL\" >>'{tmp_path}/language.txt'\nexec {shutil.which('awk')} \"$@\"",
+    )
+    environment = {
+        **os.environ,
+        "LC_ALL": "de_DE.UTF-8",  # where numbers have commas
+        "PATH": f"{tmp_path}/bin:{os.environ['PATH']}",
+        "PYTHON": f"{tmp_path}/python",
+        "RICOCHET": f"{tmp_path}/ricochet",
+    }
+
+    def run(script, *options, **more):
+        return subprocess.run(
+            ["bash", f"{script}.sh", *options],
+            cwd=tmp_path / "runs",
+            env={**environment, **more},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+def stand_in(path: Path, text: str) -> None:
+    """An executable script."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_a_study_names_its_members_and_draws_its_figures(study, tmp_path, system):
+    run = study(system, "--dry-run")
+    assert run.returncode == 0, run.stderr
+    assert "--set " in run.stdout
+    for call in (tmp_path / "drawn.txt").read_text().splitlines():
+        script = call.split()[0]
+        assert (ROOT / script).is_file() and " -o runs/figures/" in call
+    if (tmp_path / "language.txt").exists():
+        assert set((tmp_path / "language.txt").read_text().split()) == {"C"}
+
+
+@pytest.mark.parametrize("script", [*SYSTEMS, "figures"])
+def test_help_says_what_a_study_does_and_starts_nothing(study, tmp_path, script):
+    run = study(script, "--help")
+    assert run.returncode == 0 and "ensemble.sh" in run.stdout
+    assert run.stdout.splitlines()[0] in (ROOT / "runs" / f"{script}.sh").read_text()
+    assert not (tmp_path / "runs" / script).exists()
+
+
+def test_what_is_missing_shows_before_anything_runs(study):
+    run = study("gas", PYTHON="/nowhere/python")
+    assert run.returncode == 2 and "make demo" in run.stderr.splitlines()[-1]
+    run = study("figures", "gasses")
+    assert run.returncode == 2 and "there are: scattering" in run.stderr.splitlines()[-1]

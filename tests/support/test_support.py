@@ -1,0 +1,202 @@
+"""The tools behind the tests: the substitute for pFUnit, the judge of its runs, the style rules."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SUPPORT = ROOT / "tests" / "support"
+sys.path.insert(0, str(SUPPORT))
+
+from check_style import problems_of  # noqa: E402
+from translate_pf import Refused, translate  # noqa: E402
+
+RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
+FILE = """module test_it
+  use funit
+contains
+  @test
+  subroutine works()
+    {}
+  end subroutine works
+end module test_it
+"""
+
+
+@pytest.mark.parametrize("pfunit", RUNNERS, ids=["substitute", "pFUnit"][: len(RUNNERS)])
+def test_every_verdict_is_the_name_of_its_test(tmp_path, pfunit):
+    shared = "" if pfunit else "tests/support/funit.f90"
+    command = ["make", "unit-tests", "sources=", "suites=tests/support/verdicts", "DEBUG=1",
+               f"shared={shared}", f"BUILD={tmp_path}", f"PFUNIT_DIR={pfunit}"]
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    suite = (SUPPORT / "verdicts" / "test_verdicts.pf").read_text()
+    names = re.findall(r"end subroutine (fails_\w+)", suite)
+    failed = re.findall(r"test_verdicts(?:_suite)?\.((?:fails|passes)_\w+)", result.stdout)
+    assert failed == names, result.stdout + result.stderr
+    assert result.returncode == 2
+    assert f"Failures: {len(names)}" in result.stdout
+
+
+def translated(tmp_path: Path, text: str, name: str = "test_it.pf") -> str:
+    path = tmp_path / name
+    path.write_text(text)
+    return translate(path)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "@assertTrue(done) ! a comment",
+        "@assertTrue(done); n = 1",
+        "@assertTrue(a .and. &",
+        "if (ready) @assertTrue(done)",
+        "@assertEqual(1, n, 'a message')",
+        "@assertEqual(1.0, x, 1.0e-6)",
+        "@assertEqual(expected=1, actual=n)",
+        "@assertEqual(1, n, whitespace=keep_all)",
+        "@assertEqual(1, n, message='a', message='b')",
+        "@assertEqual(message='a', 1, n)",
+        "@assertEqual(1)",
+        "@assertEqual(1, , n)",
+        "@assertEqual(1, f(n)",
+        "@assertLessThan(x, y, tolerance=0.1)",
+        "@assertRelativelyEqual(x, y)",
+        "@assertTrue(done, tolerance=0.1)",
+        "@assertFail()",
+        "@assertFail(message='a', tolerance=0.1)",
+        "@assertThat(x, is(y))",
+        "@mpiAssertEqual(1, n)",
+        "@asserttrue done",
+        "@disable",
+    ],
+)
+def test_a_line_outside_the_common_language_is_refused_with_its_number(tmp_path, line):
+    with pytest.raises(Refused, match="line 6: "):
+        translated(tmp_path, FILE.format(line))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("module test_it", "module test_that"),
+        ("subroutine works", "recursive subroutine works"),
+        ("works()\n   ", "works(self)\n   "),
+        ("@test", "@test(ifdef=X)"),
+        ("@test", "@testCase"),
+        ("  @test\n", "  @before\n\n"),
+        ("contains", "  @before\n  subroutine a()\n  @before\n  subroutine b()\n"),
+        ("@test\n", "@test\n  integer :: n\n"),
+        ("use funit", "use funit\n  use systems, only: a, &\n    run"),
+        ("use funit", "use funit\n  use systems, only: near => close_to, b"),
+        ("end module", "pure logical function is(x)\n  end function is\nend module"),
+    ],
+)
+def test_a_file_outside_the_common_language_is_refused(tmp_path, before, after):
+    assert before in FILE
+    with pytest.raises(Refused):
+        translated(tmp_path, FILE.replace(before, after))
+
+
+def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_path):
+    text = FILE.format("@assertEqual('a, @b(', name, message='x=1, ''y''') ").replace(
+        "contains", "use systems, only: carry_on => run ! user@host"
+    )
+    lines = translated(tmp_path, text).splitlines()
+    assert lines[3] == "use systems, only: carry_on => run ! user@host"
+    assert "(e_ => ('a, @b('), a_ => (name))" in lines[6]
+    assert "message='x=1, ''y'''" in lines[6]
+
+
+@pytest.mark.parametrize(
+    ("output", "status", "verdict"),
+    [
+        (" OK\n (2 tests)", 0, 0),
+        (" OK\n (2 tests, 1 disabled)", 0, 1),
+        (" OK\n (1 test)", 0, 1),
+        (" OK\n (12 tests)", 0, 1),
+        ("..", 0, 1),
+        (" OK\n (2 tests)", 2, 2),
+        ("Program received signal SIGFPE", 136, 136),
+    ],
+)
+def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict):
+    program = tmp_path / "unit_tests"
+    program.write_text(f"#!/bin/sh\ncat <<'E'\n{output}\nE\nexit {status}\n")
+    program.chmod(0o755)
+    suites = tmp_path / "test_it.pf"
+    suites.write_text("  @test\n  !@test\n  @Test\n  ! about @test\n")
+    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suites]
+    assert subprocess.run(command, capture_output=True).returncode == verdict
+
+
+MODULE = """!> A module. It says: use nothing, private, get_it.
+module upper
+  use lower, only: value
+  use, intrinsic :: iso_fortran_env, only: real64
+  implicit none
+  private
+contains
+  pure real(real64) function twice(x)
+    twice = 2*x
+  end function twice
+end module upper
+"""
+
+
+PICTURE = """```mermaid
+flowchart TD
+  high --> low & lowest
+```
+"""
+
+
+def style_problems(root: Path, text: str, picture: str = PICTURE):
+    subprocess.run(["git", "init", "-q", root], check=True)
+    for folder in ("high", "low", "lowest"):
+        (root / "src" / folder).mkdir(parents=True)
+        (root / "src" / folder / "README.md").write_text("A folder.\n")
+    (root / "src" / "README.md").write_text(picture)
+    for folder, name in (("low", "lower"), ("lowest", "other")):
+        empty = f"module {name}\n  private\nend module {name}\n"
+        (root / "src" / folder / f"{name}.f90").write_text(empty)
+    (root / "src" / "high" / "upper.f90").write_text(text)
+    return [str(problem) for problem in problems_of(root)]
+
+
+def test_a_module_in_order_has_no_style_problem(tmp_path):
+    assert style_problems(tmp_path, MODULE) == []
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "line", "words"),
+    [
+        ("lower, only: value", "lower", 3, "without only"),
+        ("  private\n", "  public\n", 1, "no private"),
+        ("module upper", "module uppermost", 1, "instead of upper"),
+        ("    twice = 2*x\n", "    twice = 2*x\n" * 61, 8, "longer than 62 lines"),
+        ("function twice", "function get_twice", 8, "says nothing"),
+        ("contains\n", "#include 'x'\ncontains\n", 7, "preprocessor"),
+        ("contains\n", "contains\n" + "! a line\n" * 520, 531, "more than 530 lines"),
+        ("It says:", "It says: '/ho" "me/me'", 1, "path of one machine"),
+    ],
+)
+def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, words):
+    assert before in MODULE
+    (problem,) = style_problems(tmp_path, MODULE.replace(before, after, 1))
+    assert problem.startswith(f"src/high/upper.f90:{line}: ")
+    assert words in problem
+
+
+def test_a_use_without_an_arrow_in_the_picture_is_reported(tmp_path):
+    (problem,) = style_problems(tmp_path, MODULE, PICTURE.replace("low & ", ""))
+    assert problem.startswith("src/high/upper.f90:3: high/ uses lower of low/")
+
+
+def test_picture_and_folders_belong_together(tmp_path):
+    problems = style_problems(tmp_path, MODULE, PICTURE + "high --> lost\n")
+    assert problems == ["src/README.md:1: there is no folder src/lost"]
