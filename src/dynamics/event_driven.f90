@@ -5,15 +5,14 @@
 !> partner's stamp shows it when the event comes up, and the disk only predicts again.
 module event_driven
   use kinds, only: int32, int64, never, real64
-  use box_geometry, only: first_obstacle
-  use encounters, only: collide, collide_pair, pass_side, passes
+  use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_queue, only: event_queue_t, most_coming, stages
   use evolution, only: evolution_t, limits_t
-  use neighbour_search, only: first_crossing, neighbour_search_t
+  use neighbour_search, only: neighbour_search_t
+  use partners, only: is_wall
   use renumbering, only: renumber
   use simulation_state, only: simulation_t
-  use texts, only: written
   implicit none
   private
   public :: event_driven_t
@@ -26,7 +25,6 @@ module event_driven
   integer(int32), parameter :: many = 20000        !! disks that do not fit into a second-level cache
   integer(int64), parameter :: events_ahead = 8    !! after which to read ahead again
   real(real64), parameter :: last_time = 0.5_real64*never
-  character(len=6), parameter :: side_name(4) = ["left  ", "right ", "bottom", "top   "]
 
   type, extends(evolution_t) :: event_driven_t
     class(neighbour_search_t), allocatable :: search
@@ -110,7 +108,7 @@ contains
       if (sim%n_disks() >= many) call read_ahead(self, sim, look)
       call self%go_on(sim, t_limit, look, turns, i, code, t)
       if (.not. t <= t_limit) then
-        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//moment(sim, i, code))
+        if (t /= t) call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, i, code))
         self%idle = t > last_time
         if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
         return
@@ -204,10 +202,10 @@ contains
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
       end if
-    else if (code > first_crossing .and. .not. passes(sim, code)) then
+    else if (is_wall(code) .and. .not. passes(sim, code)) then
       call collide(sim, i, code, t, self%log)
     else
-      if (code > first_crossing) call pass_side(sim, i, code)
+      if (is_wall(code)) call pass_side(sim, i, code)
       call self%search%cross(sim, i, code)
       call self%queue%schedule(sim%disk, sim%tag, i)
       return
@@ -247,34 +245,12 @@ contains
     if (code <= 0 .and. sim%box%falling()) remedy = "; a disk that starts at rest on a wall never leaves it: " &
       //"start it higher, or take run.dynamics = 'steps'"
     if (sim%now - self%last_look < self%blink) call fail(error, exit_broken, &
-      "inelastic collapse, the clock stands still: "//moment(sim, i, code)//"; set contact.contact_time " &
+      "inelastic collapse, the clock stands still: "//encounter_text(sim, i, code)//"; set contact.contact_time " &
       //"(TC model), well below the mean time between collisions, or raise " &
       //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))//remedy)
     self%next_watch = sim%events + events_per_watch(sim)
     self%last_look = sim%now
   end subroutine watch
-
-  !> Time, disk and partner of an event, for messages.
-  pure function moment(sim, i, code) result(text)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code
-    character(len=:), allocatable :: text
-    character(len=200) :: line
-
-    write (line, "(""disk "",i0,"" ("",a,"")"")") sim%tag(i)%id, sim%species(sim%tag(i)%species)%name
-    text = trim(line)
-    if (code > 0) then
-      write (line, "("" and disk "",i0,"" ("",a,"")"")") sim%tag(code)%id, sim%species(sim%tag(code)%species)%name
-    else if (code > first_obstacle) then
-      line = " and the "//trim(side_name(1 - code))//" side"
-    else if (code > first_crossing) then
-      line = " and obstacle "//sim%box%obstacle(first_obstacle + 1 - code)%name
-    else
-      line = ""
-    end if
-    text = text//trim(line)
-    text = text//" at time "//written(sim%time())
-  end function moment
 
   !> Moves the origin of time to about now, so that times stay small and keep their digits; and, as
   !> everything is predicted anew then, puts the disks into the order of the cells.

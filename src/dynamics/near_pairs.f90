@@ -2,9 +2,12 @@
 !> pairs, or only those near each other: no other can touch before a disk has moved by half the `skin`, so
 !> that one list of them serves many steps (Verlet, Phys. Rev. 159, 98 (1967)).
 module near_pairs
-  use kinds, only: int32, never, pi, real64
-  use box_geometry, only: box_t, first_obstacle, from_obstacle, obstacle_reach
+  use kinds, only: int32, pi, real64
+  use partners, only: obstacle_code, obstacle_number
+  use shapes, only: spare
+  use box_geometry, only: box_t, obstacle_gap
   use simulation_state, only: simulation_t
+  use sorting, only: sort_by_count
   implicit none
   private
   public :: near_pairs_t, pair_list_t, find_all_contacts
@@ -13,7 +16,6 @@ module near_pairs
   real(real64), parameter :: pairs_per_disk = 4.0_real64   !! in a list, at most, at the mean density
   real(real64), parameter :: least_skin = 0.2_real64       !! [mean diameter]
   real(real64), parameter :: cells_per_disk = 4.0_real64   !! at most
-  real(real64), parameter :: spare = 1.0e-6_real64         !! relative, above all rounding
 
   !> A disk and what it meets.
   type :: pair_t
@@ -41,14 +43,14 @@ module near_pairs
   end type near_pairs_t
 
   !> Disks sorted by cell, row after row.
-  type :: cells_t
+  type :: bins_t
     integer(int32) :: n(2) = 0                 !! columns, rows
     real(real64) :: width(2) = 0.0_real64      !! [length]
-    integer(int32), allocatable :: first(:)    !! (cells+1) place of a cell's first disk
+    integer(int32), allocatable :: first(:)    !! (bins+1) place of a cell's first disk
     integer(int32), allocatable :: disk(:)     !! (disks) its number
     real(real64), allocatable :: x(:, :)       !! (2,disks) [length]
     real(real64), allocatable :: radius(:)     !! (disks) [length]
-  end type cells_t
+  end type bins_t
 
 contains
 
@@ -100,7 +102,7 @@ contains
     real(real64) :: period(2), sigma
     integer(int32) :: i, j
 
-    period = periods(sim%box)
+    period = sim%box%periods()
     do i = 1, sim%n_disks() - 1
       do j = i + 1, sim%n_disks()
         sigma = sim%disk(i)%radius + sim%disk(j)%radius
@@ -119,13 +121,13 @@ contains
     integer :: k
     logical :: overlap
 
-    period = periods(sim%box)
+    period = sim%box%periods()
     do k = 1, list%n
       associate (p => list%pair(k))
         if (p%partner > 0) then
           overlap = distance2(x(:, p%i), x(:, p%partner), period) < p%sigma*p%sigma
         else
-          overlap = gap(sim%box, first_obstacle + 1 - p%partner, x(:, p%i), sim%disk(p%i)%radius) < 0
+          overlap = obstacle_gap(sim%box, obstacle_number(p%partner), x(:, p%i), sim%disk(p%i)%radius) < 0
         end if
         if (overlap) call append(contacts, p)
       end associate
@@ -140,24 +142,13 @@ contains
     real(real64), intent(in) :: length
     integer(int32) :: i, m
 
-    if (.not. allocated(sim%box%obstacle)) return
-    do m = 1, size(sim%box%obstacle, kind=int32)
+    do m = 1, sim%box%n_obstacles()
       do i = 1, sim%n_disks()
-        if (gap(sim%box, m, x(:, i), sim%disk(i)%radius) < length) call append(list, pair_t(i, first_obstacle + 1 - m))
+        if (obstacle_gap(sim%box, m, x(:, i), sim%disk(i)%radius) < length) &
+          call append(list, pair_t(i, obstacle_code(m)))
       end do
     end do
   end subroutine add_obstacles
-
-  !> From the m-th obstacle to the rim of a disk at x; negative if they overlap.
-  pure function gap(box, m, x, radius) result(length)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: m
-    real(real64), intent(in) :: x(2), radius   !! [length]
-    real(real64) :: length
-
-    length = norm2(from_obstacle(box, int(m), x)) - obstacle_reach(box%obstacle(m), radius)
-    if (box%obstacle(m)%inside) length = -length
-  end function gap
 
   !> Squared distance of the nearest images of two points in the box.
   pure function distance2(a, b, period) result(d2)
@@ -171,13 +162,6 @@ contains
     dy = min(dy, abs(period(2) - dy))
     d2 = dx*dx + dy*dy
   end function distance2
-
-  pure function periods(box) result(period)
-    type(box_t), intent(in) :: box
-    real(real64) :: period(2)                  !! `never` between walls [length]
-
-    period = merge(box%edges(), never, box%periodic)
-  end function periods
 
   pure subroutine empty(list)
     type(pair_list_t), intent(inout) :: list
@@ -222,7 +206,7 @@ contains
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :), step
-    type(cells_t) :: cells
+    type(bins_t) :: bins
     integer(int32) :: i
     integer :: n_obstacles
 
@@ -231,9 +215,9 @@ contains
     call empty(self%list)
     call add_obstacles(self%list, sim, x, self%skin)
     n_obstacles = self%list%n
-    call sort_into_cells(cells, sim, x, self%skin)
+    call sort_into_bins(bins, sim, x, self%skin)
     do i = 1, sim%n_disks()
-      call add_smaller_neighbours(self%list, cells, sim%box, i, x(:, i), sim%disk(i)%radius, self%skin)
+      call add_smaller_neighbours(self%list, bins, sim%box, i, x(:, i), sim%disk(i)%radius, self%skin)
     end do
     call sort_pairs(self%list%pair(n_obstacles + 1:self%list%n), sim%n_disks())
   end subroutine make_list
@@ -257,8 +241,8 @@ contains
   end function wanted_skin
 
   !> The cells are as wide as a mean disk and the skin reach; wider in a vast box.
-  subroutine sort_into_cells(cells, sim, x, skin)
-    type(cells_t), intent(inout) :: cells
+  subroutine sort_into_bins(bins, sim, x, skin)
+    type(bins_t), intent(inout) :: bins
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :), skin
     integer(int32) :: cell(size(x, 2)), place(size(x, 2)), c(2), i, n
@@ -267,24 +251,24 @@ contains
     n = sim%n_disks()
     edges = sim%box%edges()
     width = max(skin + 2*sum(sim%disk%radius)/n, sqrt(product(edges)/(cells_per_disk*n)))
-    cells%n = int(min(max(edges/width, 1.0_real64), cells_per_disk*n), int32)
-    cells%width = edges/cells%n
-    allocate (cells%disk(n), cells%x(2, n), cells%radius(n))
+    bins%n = int(min(max(edges/width, 1.0_real64), cells_per_disk*n), int32)
+    bins%width = edges/bins%n
+    allocate (bins%disk(n), bins%x(2, n), bins%radius(n))
     do i = 1, n
-      c = modulo(column_and_row(cells, sim%box, x(:, i)), cells%n)
-      cell(i) = 1 + c(1) + cells%n(1)*c(2)
+      c = modulo(column_and_row(bins, sim%box, x(:, i)), bins%n)
+      cell(i) = 1 + c(1) + bins%n(1)*c(2)
     end do
-    call sort(cell, product(cells%n), cells%first, place)
+    call sort_by_count(cell, product(bins%n), bins%first, place)
     do i = 1, n
-      cells%disk(place(i)) = i
-      cells%x(:, place(i)) = x(:, i)
-      cells%radius(place(i)) = sim%disk(i)%radius
+      bins%disk(place(i)) = i
+      bins%x(:, place(i)) = x(:, i)
+      bins%radius(place(i)) = sim%disk(i)%radius
     end do
-  end subroutine sort_into_cells
+  end subroutine sort_into_bins
 
   !> The cell at x, from (0,0): beyond a periodic side cells go on, beyond a wall the last one does.
-  pure function column_and_row(cells, box, x) result(c)
-    type(cells_t), intent(in) :: cells
+  pure function column_and_row(bins, box, x) result(c)
+    type(bins_t), intent(in) :: bins
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: x(2)           !! [length]
     integer(int32) :: c(2)
@@ -292,17 +276,17 @@ contains
     integer :: axis
 
     do axis = 1, 2
-      place = (x(axis) - box%lower(axis))/cells%width(axis)
-      if (.not. box%periodic(axis)) place = max(0.0_real64, min(place, cells%n(axis) - 1.0_real64))
+      place = (x(axis) - box%lower(axis))/bins%width(axis)
+      if (.not. box%periodic(axis)) place = max(0.0_real64, min(place, bins%n(axis) - 1.0_real64))
       c(axis) = floor(place, int32)
     end do
   end function column_and_row
 
   !> Adds the pairs of disk i with disks near it that are smaller, or equal and behind it. So a small disk
   !> looks only at cells close by, however large the largest disk is.
-  subroutine add_smaller_neighbours(list, cells, box, i, x, radius, skin)
+  subroutine add_smaller_neighbours(list, bins, box, i, x, radius, skin)
     type(pair_list_t), intent(inout) :: list
-    type(cells_t), intent(in) :: cells
+    type(bins_t), intent(in) :: bins
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: x(2), radius, skin  !! [length]
@@ -310,14 +294,14 @@ contains
     real(real64) :: reach
 
     reach = (2*radius + skin)*(1 + spare)
-    low = column_and_row(cells, box, x - reach)
-    high = min(column_and_row(cells, box, x + reach), low + cells%n - 1)   ! each cell once
-    from = 1 + modulo(low(1), cells%n(1))
+    low = column_and_row(bins, box, x - reach)
+    high = min(column_and_row(bins, box, x + reach), low + bins%n - 1)   ! each cell once
+    from = 1 + modulo(low(1), bins%n(1))
     to = from + high(1) - low(1)
     do y = low(2), high(2)
-      row = cells%n(1)*modulo(y, cells%n(2))
-      call add_run(row + from, row + min(to, cells%n(1)))
-      call add_run(row + 1, row + to - cells%n(1))   ! what goes on behind a periodic side
+      row = bins%n(1)*modulo(y, bins%n(2))
+      call add_run(row + from, row + min(to, bins%n(1)))
+      call add_run(row + 1, row + to - bins%n(1))   ! what goes on behind a periodic side
     end do
 
   contains
@@ -329,12 +313,12 @@ contains
       real(real64) :: sigma, period(2)
 
       if (d < c) return
-      period = periods(box)
-      do k = cells%first(c), cells%first(d + 1) - 1
-        j = cells%disk(k)
-        if (cells%radius(k) > radius .or. (j <= i .and. .not. cells%radius(k) < radius)) cycle
-        sigma = radius + cells%radius(k)
-        if (distance2(x, cells%x(:, k), period) > (sigma + skin)**2) cycle
+      period = box%periods()
+      do k = bins%first(c), bins%first(d + 1) - 1
+        j = bins%disk(k)
+        if (bins%radius(k) > radius .or. (j <= i .and. .not. bins%radius(k) < radius)) cycle
+        sigma = radius + bins%radius(k)
+        if (distance2(x, bins%x(:, k), period) > (sigma + skin)**2) cycle
         call append(list, pair_t(min(i, j), max(i, j), sigma))
       end do
     end subroutine add_run
@@ -349,37 +333,14 @@ contains
     integer :: k
 
     allocate (copy(size(pair)), place(size(pair)))
-    call sort(pair%partner, n_disks, first, place)
+    call sort_by_count(pair%partner, n_disks, first, place)
     do k = 1, size(pair)
       copy(place(k)) = pair(k)
     end do
-    call sort(copy%i, n_disks, first, place)
+    call sort_by_count(copy%i, n_disks, first, place)
     do k = 1, size(pair)
       pair(place(k)) = copy(k)
     end do
   end subroutine sort_pairs
 
-  !> Sorts by counting; equal keys keep their order.
-  pure subroutine sort(key, n_keys, first, place)
-    integer(int32), intent(in) :: key(:)       !! from 1 to n_keys
-    integer(int32), intent(in) :: n_keys
-    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) place of the first of each key
-    integer(int32), intent(out) :: place(:)    !! of each item
-    integer(int32) :: k
-
-    allocate (first(n_keys + 1))
-    first = 0
-    do k = 1, size(key, kind=int32)
-      first(key(k) + 1) = first(key(k) + 1) + 1
-    end do
-    first(1) = 1
-    do k = 2, n_keys + 1
-      first(k) = first(k) + first(k - 1)
-    end do
-    do k = 1, size(key, kind=int32)
-      place(k) = first(key(k))
-      first(key(k)) = first(key(k)) + 1
-    end do
-    first = eoshift(first, -1, 1_int32)        ! each key has moved to the next one's first
-  end subroutine sort
 end module near_pairs

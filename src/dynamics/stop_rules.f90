@@ -56,7 +56,7 @@ contains
     collisions = 0.5_real64*settings%collisions_per_disk*sim%n_disks()
     if (collisions < 9.0e18_real64) rule%limits%collisions = min(rule%limits%collisions, ceiling(collisions, int64))
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
-    if (all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. any(sim%law%restitution < 1)) &
+    if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. any(sim%law%restitution < 1)) &
       rule%look_every = look_interval*int(sim%n_disks(), int64)
   end function new_stop_rule
 

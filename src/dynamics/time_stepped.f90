@@ -5,13 +5,16 @@
 !> As there, a disk's own state changes only at its own collisions: no error adds up from step to step.
 module time_stepped
   use kinds, only: int32, int64, never, real64
-  use box_geometry, only: box_t, n_sides, nearest_image
+  use box_geometry, only: box_t, wall_normal
   use disks, only: disk_t
-  use encounters, only: collide, pass_side, passes, wall_normal
+  use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
+  use free_flight, only: slowest
   use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
+  use partners, only: axis_of, n_sides, nothing, sense_of
+  use shapes, only: nearest_image
   use simulation_state, only: simulation_t
   use texts, only: written
   implicit none
@@ -21,7 +24,6 @@ module time_stepped
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
   integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
-  real(real64), parameter :: slowest = 1/never      !! a disk slower than this is at rest [length/time]
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
@@ -110,7 +112,7 @@ contains
     do k = 1, n_outside
       i = self%outside(k)
       if (any(self%x(:, i) /= self%x(:, i))) then
-        call fail(error, exit_broken, "a position became NaN: disk "//name_of(sim, i))
+        call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
       call meet_sides(self, sim, i)
@@ -194,9 +196,9 @@ contains
     integer :: axis
 
     do side = 0, 1 - n_sides, -1
-      axis = 1 - side/2
+      axis = axis_of(side)
       inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
-      if (modulo(side, 2) == 0) then
+      if (sense_of(side) < 0) then
         beyond = (sim%box%lower(axis) + inset) - self%x(axis, i)
       else
         beyond = self%x(axis, i) - (sim%box%upper(axis) - inset)
@@ -232,18 +234,9 @@ contains
     real(real64) :: dx(2)
 
     dx = self%x(:, j) - self%x(:, i)
-    dx = dx - nearest_image(sim%box, dx)
+    dx = dx - nearest_image(dx, sim%box%periods())
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, self%log)
   end subroutine meet_disk
-
-  !> Name of disk i, and the time, for a message.
-  pure function name_of(sim, i) result(text)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    character(len=:), allocatable :: text
-
-    text = written(sim%tag(i)%id)//" ("//sim%species(sim%tag(i)%species)%name//") at time "//written(sim%time())
-  end function name_of
 
   !> What is wrong with the step, '' if nothing. The fastest disk may fall through the whole box, and then
   !> has the speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact cannot

@@ -6,7 +6,7 @@
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int32, int64, real64
-  use box_geometry, only: n_sides
+  use partners, only: n_sides
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use checksum, only: crc_of_bytes, crc_of_file, hexadecimal

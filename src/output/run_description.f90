@@ -2,11 +2,11 @@
 module run_description
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use kinds, only: int32, int64, real64
-  use box_geometry, only: box_t, obstacle_t
+  use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
   use hdf5_objects, only: hdf5_file_t, hdf5_version
   use parameter_values, only: parameter_group_t, parameter_value_t
-  use parameters, only: is_repeated
+  use parameters, only: is_repeated, table
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use system, only: host_name
@@ -35,7 +35,8 @@ contains
     call describe_input(file, groups, input_text, overrides)
     call describe_species(file, sim)
     call describe_populations(file, sim)
-    if (allocated(sim%box%obstacle)) call describe_obstacles(file, sim%box%obstacle)
+    call describe_table(file, pack(groups, groups%name == "obstacle"))
+    call describe_table(file, pack(groups, groups%name == "wall"))
     call file%put("parameters/seed", [integer ::], [settings%run%seed])
     call describe_origin(file)
     call describe_cost(file, 0.0_real64, 0.0_real64)     ! so that nothing is added at the end
@@ -104,7 +105,7 @@ contains
     integer :: g, k
 
     do g = 1, size(groups)
-      if (groups(g)%name == "obstacle") cycle           ! one table below
+      if (groups(g)%name == "obstacle" .or. groups(g)%name == "wall") cycle     ! one table each, below
       group = "parameters/"//trim(groups(g)%name)
       if (is_repeated(groups(g)%name)) group = group//"/"//trim(groups(g)%instance)
       call file%make_group(group)
@@ -181,23 +182,36 @@ contains
     end do
   end subroutine describe_populations
 
-  subroutine describe_obstacles(file, obstacles)
+  !> All groups of one name as a table, with a dataset for each variable. A choice of two words is stored as a
+  !> flag with the name of the second.
+  subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
-    type(obstacle_t), intent(in) :: obstacles(:)
-    character(len=64) :: names(size(obstacles))
-    real(real64) :: centres(2*size(obstacles))
-    integer :: k
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=64) :: texts(size(groups))
+    character(len=:), allocatable :: path, second
+    real(real64), allocatable :: values(:)
+    integer :: g, k, n
 
-    if (size(obstacles) == 0) return
-    do k = 1, size(names)
-      names(k) = obstacles(k)%name
-      centres(2*k - 1:2*k) = obstacles(k)%centre
+    if (size(groups) == 0) return
+    n = size(groups)
+    do k = 1, size(groups(1)%values)
+      associate (row => table(groups(1)%values(k)%row))
+        path = "parameters/"//trim(row%group)//"/"
+        second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
+        if (row%kind == "text") then
+          do g = 1, n
+            texts(g) = groups(g)%text_of(trim(row%name))
+          end do
+          if (second == "") call file%put(path//trim(row%name), texts)
+          if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
+        else
+          values = [(groups(g)%values(k)%reals, g=1, n)]
+          if (row%size == 1) call file%put(path//trim(row%name), [n], values)
+          if (row%size > 1) call file%put(path//trim(row%name), [row%size, n], values)
+        end if
+      end associate
     end do
-    call file%put("parameters/obstacle/name", names)
-    call file%put("parameters/obstacle/centre", [2, size(names)], centres)
-    call file%put("parameters/obstacle/radius", [size(names)], obstacles%radius)
-    call file%put("parameters/obstacle/inside", [size(names)], merge(1_int32, 0_int32, obstacles%inside))
-  end subroutine describe_obstacles
+  end subroutine describe_table
 
   subroutine describe_origin(file)
     type(hdf5_file_t), intent(inout) :: file

@@ -1,25 +1,19 @@
-!> The container: four sides, walls or periodic by axis, circular obstacles, and the acceleration in it.
+!> The container: four sides, walls or periodic by axis, fixed obstacles, and the acceleration in it.
 !> Times of contact are pure functions of a disk's own state, counted from the epoch like its clock.
 module box_geometry
-  use kinds, only: int32, never, real64
   use disks, only: disk_t
-  use free_flight, only: time_to_circle, time_to_line
+  use free_flight, only: time_to_line
+  use kinds, only: int32, never, real64
+  use partners, only: axis_of, is_side, n_sides, obstacle_code, obstacle_number, sense_of
+  use shapes, only: shape_t
   implicit none
   private
-  public :: box_t, obstacle_t, first_obstacle, n_sides
-  public :: side_time, obstacle_time, next_side, next_obstacle, obstacle_reach, from_obstacle, nearest_image
+  public :: box_t, obstacle_t
+  public :: side_time, next_side, next_obstacle, obstacle_gap, wall_normal, free_area
 
-  integer(int32), parameter :: n_sides = 4
-  !> What a disk meets, as one number: > 0 a disk; 0, -1, -2, -3 the left, right, bottom and top side;
-  !> from `first_obstacle` downwards the obstacles.
-  integer(int32), parameter :: first_obstacle = -4
-
-  !> A fixed circle: disks bounce off its outside, or are kept inside it.
   type :: obstacle_t
     character(len=:), allocatable :: name
-    real(real64) :: centre(2) = 0.0_real64      !! [length]
-    real(real64) :: radius = 0.0_real64         !! [length]
-    logical :: inside = .false.                 !! disks are kept inside
+    class(shape_t), allocatable :: shape
   end type obstacle_t
 
   type :: box_t
@@ -30,8 +24,9 @@ module box_geometry
     type(obstacle_t), allocatable :: obstacle(:)
   contains
     procedure :: edges
+    procedure :: periods
     procedure :: falling
-    procedure :: obstructed
+    procedure :: n_obstacles
   end type box_t
 
 contains
@@ -44,6 +39,14 @@ contains
     lengths = self%upper - self%lower
   end function edges
 
+  !> The same, but `never` where the sides are walls.
+  pure function periods(self) result(lengths)
+    class(box_t), intent(in) :: self
+    real(real64) :: lengths(2)
+
+    lengths = merge(self%upper - self%lower, never, self%periodic)
+  end function periods
+
   !> Whether disks fly on parabolas.
   pure function falling(self) result(yes)
     class(box_t), intent(in) :: self
@@ -52,14 +55,14 @@ contains
     yes = any(abs(self%gravity) > 0)
   end function falling
 
-  !> Whether there are obstacles.
-  pure function obstructed(self) result(yes)
+  !> Number of obstacles.
+  pure function n_obstacles(self) result(n)
     class(box_t), intent(in) :: self
-    logical :: yes
+    integer(int32) :: n
 
-    yes = .false.
-    if (allocated(self%obstacle)) yes = size(self%obstacle) > 0
-  end function obstructed
+    n = 0
+    if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
+  end function n_obstacles
 
   !> When the disk's rim meets a wall, or its centre a periodic side. A gap that rounding made negative
   !> counts as zero: a disk that has arrived and moves on outwards turns now and never leaks.
@@ -70,9 +73,9 @@ contains
     real(real64) :: t, gap, inset
     integer :: axis
 
-    axis = 1 - side/2
+    axis = axis_of(side)
     inset = merge(0.0_real64, disk%radius, box%periodic(axis))
-    if (modulo(side, 2) == 0) then
+    if (sense_of(side) < 0) then
       gap = max(disk%x(axis) - (box%lower(axis) + inset), 0.0_real64)
       t = disk%clock + time_to_line(gap, -disk%v(axis), -box%gravity(axis))
     else
@@ -101,76 +104,78 @@ contains
     end do
   end subroutine next_side
 
-  !> Distance between the obstacle's centre and the disk's at contact.
-  pure function obstacle_reach(obstacle, radius) result(rho)
-    type(obstacle_t), intent(in) :: obstacle
-    real(real64), intent(in) :: radius
-    real(real64) :: rho
-
-    rho = merge(obstacle%radius - radius, obstacle%radius + radius, obstacle%inside)
-  end function obstacle_reach
-
-  !> When the disk meets the m-th obstacle. A disk stays in the box until it passes a periodic side, so the
-  !> images of the obstacle one period away are enough; a container has none, it holds its disks.
-  pure function obstacle_time(box, disk, m) result(t)
-    type(box_t), intent(in) :: box
-    type(disk_t), intent(in) :: disk
-    integer, intent(in) :: m
-    real(real64) :: t
-    integer :: image_x, image_y, reach(2)
-
-    t = never
-    associate (o => box%obstacle(m))
-      reach = merge(1, 0, box%periodic .and. .not. o%inside)
-      do image_y = -reach(2), reach(2)
-        do image_x = -reach(1), reach(1)
-          t = min(t, disk%clock + time_to_circle(disk%x - (o%centre + [image_x, image_y]*box%edges()), &
-            disk%v, box%gravity, obstacle_reach(o, disk%radius), o%inside))
-        end do
-      end do
-    end associate
-  end function obstacle_time
-
-  !> From the m-th obstacle's centre, or its nearest image's, to x.
-  pure function from_obstacle(box, m, x) result(d)
-    type(box_t), intent(in) :: box
-    integer, intent(in) :: m
-    real(real64), intent(in) :: x(2)            !! [length]
-    real(real64) :: d(2)
-
-    d = x - box%obstacle(m)%centre
-    if (any(box%periodic) .and. .not. box%obstacle(m)%inside) d = d - nearest_image(box, d)
-  end function from_obstacle
-
-  !> The whole periods in a separation: dx less these leads to the nearest image.
-  pure function nearest_image(box, dx) result(shift)
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64) :: shift(2), edges(2)
-
-    edges = box%edges()
-    shift = 0
-    if (abs(dx(1)) < 0.5_real64*edges(1) .and. abs(dx(2)) < 0.5_real64*edges(2)) return    ! nearly always
-    shift = merge(edges*anint(dx/edges), 0.0_real64, box%periodic)
-  end function nearest_image
-
-  !> The earlier of an event known already and the contacts with the obstacles listed.
+  !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
+  !> passes a periodic side, so the images of an obstacle one period away are enough; what encloses the disks has none.
   pure subroutine next_obstacle(box, disk, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: list(:)       !! numbers of the obstacles in question, ascending
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    real(real64) :: t_m
-    integer :: k
+    real(real64) :: t_m, shift(2)
+    integer :: k, image_x, image_y, reach(2)
 
     do k = 1, size(list)
-      t_m = obstacle_time(box, disk, int(list(k)))
+      associate (shape => box%obstacle(list(k))%shape)
+        reach = merge(1, 0, box%periodic .and. .not. shape%encloses)
+        t_m = never
+        do image_y = -reach(2), reach(2)
+          do image_x = -reach(1), reach(1)
+            shift = [image_x, image_y]*box%edges()
+            t_m = min(t_m, disk%clock + &
+              shape%contact_time(disk%x - (shape%middle + shift), disk%v, box%gravity, disk%radius))
+          end do
+        end do
+      end associate
       if (t_m < t) then
         t = t_m
-        code = first_obstacle + 1 - list(k)
+        code = obstacle_code(list(k))
       end if
     end do
   end subroutine next_obstacle
+
+  !> Distance between the m-th obstacle and the rim of a disk at x; negative if they overlap.
+  pure function obstacle_gap(box, m, x, radius) result(length)
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: m
+    real(real64), intent(in) :: x(2), radius    !! [length]
+    real(real64) :: length
+
+    associate (shape => box%obstacle(m)%shape)
+      length = shape%gap(shape%from_nearest(x, box%periods()), radius)
+    end associate
+  end function obstacle_gap
+
+  !> Unit vector from a side or obstacle to a disk at x that touches it.
+  pure function wall_normal(box, code, x) result(normal)
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: code
+    real(real64), intent(in) :: x(2)            !! [length]
+    real(real64) :: normal(2)
+
+    if (is_side(code)) then
+      normal = 0
+      normal(axis_of(code)) = -sense_of(code)
+    else
+      associate (shape => box%obstacle(obstacle_number(code))%shape)
+        normal = shape%normal(shape%from_nearest(x, box%periods()))
+      end associate
+    end if
+  end function wall_normal
+
+  !> Where disks can be: the box less the obstacles, or the smallest outline that encloses them.
+  pure function free_area(box) result(area)
+    type(box_t), intent(in) :: box
+    real(real64) :: area                        !! [length**2]
+    integer :: m
+
+    area = product(box%edges())
+    do m = 1, box%n_obstacles()
+      if (box%obstacle(m)%shape%encloses) area = min(area, box%obstacle(m)%shape%area())
+    end do
+    do m = 1, box%n_obstacles()
+      if (.not. box%obstacle(m)%shape%encloses) area = area - box%obstacle(m)%shape%area()
+    end do
+  end function free_area
 
 end module box_geometry

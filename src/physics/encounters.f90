@@ -2,15 +2,18 @@
 !> meet. Both dynamics share it, with all counts and sums.
 module encounters
   use kinds, only: int32, real64
-  use box_geometry, only: box_t, first_obstacle, from_obstacle, nearest_image
+  use box_geometry, only: wall_normal
   use collisions, only: pair_impulse, wall_rebound
   use disks, only: disk_t
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
+  use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
+  use shapes, only: nearest_image
   use simulation_state, only: simulation_t
+  use texts, only: written
   implicit none
   private
-  public :: collide, collide_pair, collide_wall, pass_side, passes, wall_normal
+  public :: collide, collide_pair, encounter_text, pass_side, passes
 
 contains
 
@@ -83,7 +86,7 @@ contains
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
-    if (any(sim%box%periodic)) dx = dx - nearest_image(sim%box, dx)
+    if (any(sim%box%periodic)) dx = dx - nearest_image(dx, sim%box%periods())
     dv = sim%disk(j)%v - sim%disk(i)%v
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
@@ -107,7 +110,7 @@ contains
     logical :: yes
 
     yes = .false.
-    if (code > first_obstacle) yes = sim%box%periodic(1 - code/2)
+    if (is_side(code)) yes = sim%box%periodic(axis_of(code))
   end function passes
 
   !> Takes disk i through a periodic side: it goes on from one period away. Its clock, the time of its last
@@ -117,8 +120,8 @@ contains
     integer(int32), intent(in) :: i, code
     integer :: axis, period
 
-    axis = 1 - code/2
-    period = 2*modulo(code, 2) - 1                 ! +1 through the right or top side
+    axis = axis_of(code)
+    period = sense_of(code)
     associate (d => sim%disk(i), tag => sim%tag(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
       d%stamp = d%stamp + 1
@@ -132,6 +135,7 @@ contains
     integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: t
     real(real64) :: normal(2), v(2), restitution, mass
+    integer(int32) :: k
 
     restitution = sim%law%wall_restitution
     if (sim%law%contact_time > 0) then
@@ -145,30 +149,40 @@ contains
     sim%dissipated = sim%dissipated + 0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v))
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%events = sim%events + 1
-    if (code > first_obstacle) then
-      sim%wall_collisions(1 - code) = sim%wall_collisions(1 - code) + 1
-      sim%wall_impulse(1 - code) = sim%wall_impulse(1 - code) + mass*dot_product(sim%disk(i)%v - v, normal)
+    if (is_side(code)) then
+      k = wall_index(code)
+      sim%wall_collisions(k) = sim%wall_collisions(k) + 1
+      sim%wall_impulse(k) = sim%wall_impulse(k) + mass*dot_product(sim%disk(i)%v - v, normal)
     else
       sim%obstacle_collisions = sim%obstacle_collisions + 1
     end if
   end subroutine collide_wall
 
-  !> Unit vector from a side or obstacle to a disk at x that touches it.
-  pure function wall_normal(box, code, x) result(normal)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: code
-    real(real64), intent(in) :: x(2)
-    real(real64) :: normal(2)
-    integer :: m
+  !> Disk i, its partner and the time, for messages.
+  pure function encounter_text(sim, i, code) result(text)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, code           !! as in `partners`
+    character(len=:), allocatable :: text
 
-    normal = 0
-    if (code > first_obstacle) then
-      normal(1 - code/2) = 1 - 2*modulo(code, 2)
-    else
-      m = first_obstacle + 1 - code
-      normal = from_obstacle(box, m, x)
-      normal = merge(-normal, normal, box%obstacle(m)%inside)/norm2(normal)
+    text = disk_text(i)
+    if (code > 0) then
+      text = text//" and "//disk_text(code)
+    else if (is_side(code)) then
+      text = text//" and the "//trim(side_name(wall_index(code)))//" side"
+    else if (is_wall(code)) then
+      text = text//" and obstacle "//sim%box%obstacle(obstacle_number(code))%name
     end if
-  end function wall_normal
+    text = text//" at time "//written(sim%time())
+
+  contains
+
+    !> A disk by its number and species.
+    pure function disk_text(k) result(words)
+      integer(int32), intent(in) :: k
+      character(len=:), allocatable :: words
+
+      words = "disk "//written(sim%tag(k)%id)//" ("//sim%species(sim%tag(k)%species)%name//")"
+    end function disk_text
+  end function encounter_text
 
 end module encounters

@@ -4,7 +4,10 @@ module free_flight
   use kinds, only: never, real64
   implicit none
   private
-  public :: flight, flight_velocity, time_to_contact, time_to_line, time_to_circle
+  public :: flight, flight_velocity, time_to_contact, time_to_line, time_to_circle, slowest
+
+  !> What is slower than this is at rest: times would overflow. [length/time]
+  real(real64), parameter :: slowest = 1/never
 
 contains
 
@@ -51,7 +54,6 @@ contains
     real(real64), intent(in) :: distance      !! along the normal; negative: the line lies behind [length]
     real(real64), intent(in) :: speed         !! along the normal [length/time]
     real(real64), intent(in) :: acceleration  !! along the normal [length/time**2]
-    real(real64), parameter :: slowest = 1/never  !! slower is at rest; the time would overflow
     real(real64) :: s, root
 
     s = never

@@ -2,7 +2,7 @@
 !> that the collisions have gathered.
 module observables
   use kinds, only: int32, pi, real64
-  use box_geometry, only: box_t
+  use box_geometry, only: free_area
   use disks, only: species_t
   use simulation_state, only: simulation_t
   implicit none
@@ -134,23 +134,7 @@ contains
 
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%virial/sim%time()
-    pressure = pressure/area(sim%box)
+    pressure = pressure/free_area(sim%box)
   end function pressure
-
-  !> Where disks can be: the box less the obstacles, or the smallest circle that keeps them in.
-  pure function area(box)
-    type(box_t), intent(in) :: box
-    real(real64) :: area
-    integer :: m
-
-    area = product(box%edges())
-    if (.not. allocated(box%obstacle)) return
-    do m = 1, size(box%obstacle)
-      if (box%obstacle(m)%inside) area = min(area, pi*box%obstacle(m)%radius**2)
-    end do
-    do m = 1, size(box%obstacle)
-      if (.not. box%obstacle(m)%inside) area = area - pi*box%obstacle(m)%radius**2
-    end do
-  end function area
 
 end module observables

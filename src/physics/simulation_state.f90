@@ -1,7 +1,8 @@
 !> The state of a simulation: all that a checkpoint holds and nothing else.
 module simulation_state
   use kinds, only: int32, int64, real64
-  use box_geometry, only: box_t, n_sides
+  use box_geometry, only: box_t
+  use partners, only: n_sides
   use collisions, only: contact_law_t
   use disks, only: disk_t, species_t, tag_t
   use free_flight, only: flight, flight_velocity

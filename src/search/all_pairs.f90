@@ -1,9 +1,9 @@
 !> Search without cells: every other disk is a candidate. O(N) per prediction; with `everyone` set all
 !> predictions are made anew after each event, O(N**2), which is the first textbook method.
 module all_pairs
-  use kinds, only: int32, real64
+  use kinds, only: int32
   use box_geometry, only: next_obstacle, next_side
-  use neighbour_search, only: earliest_contact, neighbour_search_t
+  use neighbour_search, only: earliest_contact, list_capacity, neighbour_search_t, prospect_t
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -11,7 +11,6 @@ module all_pairs
 
   type, extends(neighbour_search_t) :: all_pairs_t
     private
-    integer(int32), allocatable :: disk(:)         !! 0, 1, ..., n - 1, as the kernel counts them
     integer(int32), allocatable :: obstacle(:)     !! 1, 2, ...
   contains
     procedure :: build
@@ -21,14 +20,13 @@ module all_pairs
 
 contains
 
+  !> Notes how many obstacles there are.
   subroutine build(self, sim)
     class(all_pairs_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32) :: k
+    integer(int32) :: m
 
-    self%disk = [(k - 1, k=1, sim%n_disks())]
-    self%obstacle = [integer(int32) ::]
-    if (sim%box%obstructed()) self%obstacle = [(k, k=1, size(sim%box%obstacle, kind=int32))]
+    self%obstacle = [(m, m=1, sim%box%n_obstacles())]
   end subroutine build
 
   !> The earliest of: side, obstacle, any disk. All disks are inside the box until one passes a periodic
@@ -37,23 +35,24 @@ contains
     class(all_pairs_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    real(real64) :: t, edges(2)
-    integer(int32) :: code, image_x, image_y
-    integer(int32) :: reach(2)
+    type(prospect_t) :: near
+    integer(int32) :: first, k, image_x, image_y, reach(2)
 
-    call next_side(sim%box, sim%disk(i), t, code)
-    call next_obstacle(sim%box, sim%disk(i), self%obstacle, t, code)
-    edges = sim%box%edges()
+    call next_side(sim%box, sim%disk(i), near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), self%obstacle, near%time, near%partner)
     reach = merge(1, 0, sim%box%periodic)
-    do image_y = -reach(2), reach(2)
-      do image_x = -reach(1), reach(1)
-        call earliest_contact(sim%disk, i, sim%n_disks(), self%disk, sim%now, .false., .true., sim%box%gravity, &
-          t, code, [image_x, image_y]*edges)
+    do first = 0, sim%n_disks() - 1, list_capacity
+      near%n = min(list_capacity, sim%n_disks() - first)
+      near%list(:near%n) = [(first + k, k=0, near%n - 1)]
+      do image_y = -reach(2), reach(2)
+        do image_x = -reach(1), reach(1)
+          call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, [image_x, image_y]*sim%box%edges())
+        end do
       end do
     end do
-    sim%disk(i)%event_time = t
-    sim%disk(i)%partner = code
-    if (code > 0) sim%tag(i)%partner_stamp = sim%disk(code)%stamp
+    sim%disk(i)%event_time = near%time
+    sim%disk(i)%partner = near%partner
+    if (near%partner > 0) sim%tag(i)%partner_stamp = sim%disk(near%partner)%stamp
   end subroutine predict
 
   !> There are no cells to cross: the disk has only passed a periodic side.

@@ -4,13 +4,14 @@
 !> along its rim: nobody pays for a size that is not near.
 module big_disks
   use kinds, only: int32, real64
+  use cell_faces, only: cell_faces_t
   use disks, only: disk_t
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: big_disks_t, largest_small_radius, ring_cell_t
 
-  integer(int32), parameter :: most = 256        !! they test each other all with all
+  integer(int32), parameter :: most_big_disks = 256    !! they test each other all with all
 
   !> A cell along the rim of a big disk.
   type :: ring_cell_t
@@ -23,11 +24,11 @@ module big_disks
   end type ring_t
 
   !> A big disk in the list of a cell.
-  type :: entry_t
+  type :: listing_t
     integer(int32) :: number = 0                 !! of the big disk
     integer(int32) :: image(2) = 0
     integer(int32) :: next = 0                   !! entry in the same list; 0: none
-  end type entry_t
+  end type listing_t
 
   type :: big_disks_t
     integer(int32) :: count = 0
@@ -37,7 +38,7 @@ module big_disks
     real(real64) :: small = 0.0_real64           !! largest radius of the other disks [length]
     real(real64) :: margin = 0.0_real64          !! [length]
     integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none
-    type(entry_t), allocatable :: entry(:)
+    type(listing_t), allocatable :: listing(:)
     integer(int32), private :: free = 0          !! first of the entries not in use
     real(real64), private :: width(2) = 0.0_real64    !! from cell to cell [length]
     real(real64), private :: half(2) = 0.0_real64     !! of a cell's extent [length]
@@ -59,30 +60,29 @@ contains
     do
       next = maxval(disk%radius, mask=disk%radius <= 0.5_real64*radius)
       n_bigger = count(disk%radius > next)
-      if (.not. next > 0 .or. n_bigger > most .or. 20*n_bigger > size(disk)) exit
+      if (.not. next > 0 .or. n_bigger > most_big_disks .or. 20*n_bigger > size(disk)) exit
       radius = next
     end do
   end function largest_small_radius
 
   !> Finds the disks bigger than `small` and registers them in n(1) columns and n(2) rows of cells.
-  subroutine start(self, sim, small, n, width, overlap)
+  subroutine start(self, sim, small, n, faces)
     class(big_disks_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: small            !! [length]
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: width(2)         !! from cell to cell [length]
-    real(real64), intent(in) :: overlap(2)       !! of neighbouring cells [length]
+    type(cell_faces_t), intent(in) :: faces
     integer(int32) :: i, k
 
     self%disk = pack([(i, i=1, sim%n_disks())], sim%disk%radius > small)
     self%count = size(self%disk, kind=int32)
     self%small = small
     if (self%count == 0) return
-    self%width = width
-    self%half = 0.5_real64*(width + overlap)
-    self%margin = 0.5_real64*minval(width)
-    if (allocated(self%ring)) deallocate (self%ring, self%centre, self%first, self%entry)
-    allocate (self%ring(self%count), self%centre(2, self%count), self%first(n(1), n(2)), self%entry(0))
+    self%width = faces%width
+    self%half = 0.5_real64*(faces%width + faces%overlap)
+    self%margin = 0.5_real64*minval(faces%width)
+    if (allocated(self%ring)) deallocate (self%ring, self%centre, self%first, self%listing)
+    allocate (self%ring(self%count), self%centre(2, self%count), self%first(n(1), n(2)), self%listing(0))
     self%first = 0
     self%free = 0
     do k = 1, self%count
@@ -110,12 +110,12 @@ contains
     integer :: m
 
     do m = 1, size(self%ring(k)%at)
-      call leave(self, self%ring(k)%at(m)%cell, k)
+      call unlist(self, self%ring(k)%at(m)%cell, k)
     end do
     self%centre(:, k) = sim%position(self%disk(k))
     call find_ring(self, sim, k)
     do m = 1, size(self%ring(k)%at)
-      call enter(self, self%ring(k)%at(m), k)
+      call list_in(self, self%ring(k)%at(m), k)
     end do
   end subroutine register
 
@@ -152,46 +152,46 @@ contains
   end subroutine find_ring
 
   !> Adds the k-th big disk to the list of a cell.
-  subroutine enter(self, place, k)
+  subroutine list_in(self, place, k)
     class(big_disks_t), intent(inout) :: self
     type(ring_cell_t), intent(in) :: place
     integer(int32), intent(in) :: k
-    type(entry_t), allocatable :: more(:)
+    type(listing_t), allocatable :: more(:)
     integer(int32) :: e, n
 
     if (self%free == 0) then
-      n = size(self%entry, kind=int32)
+      n = size(self%listing, kind=int32)
       allocate (more(2*n + 64))
-      more(:n) = self%entry
+      more(:n) = self%listing
       more(n + 1:)%next = [(e, e=n + 2, size(more, kind=int32)), 0]
-      call move_alloc(more, self%entry)
+      call move_alloc(more, self%listing)
       self%free = n + 1
     end if
     e = self%free
-    self%free = self%entry(e)%next
-    self%entry(e) = entry_t(k, place%image, self%first(place%cell(1), place%cell(2)))
+    self%free = self%listing(e)%next
+    self%listing(e) = listing_t(k, place%image, self%first(place%cell(1), place%cell(2)))
     self%first(place%cell(1), place%cell(2)) = e
-  end subroutine enter
+  end subroutine list_in
 
   !> Removes the k-th big disk from the list of a cell, once.
-  subroutine leave(self, cell, k)
+  subroutine unlist(self, cell, k)
     class(big_disks_t), intent(inout) :: self
     integer(int32), intent(in) :: cell(2), k
     integer(int32) :: e, before
 
     before = 0
     e = self%first(cell(1), cell(2))
-    do while (self%entry(e)%number /= k)
+    do while (self%listing(e)%number /= k)
       before = e
-      e = self%entry(e)%next
+      e = self%listing(e)%next
     end do
     if (before == 0) then
-      self%first(cell(1), cell(2)) = self%entry(e)%next
+      self%first(cell(1), cell(2)) = self%listing(e)%next
     else
-      self%entry(before)%next = self%entry(e)%next
+      self%listing(before)%next = self%listing(e)%next
     end if
-    self%entry(e)%next = self%free
+    self%listing(e)%next = self%free
     self%free = e
-  end subroutine leave
+  end subroutine unlist
 
 end module big_disks

@@ -6,13 +6,11 @@ module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, side_time
   use disks, only: disk_t
-  use free_flight, only: flight, flight_velocity, time_to_line
-  use neighbour_search, only: first_crossing
+  use free_flight, only: flight, flight_velocity, slowest, time_to_line
+  use partners, only: crossing, is_wall, sense_of, side_crossed
   implicit none
   private
   public :: cell_faces_t
-
-  real(real64), parameter :: slowest = 1/never     !! a disk slower than this is at rest
 
   !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
   type :: line_t
@@ -66,8 +64,8 @@ contains
     allocate (line(0:1, n))
     do k = 1, n - 1
       face = self%box%lower(axis) + self%width(axis)*k
-      line(1, k) = line_t(face + 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + high)
-      line(0, k + 1) = line_t(face - 0.5_real64*self%overlap(axis), 0.0_real64, first_crossing + low)
+      line(1, k) = line_t(face + 0.5_real64*self%overlap(axis), 0.0_real64, crossing(high))
+      line(0, k + 1) = line_t(face - 0.5_real64*self%overlap(axis), 0.0_real64, crossing(low))
     end do
     line(0, 1) = line_t(self%box%lower(axis), inset, low)
     line(1, n) = line_t(self%box%upper(axis), -inset, high)
@@ -86,7 +84,7 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), self%box%gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Along one axis: a step into the next cell if the disk is in that one too, and goes there. No branch, as in `next`.
+  !> Along one axis: a step into the next cell if the disk is in that one too, and moves towards it.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s
@@ -97,8 +95,17 @@ contains
 
     up = merge(1, 0, flight_velocity(v, g, s) > 0)
     left = abs(line(up, cell)%place - flight(x, v, g, s))
-    step = int(iand(2*up - 1, -merge(1, 0, left < overlap .and. line(up, cell)%code <= first_crossing)), int16)
+    step = int(chosen(0_int32, 2*up - 1, left < overlap .and. .not. is_wall(line(up, cell)%code)), int16)
   end function ahead
+
+  !> `second` if the condition holds, else `first`. Which is a toss-up: this is done without a branch.
+  elemental function chosen(first, second, condition) result(n)
+    integer(int32), intent(in) :: first, second
+    logical, intent(in) :: condition
+    integer(int32) :: n
+
+    n = ieor(first, iand(-merge(1, 0, condition), ieor(first, second)))
+  end function chosen
 
   !> When and how the disk leaves its cell, or meets a side within it.
   pure subroutine next(self, disk, cell, now, falling, t, code)
@@ -113,40 +120,40 @@ contains
     if (falling) then
       call self%next_falling(disk, cell, now, t, code)
     else
-      call next_of(self%column, self%row, disk%x, disk%v, disk%clock, disk%radius, cell, t, code)
+      call next_straight(self%column, self%row, disk, cell, t, code)
     end if
   end subroutine next
 
-  !> On a straight line; which axis and which way are toss-ups: no branch on them.
-  pure subroutine next_of(column, row, x, v, clock, radius, cell, t, code)
+  !> On a straight line. Which axis and which way are toss-ups: no branch on them.
+  pure subroutine next_straight(column, row, disk, cell, t, code)
     type(line_t), intent(in) :: column(0:1, *), row(0:1, *)
-    real(real64), intent(in) :: x(2), v(2), clock, radius
+    type(disk_t), intent(in) :: disk
     integer(int16), intent(in) :: cell(2)
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
     real(real64) :: t_x, t_y
-    integer(int32) :: up_x, up_y, code_x, code_y
+    integer(int32) :: up_x, up_y
 
-    up_x = merge(1, 0, v(1) > 0)
-    up_y = merge(1, 0, v(2) > 0)
-    t_x = line_time(column(up_x, cell(1)), x(1), v(1), clock, radius)
-    t_y = line_time(row(up_y, cell(2)), x(2), v(2), clock, radius)
-    code_x = column(up_x, cell(1))%code
-    code_y = row(up_y, cell(2))%code
-    code = ieor(code_x, iand(-merge(1, 0, t_y < t_x), ieor(code_x, code_y)))
+    up_x = merge(1, 0, disk%v(1) > 0)
+    up_y = merge(1, 0, disk%v(2) > 0)
+    t_x = line_time(column(up_x, cell(1)), disk, 1)
+    t_y = line_time(row(up_y, cell(2)), disk, 2)
+    code = chosen(column(up_x, cell(1))%code, row(up_y, cell(2))%code, t_y < t_x)
     t = merge(t_y, t_x, t_y < t_x)
-  end subroutine next_of
+  end subroutine next_straight
 
-  !> When a disk on its way to a line reaches it. Contact with a side comes out as `side_time` has it: it is one
-  !> event, whoever predicts it.
-  pure function line_time(line, x, v, clock, radius) result(t)
+  !> When a disk reaches a line across an axis that it moves towards. Contact with a side comes out as `side_time` has
+  !> it, to the last bit: it is one event, whoever predicts it.
+  pure function line_time(line, disk, axis) result(t)
     type(line_t), intent(in) :: line
-    real(real64), intent(in) :: x, v, clock, radius
+    type(disk_t), intent(in) :: disk
+    integer, intent(in) :: axis
     real(real64) :: t, speed
 
-    speed = abs(v)
-    t = ((line%place + line%inset*radius) - x)/sign(merge(speed, slowest, speed > slowest), v)
-    t = clock + merge(t, 0.0_real64, t > 0)
+    speed = abs(disk%v(axis))
+    t = ((line%place + line%inset*disk%radius) - disk%x(axis))/ &
+      sign(merge(speed, slowest, speed > slowest), disk%v(axis))
+    t = disk%clock + merge(t, 0.0_real64, t > 0)
     t = merge(t, never, speed > slowest)
   end function line_time
 
@@ -158,17 +165,17 @@ contains
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: t_y
-    integer(int32) :: code_y
+    real(real64) :: t_x, t_y
+    integer(int32) :: code_x, code_y
 
-    call leave(self%column(:, cell(1)), 1, self%box, disk, now, t, code)
-    call leave(self%row(:, cell(2)), 2, self%box, disk, now, t_y, code_y)
-    code = ieor(code, iand(-merge(1, 0, t_y < t), ieor(code, code_y)))
-    t = merge(t_y, t, t_y < t)
+    call next_along(self%column(:, cell(1)), 1, self%box, disk, now, t_x, code_x)
+    call next_along(self%row(:, cell(2)), 2, self%box, disk, now, t_y, code_y)
+    code = chosen(code_x, code_y, t_y < t_x)
+    t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
   !> The same along one axis.
-  pure subroutine leave(line, axis, box, disk, now, t, code)
+  pure subroutine next_along(line, axis, box, disk, now, t, code)
     type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
     integer(int32), intent(in) :: axis
     type(box_t), intent(in) :: box
@@ -176,22 +183,22 @@ contains
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
     integer(int32), intent(out) :: code
-    real(real64) :: g, x, v, sense, gap, disc
+    real(real64) :: g, x, v, sense, gap, disc, t_other
     integer(int32) :: up
 
     g = box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
     if (.not. abs(g) > 0) then
-      t = line_time(line(up), disk%x(axis), disk%v(axis), disk%clock, disk%radius)
-    else if (any(line%code > first_crossing)) then
-      t = falling_time(line(up), up, axis, box, disk, now)
-      x = falling_time(line(1 - up), 1 - up, axis, box, disk, now)
-      up = ieor(up, merge(1, 0, x < t))
-      t = min(t, x)
+      t = line_time(line(up), disk, axis)
+    else if (any(is_wall(line%code))) then
+      t = falling_time(line(up), axis, box, disk, now)
+      t_other = falling_time(line(1 - up), axis, box, disk, now)
+      up = chosen(up, 1 - up, t_other < t)
+      t = min(t, t_other)
     else                                           ! forward, or, if gravity turns the disk before, back
       x = flight(disk%x(axis), disk%v(axis), g, now - disk%clock)
       v = flight_velocity(disk%v(axis), g, now - disk%clock)
-      up = merge(1, 0, v > -g*moment(now))
+      up = merge(1, 0, v > -g*resolution(now))
       sense = 2*up - 1                             ! the roots of `time_to_line`, whose case is known here
       gap = max(sense*(line(up)%place - x), 0.0_real64)
       disc = (v*v + tiny(v)) + 2*sense*g*gap       ! not zero if at rest on the face
@@ -204,37 +211,36 @@ contains
       end if
     end if
     code = line(up)%code
-  end subroutine leave
+  end subroutine next_along
 
-  !> When a falling disk reaches a face or side. The root before `now`, where it came in, is not the one.
-  pure function falling_time(line, up, axis, box, disk, now) result(t)
+  !> When a falling disk reaches a face or side. The root before `now`, when it came in, is not the one.
+  pure function falling_time(line, axis, box, disk, now) result(t)
     type(line_t), intent(in) :: line
-    integer(int32), intent(in) :: up               !! 1: the upper one along the axis, 0: the lower
     integer(int32), intent(in) :: axis
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     real(real64) :: t, sense, g
 
-    if (line%code > first_crossing) then
+    if (is_wall(line%code)) then
       t = side_time(box, disk, line%code)
       return
     end if
     t = never
-    sense = 2*up - 1
+    sense = sense_of(side_crossed(line%code))
     g = box%gravity(axis)
-    if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + moment(now)) <= 0 &
+    if (sense*flight_velocity(disk%v(axis), g, now - disk%clock + resolution(now)) <= 0 &
       .and. sense*g < 0) return                    ! flies away from it, ever faster
     t = max(now, disk%clock + time_to_line(sense*(line%place - disk%x(axis)), sense*disk%v(axis), sense*g))
   end function falling_time
 
-  !> The least while after `now` that a time can tell. A disk that turns at a face within it would else go through
-  !> that face to and fro and come to no later time.
-  elemental function moment(now)
+  !> Smallest resolvable time step at `now`; without it a disk that turns at a face could cross it back and forth
+  !> for ever.
+  elemental function resolution(now)
     real(real64), intent(in) :: now
-    real(real64) :: moment
+    real(real64) :: resolution
 
-    moment = 4*epsilon(now)*now + tiny(now)
-  end function moment
+    resolution = 4*epsilon(now)*now + tiny(now)
+  end function resolution
 
 end module cell_faces

@@ -2,34 +2,34 @@
 !> its own cell and the eight around it before it leaves its cell, which is an event like any other. Wider cells
 !> overlap (see `cell_faces`).
 module cell_grid
-  use kinds, only: int16, int32, int64, real64
+  use kinds, only: int16, int32, real64
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
+  use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: cell_faces_t
-  use cells, only: append, cell_t, cells_t, gather, list_capacity
+  use cell_scans, only: scan_around_edge, scan_cell, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
-  use neighbour_search, only: earliest_contact, first_crossing, neighbour_search_t
+  use neighbour_search, only: earliest_contact, latest_clock, neighbour_search_t, no_gravity, prospect_t
   use obstacle_lists, only: obstacle_lists_t
-  use outlook, only: look_around, outlook_t
+  use partners, only: axis_of, is_wall, leaves_margin, sense_of, side_crossed
+  use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none
   private
   public :: cell_grid_t
 
+  !> Tuning. Fewer disks per cell mean fewer candidates, but more crossings of faces.
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
-  real(real64), parameter :: spacious = 1.2_real64          !! cell, in diameters: wide enough for choosing to pay
-  real(real64), parameter :: spare_width = 1.0e-6_real64    !! relative, above all rounding
-  integer(int32), parameter :: leaves_margin = first_crossing - 4   !! event of a big disk
+  real(real64), parameter :: spacious = 1.2_real64          !! width of cells, in diameters, from which choosing pays
 
   type, extends(neighbour_search_t) :: cell_grid_t
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
-    logical :: obstructed = .false.                !! there are obstacles
-    logical :: chosen = .false.                    !! colliding disks choose among the cells that they are in
-    type(big_disks_t) :: big                       !! disks much larger than those the cells are made for
-    type(cells_t) :: cells                         !! numbered row by row, with a ring of empty ones around
+    logical :: roomy = .false.                     !! cells overlap: a disk that collides chooses its cell anew
+    type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
+    type(cell_contents_t) :: cells                 !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
   contains
     procedure :: build
@@ -37,8 +37,8 @@ module cell_grid
     procedure :: predict_both
     procedure :: cross
     procedure :: read_ahead
-    procedure, private :: predict_special
-    procedure, private :: scan_crowd, follow_big
+    procedure, private :: predict_with_care        ! bound, so that it is not inlined into the hot path
+    procedure, private :: follow_big
   end type cell_grid_t
 
 contains
@@ -52,11 +52,11 @@ contains
     integer(int16) :: ix, iy
 
     small = largest_small_radius(sim%disk)
-    reach = 2*small*(1 + spare_width)
+    reach = 2*small*(1 + spare)
     width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
     self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
     call self%faces%set(sim%box, self%n, reach)
-    self%chosen = any(self%faces%width > spacious*reach)
+    self%roomy = any(self%faces%width > spacious*reach)
     call self%cells%empty(self%n(1) + 2, self%n(2) + 2, sim%n_disks())
     do i = 1, sim%n_disks()
       x = (sim%position(i) - sim%box%lower)/self%faces%width
@@ -67,30 +67,28 @@ contains
         call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
       end if
     end do
-    self%obstructed = sim%box%obstructed()
-    if (self%obstructed) call self%obstacles%renew(sim%box, small, self%n, self%faces%width, self%faces%overlap)
-    call self%big%start(sim, small, self%n, self%faces%width, self%faces%overlap)
-    if (.not. (any(sim%box%periodic) .or. self%obstructed .or. self%big%count > 0)) return
+    call self%obstacles%renew(sim%box, small, self%n, self%faces)
+    call self%big%start(sim, small, self%n, self%faces)
+    if (.not. any(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. self%big%count == 0) return
     do iy = 1, int(self%n(2), int16)
       do ix = 1, int(self%n(1), int16)
-        call mark_special(self, [ix, iy])
+        call mark(self, [ix, iy])
       end do
     end do
   end subroutine build
 
   !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
-  subroutine mark_special(self, cell)
+  subroutine mark(self, cell)
     class(cell_grid_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
-    logical :: yes
+    logical :: special
 
-    yes = at_periodic_edge(self, cell)
-    if (self%obstructed) yes = yes .or. self%obstacles%reach_into(cell)
-    if (self%big%count > 0) yes = yes .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
-    call self%cells%mark(self%cells%number(cell), yes)
-  end subroutine mark_special
+    special = at_periodic_edge(self, cell) .or. self%obstacles%reach_into(cell)
+    if (self%big%count > 0) special = special .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
+    call self%cells%mark(self%cells%number(cell), special)
+  end subroutine mark
 
-  !> Registers a big disk anew. The cells it leaves and those it comes to change their marks.
+  !> Registers a big disk anew. The cells that it leaves and those that it reaches change their marks.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -102,18 +100,18 @@ contains
     call self%big%register(sim, number)
     ring = [ring, self%big%ring(number)%at]
     do m = 1, size(ring)
-      call mark_special(self, int(ring(m)%cell, int16))
+      call mark(self, int(ring(m)%cell, int16))
     end do
   end subroutine follow_big
 
   !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
-  !> predicts what it meets there.
+  !> predicts there.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: face, axis, there
+    integer(int32) :: side, axis, there
     integer(int16) :: cell(2)
 
     if (sim%disk(i)%radius > self%big%small) then
@@ -121,20 +119,21 @@ contains
       call self%predict(sim, i)
       return
     end if
-    face = -merge(code - first_crossing, code, code <= first_crossing)
-    axis = 1 + face/2
+    side = code
+    if (.not. is_wall(code)) side = side_crossed(code)
+    axis = axis_of(side)
     cell = sim%tag(i)%cell
-    there = cell(axis) + 2*modulo(face, 2) - 1
+    there = cell(axis) + sense_of(side)
     if (there < 1) there = self%n(axis)
     if (there > self%n(axis)) there = 1
     cell(axis) = int(there, int16)
-    if (self%chosen) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
+    if (self%roomy) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Lets disk i, which has just collided, choose its cell.
-  subroutine settle(self, disk, tag, i)
+  !> Chooses the cell of disk i anew after a collision.
+  subroutine choose_cell(self, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk
     type(tag_t), intent(inout) :: tag
@@ -145,7 +144,7 @@ contains
     cell = tag%cell
     call self%faces%choose_cell(disk, disk%clock, cell)
     if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
-  end subroutine settle
+  end subroutine choose_cell
 
   !> Moves disk i into another cell.
   subroutine move(self, tag, i, cell)
@@ -164,16 +163,17 @@ contains
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    logical :: done
 
-    if (self%faces%falling) then                   ! said in so many words, the compiler makes a version for each
-      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, done)
+    if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care()) then
+      call self%predict_with_care(sim, i)
+    else if (self%faces%falling) then              ! literals let the compiler specialise the kernel
+      call predict_one(self, sim%disk, sim%tag, sim%now, 0, i)
     else
-      call predict_in_bulk(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, done)
+      call predict_one(self, sim%disk, sim%tag, sim%now, no_gravity, i)
     end if
-    if (.not. done) call self%predict_special(sim, i)    ! by dispatch, which keeps it out of the way of the bulk
   end subroutine predict
 
+  !> Prefetches what predictions of some disks will read.
   subroutine read_ahead(self, sim, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -183,169 +183,162 @@ contains
     call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
   end subroutine read_ahead
 
-  !> The same for two disks that have just collided. What comes before the tests of candidates is done for both
-  !> first: it need not wait for those.
+  !> Predicts the disks i and j, which have just collided.
   subroutine predict_both(self, sim, i, j)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    logical :: done
 
-    if (self%chosen) then
-      call settle(self, sim%disk(i), sim%tag(i), i)
-      call settle(self, sim%disk(j), sim%tag(j), j)
+    if (self%roomy) then
+      call choose_cell(self, sim%disk(i), sim%tag(i), i)
+      call choose_cell(self, sim%disk(j), sim%tag(j), j)
     end if
-    if (self%faces%falling) then
-      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .true., i, j, done)
+    if (self%cells%cell(self%cells%number(sim%tag(i)%cell))%needs_care() .or. &
+      self%cells%cell(self%cells%number(sim%tag(j)%cell))%needs_care()) then
+      call self%predict(sim, i)
+      call self%predict(sim, j)
+    else if (self%faces%falling) then
+      call predict_two(self, sim%disk, sim%tag, sim%now, latest_clock, i, j)
     else
-      call predict_two(self, self%cells%cell, sim%disk, sim%tag, sim%now, .false., i, j, done)
+      call predict_two(self, sim%disk, sim%tag, sim%now, latest_clock + no_gravity, i, j)
     end if
-    if (done) return
-    call self%predict(sim, i)
-    call self%predict(sim, j)
   end subroutine predict_both
 
-  !> Not done where there is more than small disks and walls.
-  subroutine predict_two(self, cell, disk, tag, now, falling, i, j, done)
+  !> Predicts two disks in plain cells. All that precedes the tests of candidates is done for both first, as it
+  !> does not wait for the tests.
+  subroutine predict_two(self, disk, tag, now, known, i, j)
     class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    logical, value :: falling
-    integer(int32), value :: i, j
-    logical, intent(out) :: done
-    type(outlook_t) :: near_i, near_j
+    integer(int32), value :: known, i, j
+    type(prospect_t) :: near_i, near_j
 
-    done = .not. (cell(self%cells%number(tag(i)%cell))%is_marked() .or. cell(self%cells%number(tag(j)%cell))%is_marked())
-    if (.not. done) return
-    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near_i)
-    call look_around(self%faces, self%cells, cell, disk(j), tag(j), now, falling, j, near_j)
-    call expect_first(self, cell, disk, tag(i), now, falling, i, near_i, .true.)
-    call expect_first(self, cell, disk, tag(j), now, falling, j, near_j, .true.)
+    call survey(self, disk(i), tag(i), now, known, i, near_i)
+    call survey(self, disk(j), tag(j), now, known, j, near_j)
+    call take_earliest(self, disk, tag(i), now, known, i, near_i)
+    call take_earliest(self, disk, tag(j), now, known, j, near_j)
   end subroutine predict_two
 
-  !> Likewise for one disk.
-  subroutine predict_in_bulk(self, cell, disk, tag, now, falling, i, done)
+  !> Predicts one disk in a plain cell.
+  subroutine predict_one(self, disk, tag, now, known, i)
     class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    logical, value :: falling
-    integer(int32), value :: i
-    logical, intent(out) :: done
-    type(outlook_t) :: near
+    integer(int32), value :: known, i
+    type(prospect_t) :: near
 
-    done = .not. cell(self%cells%number(tag(i)%cell))%is_marked()
-    if (.not. done) return
-    call look_around(self%faces, self%cells, cell, disk(i), tag(i), now, falling, i, near)
-    call expect_first(self, cell, disk, tag(i), now, falling, i, near, .false.)
-  end subroutine predict_in_bulk
+    call survey(self, disk(i), tag(i), now, known, i, near)
+    call take_earliest(self, disk, tag(i), now, known, i, near)
+  end subroutine predict_one
 
-  !> Writes into disk i the first of what it can expect.
-  subroutine expect_first(self, cell, disk, tag, now, falling, i, near, fresh)
+  !> When disk i leaves its cell, and whom it can meet before.
+  subroutine survey(self, disk, tag, now, known, i, near)
     class(cell_grid_t), intent(in) :: self
-    type(cell_t), intent(in) :: cell(0:*)
+    type(disk_t), intent(in) :: disk
+    type(tag_t), intent(in) :: tag
+    real(real64), intent(in) :: now
+    integer(int32), value :: known, i
+    type(prospect_t), intent(out) :: near
+
+    call self%faces%next(disk, tag%cell, now, iand(known, no_gravity) == 0, near%time, near%partner)
+    near%cell = self%cells%number(tag%cell)
+    call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
+  end subroutine survey
+
+  !> Writes into disk i the earliest of the events in prospect.
+  subroutine take_earliest(self, disk, tag, now, known, i, near)
+    class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(inout) :: disk(*)
     type(tag_t), intent(inout) :: tag
     real(real64), intent(in) :: now
-    logical, value :: falling
-    integer(int32), value :: i
-    type(outlook_t), intent(in) :: near
-    logical, intent(in) :: fresh
-    real(real64) :: t
-    integer(int32) :: code
+    integer(int32), value :: known, i
+    type(prospect_t), intent(inout) :: near
 
-    t = near%time
-    code = near%code
-    if (cell(near%cell)%near_crowd()) call self%scan_crowd(disk, i, near%cell, now, t, code)
-    call earliest_contact(disk, i, near%n, near%list, now, fresh, falling, self%faces%box%gravity, t, code)
-    disk(i)%event_time = t
-    disk(i)%partner = code
-    tag%partner_stamp = disk(max(code, 1))%stamp   ! without a branch; of use if code > 0
-  end subroutine expect_first
+    call earliest_contact(disk, i, near, now, self%faces%box%gravity, known)
+    disk(i)%event_time = near%time
+    disk(i)%partner = near%partner
+    tag%partner_stamp = disk(max(near%partner, 1))%stamp   ! without a branch; used if partner > 0
+  end subroutine take_earliest
 
-  !> Everywhere else.
-  subroutine predict_special(self, sim, i)
+  !> Predicts a disk where there is more than nine cells with a few small disks each.
+  subroutine predict_with_care(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    real(real64) :: t
-    integer(int32) :: code
+    type(prospect_t) :: near
 
     if (sim%disk(i)%radius > self%big%small) then
-      call foresee_big(self, sim, i, t, code)
+      call find_event_of_big(self, sim, i, near)
     else
-      call foresee_small(self, sim, i, t, code)
+      call find_event_of_small(self, sim, i, near)
     end if
-    sim%disk(i)%event_time = t
-    sim%disk(i)%partner = code
-    sim%tag(i)%partner_stamp = sim%disk(max(code, 1))%stamp
-  end subroutine predict_special
+    sim%disk(i)%event_time = near%time
+    sim%disk(i)%partner = near%partner
+    sim%tag(i)%partner_stamp = sim%disk(max(near%partner, 1))%stamp
+  end subroutine predict_with_care
 
-  !> The earliest event of a small disk in a marked cell.
-  subroutine foresee_small(self, sim, i, t, code)
+  !> The earliest event of a small disk.
+  subroutine find_event_of_small(self, sim, i, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
-    integer(int32) :: c, n, e, list(list_capacity)
+    type(prospect_t), intent(out) :: near
+    integer(int32) :: e
 
-    call self%faces%next(sim%disk(i), sim%tag(i)%cell, sim%now, self%faces%falling, t, code)
-    c = self%cells%number(sim%tag(i)%cell)
-    if (self%obstructed) call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i)%cell, t, code)
-    if (at_periodic_edge(self, sim%tag(i)%cell)) then
-      call scan_around_edge(self, sim, i, t, code)
-    else
-      call gather(self%cells%cell, c, self%cells%stride, i, list, n)
-      call earliest_contact(sim%disk, i, n, list, sim%now, .false., self%faces%falling, self%faces%box%gravity, t, code)
-      if (self%cells%cell(c)%near_crowd()) call self%scan_crowd(sim%disk, i, c, sim%now, t, code)
-    end if
-    if (self%big%count == 0) return
-    e = self%big%first(sim%tag(i)%cell(1), sim%tag(i)%cell(2))
+    associate (cell => sim%tag(i)%cell)
+      call survey(self, sim%disk(i), sim%tag(i), sim%now, merge(0, no_gravity, self%faces%falling), i, near)
+      call self%obstacles%next_contact(sim%box, sim%disk(i), cell, near%time, near%partner)
+      if (at_periodic_edge(self, cell)) then
+        call scan_around_edge(self%cells, self%n, sim, i, near)
+      else
+        call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
+        call scan_chains_around(self%cells, sim, i, near)
+      end if
+      if (self%big%count == 0) return
+      e = self%big%first(cell(1), cell(2))
+    end associate
     do while (e > 0)
-      associate (entry => self%big%entry(e))
-        call earliest_contact(sim%disk, i, 1, [self%big%disk(entry%number) - 1], sim%now, .false., .true., &
-          self%faces%box%gravity, t, code, entry%image*sim%box%edges())
-        e = entry%next
+      associate (listing => self%big%listing(e))
+        call scan_one(sim, i, self%big%disk(listing%number), listing%image*sim%box%edges(), near)
+        e = listing%next
       end associate
     end do
-  end subroutine foresee_small
+  end subroutine find_event_of_small
 
   !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
   !> the cells along its rim.
-  subroutine foresee_big(self, sim, i, t, code)
+  subroutine find_event_of_big(self, sim, i, near)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
-    real(real64), intent(out) :: t
-    integer(int32), intent(out) :: code
+    type(prospect_t), intent(out) :: near
     real(real64) :: t_margin
-    integer(int32) :: number, ix, iy, m
+    integer(int32) :: number, ix, iy, m, reach(2)
 
     number = self%big%number_of(i)
-    call next_side(sim%box, sim%disk(i), t, code)
-    if (self%obstructed) call next_obstacle(sim%box, sim%disk(i), &
-      [(m, m=1, size(sim%box%obstacle, kind=int32))], t, code)
+    call next_side(sim%box, sim%disk(i), near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), [(m, m=1, sim%box%n_obstacles())], near%time, near%partner)
     t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
       sim%box%gravity, self%big%margin, inside=.true.)
-    code = merge(leaves_margin, code, t_margin < t)
-    t = min(t, t_margin)
-    do iy = merge(-1, 0, sim%box%periodic(2)), merge(1, 0, sim%box%periodic(2))
-      do ix = merge(-1, 0, sim%box%periodic(1)), merge(1, 0, sim%box%periodic(1))
-        call earliest_contact(sim%disk, i, self%big%count, self%big%disk - 1, sim%now, .false., .true., &
-          self%faces%box%gravity, t, code, [ix, iy]*sim%box%edges())
+    if (t_margin < near%time) near%partner = leaves_margin
+    near%time = min(near%time, t_margin)
+    reach = merge(1, 0, sim%box%periodic)
+    do iy = -reach(2), reach(2)
+      do ix = -reach(1), reach(1)
+        do m = 1, self%big%count
+          call scan_one(sim, i, self%big%disk(m), [ix, iy]*sim%box%edges(), near)
+        end do
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
-        call scan_cell(self, sim, i, place%cell(1) + self%cells%stride*place%cell(2), &
-          -place%image*sim%box%edges(), t, code)
+        call scan_cell(self%cells, sim, i, place%cell(1) + self%cells%stride*place%cell(2), &
+          -place%image*sim%box%edges(), near)
       end associate
     end do
-  end subroutine foresee_big
+  end subroutine find_event_of_big
 
   !> Whether the cells around lie partly beyond a periodic side.
   pure function at_periodic_edge(self, cell) result(yes)
@@ -355,95 +348,5 @@ contains
 
     yes = any(self%faces%box%periodic .and. (cell == 1 .or. cell == self%n))
   end function at_periodic_edge
-
-  !> Contacts with the chained disks of the nine cells around c.
-  pure subroutine scan_crowd(self, disk, i, c, now, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk(*)
-    integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: now
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    integer(int32) :: k, m
-
-    do k = c - self%cells%stride, c + self%cells%stride, self%cells%stride
-      do m = k - 1, k + 1
-        call scan_chain(self, disk, i, m, now, t, code)
-      end do
-    end do
-  end subroutine scan_crowd
-
-  !> Contacts with the chained disks of the crowded cell c.
-  pure subroutine scan_chain(self, disk, i, c, now, t, code, shift)
-    class(cell_grid_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk(*)
-    integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: now
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    real(real64), intent(in), optional :: shift(2) !! of the cell, seen there [length]
-    integer(int32) :: list(list_capacity), n, j
-
-    j = self%cells%chain(c)
-    do while (j > 0)
-      n = 0
-      do while (j > 0 .and. n < list_capacity)
-        n = n + 1
-        list(n) = j - 1
-        j = self%cells%next(j)
-      end do
-      call earliest_contact(disk, i, n, list, now, .false., .true., self%faces%box%gravity, t, code, shift)
-    end do
-  end subroutine scan_chain
-
-  !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
-  !> together. In a box of fewer than three columns a cell stands for several of its images.
-  subroutine scan_around_edge(self, sim, i, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-    real(real64) :: shift(2)
-    integer(int32) :: there(2, -1:1), image(2, -1:1), k, image_x, image_y, dx, dy, c, list(list_capacity)
-    integer(int64) :: n
-
-    do k = -1, 1
-      there(:, k) = sim%tag(i)%cell + k
-      image(:, k) = merge(merge(1, 0, there(:, k) > self%n) - merge(1, 0, there(:, k) < 1), 0, sim%box%periodic)
-      there(:, k) = there(:, k) - image(:, k)*self%n
-    end do
-    do image_y = minval(image(2, :)), maxval(image(2, :))
-      do image_x = minval(image(1, :)), maxval(image(1, :))
-        shift = [image_x, image_y]*sim%box%edges()
-        n = 0
-        do dy = -1, 1
-          if (image(2, dy) /= image_y) cycle
-          do dx = -1, 1
-            if (image(1, dx) /= image_x) cycle
-            c = there(1, dx) + self%cells%stride*there(2, dy)
-            call append(self%cells%cell(c), list, n)
-            call scan_chain(self, sim%disk, i, c, sim%now, t, code, shift)
-          end do
-        end do
-        call earliest_contact(sim%disk, i, int(n, int32), list, sim%now, .false., .true., self%faces%box%gravity, &
-          t, code, shift)
-      end do
-    end do
-  end subroutine scan_around_edge
-
-  !> Contacts with the disks of one cell, seen `shift` away.
-  subroutine scan_cell(self, sim, i, c, shift, t, code)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, c
-    real(real64), intent(in) :: shift(2)           !! [length]
-    real(real64), intent(inout) :: t
-    integer(int32), intent(inout) :: code
-
-    call earliest_contact(sim%disk, i, self%cells%cell(c)%in_slots(), self%cells%cell(c)%slot, &
-      sim%now, .false., .true., self%faces%box%gravity, t, code, shift)
-    call scan_chain(self, sim%disk, i, c, sim%now, t, code, shift)
-  end subroutine scan_cell
 
 end module cell_grid

@@ -1,4 +1,4 @@
-!> The seam between the dynamics and the ways to find what a disk meets next; and the kernel they share.
+!> The seam between the dynamics and the ways to find what a disk meets next; and the kernel that they share.
 module neighbour_search
   use kinds, only: int32, never, real64
   use disks, only: disk_t
@@ -6,11 +6,23 @@ module neighbour_search
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: neighbour_search_t, earliest_contact, first_crossing
+  public :: neighbour_search_t, prospect_t, earliest_contact, list_capacity, latest_clock, no_gravity
 
-  !> Codes of `disk%partner` from here downwards: the disk leaves its cell to the left, right, bottom, top.
-  integer(int32), parameter :: first_crossing = -2000000000
-  real(real64), parameter :: many = 32*epsilon(1.0_real64)        !! roundings
+  integer(int32), parameter :: list_capacity = 64
+  !> What a caller knows beforehand, as a sum, so that the compiler makes a version of the kernel without the rest:
+  !> no disk has a later clock than the one in question, which is now; nothing falls.
+  integer(int32), parameter :: latest_clock = 1, no_gravity = 2
+  real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! above all rounding in the kernel
+
+  !> What a disk may meet next: the earliest event known, and other disks that might come before it. Not
+  !> initialised, as one is made for each prediction.
+  type :: prospect_t
+    real(real64) :: time                      !! of the earliest event [time]
+    integer(int32) :: partner                 !! whom it meets then
+    integer(int32) :: cell                    !! number of the disk's cell
+    integer(int32) :: n                       !! number of candidates
+    integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
+  end type prospect_t
 
   type, abstract :: neighbour_search_t
     logical :: everyone = .false.    !! predict all disks anew after each event, not just those involved
@@ -23,16 +35,17 @@ module neighbour_search
   end type neighbour_search_t
 
   abstract interface
-    !> Takes in where the disks are now.
+    !> Sorts the disks into the search's own structures.
     subroutine build_search(self, sim)
       import :: neighbour_search_t, simulation_t
       class(neighbour_search_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
     end subroutine build_search
 
-    !> Writes into disk i the earliest event it can expect: a disk, a side, an obstacle, a cell's end. What it expects of
-    !> another disk after that one's own event may be left out: that one predicts anew then. Once all disks have
-    !> been predicted, each contact before all other events of the two is expected by at least one of them.
+    !> Writes into disk i the earliest event it can have: a disk, a side, an obstacle, or the end of its cell. A
+    !> contact later than the partner's own next event may be omitted, because the partner predicts again then.
+    !> Invariant: once all disks are predicted, every contact that precedes all other events of its pair is held by
+    !> at least one of the two.
     subroutine predict_event(self, sim, i)
       import :: int32, neighbour_search_t, simulation_t
       class(neighbour_search_t), intent(inout) :: self
@@ -40,7 +53,7 @@ module neighbour_search
       integer(int32), intent(in) :: i
     end subroutine predict_event
 
-    !> Moves disk i over the face that its event names, a crossing or a periodic side, and predicts.
+    !> Moves disk i across the cell face or periodic side that its event names, and predicts.
     subroutine cross_cells(self, sim, i, code)
       import :: int32, neighbour_search_t, simulation_t
       class(neighbour_search_t), intent(inout) :: self
@@ -52,7 +65,7 @@ module neighbour_search
 
 contains
 
-  !> Writes into the disks i and j, which have just collided, what they can expect.
+  !> Predicts the disks i and j, which have just collided.
   subroutine predict_both(self, sim, i, j)
     class(neighbour_search_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -62,8 +75,8 @@ contains
     call self%predict(sim, j)
   end subroutine predict_both
 
-  !> Asks for what the next predictions for some disks will need, so that it is in the cache by then. At each stage
-  !> that can be found out from what was asked for at those before.
+  !> Prefetches what the next predictions of some disks will read. Each stage follows the addresses that the
+  !> stage before has brought into the cache.
   subroutine read_ahead(self, sim, stage, disks)
     class(neighbour_search_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -71,39 +84,38 @@ contains
     integer(int32), intent(in) :: disks(:)
   end subroutine read_ahead
 
-  !> The earliest contact of disk i with the disks listed, if it comes before the event known already.
+  !> The earliest contact of disk i with the candidates, if it precedes the event known so far.
   !>
-  !> The time is a pure function of the states of the two disks: both are advanced to the later of their
-  !> clocks, and every term changes sign, or nothing, when they trade places. So it comes out the same to
-  !> the last bit whenever, and by whichever of the two, it is predicted. Of contacts at the same
-  !> moment the one with the lower disks wins. A contact before `now` is one of rounding: disks that collided
-  !> without rebound stay in contact to the last bits, which a period may change that one of them is moved by.
+  !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks,
+  !> and every term keeps its value, or changes sign, when they trade places. So it is the same to the last bit
+  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts the one with the lower disks
+  !> wins (`before`). A contact time before `now` is a rounding artefact: after a perfectly inelastic collision two
+  !> disks stay in contact to the last bits, and shifting one by a period can change those bits.
   !>
-  !> Most candidates fail one combined test: the root is not real, not before the best so far, or not before the
-  !> candidate's own event, at which that one will predict anew with i among its candidates. A root before t
+  !> Most candidates fail one combined test: the root is not real, or not before the best so far, or not before the
+  !> candidate's own event, when the candidate will predict again with i among its candidates. A root before t
   !> needs c < -2 b (t - late), here with a margin above rounding.
-  pure subroutine earliest_contact(disk, i, n, list, now, fresh, falling, gravity, t, partner, shift)
+  pure subroutine earliest_contact(disk, i, near, now, gravity, known, shift)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     integer(int32), value :: i
-    integer(int32), value :: n                !! number of candidates
-    integer(int32), intent(in) :: list(*)     !! (n) candidates, counted from 0; i itself is harmless
+    type(prospect_t), intent(inout) :: near   !! i itself is harmless among the candidates
     real(real64), value :: now                !! [time]
-    logical, value :: fresh                   !! nobody has a later clock than i, which is now
-    logical, value :: falling                 !! `gravity` is not zero
     real(real64), intent(in) :: gravity(2)
-    real(real64), intent(inout) :: t          !! in: of the event known; out: of the earliest [time]
-    integer(int32), intent(inout) :: partner  !! likewise
+    integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
     real(real64), intent(in), optional :: shift(2)  !! of the candidates' image [length]
     real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
-    integer(int32) :: k, j, whom
+    integer(int32) :: k, j, partner
+    logical :: fresh, falling
 
+    fresh = iand(known, latest_clock) > 0
+    falling = iand(known, no_gravity) == 0
     call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
-    x = xi; y = yi; u = ui; v = vi; late = clock; best = t; whom = partner
-    margin = many*(abs(clock) + tiny(clock)/epsilon(clock)**2)
+    x = xi; y = yi; u = ui; v = vi; late = clock; best = near%time; partner = near%partner
+    margin = margin_of_times*(abs(clock) + tiny(clock)/epsilon(clock)**2)
     from = 2*clock - margin
-    do k = 1, n
-      j = list(k)
+    do k = 1, near%n
+      j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
       if (.not. fresh) then                   ! else the same numbers come out, with si = 0
         late = merge(clock, clock_j, clock > clock_j)
@@ -126,7 +138,7 @@ contains
       c = dx*dx + dy*dy - sigma2
       disc = sigma2*(du*du + dv*dv) - (dx*dv - dy*du)**2
       latest = min(best, disk(j)%event_time)
-      in_time = (from - (2 + many)*latest)*b - c
+      in_time = (from - (2 + margin_of_times)*latest)*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0) then
         t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
@@ -136,12 +148,12 @@ contains
           t_j = now
         end if
         if (.not. t_j < best) then            ! seldom
-          if (t_j > best .or. .not. before(i, j + 1, whom)) cycle
+          if (t_j > best .or. .not. before(i, j + 1, partner)) cycle
         end if
-        best = t_j; whom = j + 1
+        best = t_j; partner = j + 1
       end if
     end do
-    t = best; partner = whom
+    near%time = best; near%partner = partner
   end subroutine earliest_contact
 
   !> The state of a disk, in numbers.

@@ -4,7 +4,7 @@
 !> dynamics serves as it is.
 module dense_growth
   use kinds, only: int32, never, pi, real64
-  use box_geometry, only: box_t
+  use box_geometry, only: box_t, obstacle_gap
   use cell_grid, only: cell_grid_t
   use disks, only: species_t
   use errors, only: error_t, exit_usage, fail
@@ -190,7 +190,7 @@ contains
       if (scale(i) >= cap) cycle
       full = sim%species(sim%tag(i)%species)%radius
       call packing%list_neighbours(sim%disk(i)%x, full, list, n)
-      room = min(wall_distance(packing, sim%disk(i)%x)/full, room_between(packing, sim, scale, i, list(:n)))
+      room = min(wall_distance(sim%box, sim%disk(i)%x)/full, room_between(packing, sim, scale, i, list(:n)))
       if (room >= 1) then
         sim%disk(i)%radius = cap*full
       else if (room > scale(i)) then
@@ -223,21 +223,16 @@ contains
   end function room_between
 
   !> Distance from a point to the nearest wall or obstacle, `never` if there is none.
-  pure function wall_distance(packing, x) result(distance)
-    type(packing_t), intent(in) :: packing
-    real(real64), intent(in) :: x(2)
-    real(real64) :: distance, gap
-    integer :: m
+  pure function wall_distance(box, x) result(distance)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: x(2)                    !! [length]
+    real(real64) :: distance
+    integer(int32) :: m
 
-    associate (box => packing%box)
-      distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
-      do m = 1, size(box%obstacle)
-        associate (o => box%obstacle(m))
-          gap = norm2(packing%separation(o%centre, x)) - o%radius
-          distance = min(distance, merge(-gap, gap, o%inside))
-        end associate
-      end do
-    end associate
+    distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
+    do m = 1, box%n_obstacles()
+      distance = min(distance, obstacle_gap(box, m, x, 0.0_real64))
+    end do
   end function wall_distance
 
 end module dense_growth

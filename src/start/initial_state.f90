@@ -3,6 +3,7 @@
 !> change of one leaves what the others draw as it is.
 module initial_state
   use kinds, only: int32, real64
+  use circles, only: new_circle
   use errors, only: error_t
   use placement, only: place_disks
   use random_stream, only: random_stream_t
@@ -49,9 +50,7 @@ contains
       allocate (sim%box%obstacle(size(o)), sim%species(size(s)))
       do k = 1, size(o)
         sim%box%obstacle(k)%name = o(k)%name
-        sim%box%obstacle(k)%centre = o(k)%centre
-        sim%box%obstacle(k)%radius = o(k)%radius
-        sim%box%obstacle(k)%inside = o(k)%inside
+        allocate (sim%box%obstacle(k)%shape, source=new_circle(o(k)%centre, o(k)%radius, o(k)%inside))
       end do
       do k = 1, size(s)
         sim%species(k)%name = s(k)%name
@@ -87,7 +86,7 @@ contains
     logical :: balanced
     integer :: s, first
 
-    balanced = all(sim%box%periodic) .and. .not. sim%box%obstructed() .and. .not. sim%box%falling()
+    balanced = all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. .not. sim%box%falling()
     first = 1
     do s = 1, size(settings%species)
       associate (species => settings%species(s))

@@ -3,7 +3,8 @@
 !> the others.
 module packing
   use kinds, only: int32, real64
-  use box_geometry, only: box_t, obstacle_t
+  use shapes, only: nearest_image
+  use box_geometry, only: box_t
   implicit none
   private
   public :: packing_t
@@ -49,7 +50,6 @@ contains
     type(packing_t) :: packing
 
     packing%box = box
-    if (.not. allocated(box%obstacle)) allocate (packing%box%obstacle(0))
     allocate (packing%disk(n_disks), packing%layer(n_species))
   end function empty_packing
 
@@ -103,7 +103,7 @@ contains
     real(real64) :: rho
     integer :: s, kx, ky, first(2), last(2)
 
-    do blocker = -1, -size(self%box%obstacle, kind=int32), -1
+    do blocker = -1, -self%box%n_obstacles(), -1
       if (self%covers(blocker, centre, half, radius)) return
     end do
     blocker = 0
@@ -223,40 +223,23 @@ contains
     logical :: yes
 
     if (by < 0) then
-      yes = bars(self, self%box%obstacle(-by), centre, half, radius)
+      associate (shape => self%box%obstacle(-by)%shape)
+        yes = shape%covers(shape%from_nearest(centre, self%box%periods()), half, radius)
+      end associate
     else
       corner = abs(self%separation(self%disk(by)%x, centre)) + half
       yes = corner(1)**2 + corner(2)**2 < (self%layer(self%disk(by)%species)%radius + radius)**2
     end if
   end function covers
 
-  !> The same for an obstacle.
-  pure function bars(packing, obstacle, centre, half, radius) result(yes)
-    type(packing_t), intent(in) :: packing
-    type(obstacle_t), intent(in) :: obstacle
-    real(real64), intent(in) :: centre(2), half(2), radius
-    real(real64) :: d(2), corner(2)
-    logical :: yes
-
-    d = packing%separation(obstacle%centre, centre)
-    if (obstacle%inside) then
-      corner = max(abs(d) - half, 0.0_real64)
-      yes = radius > obstacle%radius .or. corner(1)**2 + corner(2)**2 > (obstacle%radius - radius)**2
-    else
-      corner = abs(d) + half
-      yes = corner(1)**2 + corner(2)**2 < (obstacle%radius + radius)**2
-    end if
-  end function bars
-
   !> From a to the nearest image of b.
   pure function separation(self, a, b) result(d)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: a(2), b(2)          !! [length]
-    real(real64) :: d(2), edges(2)
+    real(real64) :: d(2)
 
     d = b - a
-    edges = self%box%edges()
-    where (self%box%periodic) d = d - edges*anint(d/edges)
+    d = d - nearest_image(d, self%box%periods())
   end function separation
 
   !> The cell of a point, or the nearest one if the point is outside.

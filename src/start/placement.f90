@@ -6,6 +6,7 @@
 module placement
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t, obstacle_t
+  use circles, only: new_circle
   use dense_growth, only: grow_disks
   use disks, only: disk_t, species_t
   use errors, only: error_t, exit_usage, fail
@@ -244,7 +245,7 @@ contains
     box%periodic = spans(region, packing%box)
     images = merge(1, 0, packing%box%periodic)
     do pass = 1, 2                                          ! count, then fill
-      n = size(packing%box%obstacle)
+      n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
         radius = packing%layer(packing%disk(k)%species)%radius
@@ -255,14 +256,15 @@ contains
             n = n + 1
             if (pass == 1) cycle
             obstacle(n)%name = "a disk"
-            obstacle(n)%centre = centre
-            obstacle(n)%radius = radius
+            allocate (obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
           end do
         end do
       end do
       if (pass == 1) allocate (obstacle(n))
     end do
-    obstacle(:size(packing%box%obstacle)) = packing%box%obstacle
+    do k = 1, packing%box%n_obstacles()
+      obstacle(k) = packing%box%obstacle(k)
+    end do
     call move_alloc(obstacle, box%obstacle)
   end function growth_box
 

@@ -1,19 +1,19 @@
 !> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
 !> A cell with more of them chains the surplus behind its last disk.
-module cells
+module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
   use memory_hints, only: prefetch
+  use neighbour_search, only: list_capacity, prospect_t
   implicit none
   private
-  public :: append, cell_t, cells_t, gather, list_capacity
+  public :: append, cell_contents_t, gather
 
   integer(int32), parameter :: cell_capacity = 3
   integer(int32), parameter :: count_slot = cell_capacity + 1
   integer(int32), parameter :: counted = 65535               !! mask of the number of disks
   integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
   integer(int32), parameter :: marked = shiftl(crowd, 8)     !! beyond nine crowded cells
-  integer(int32), parameter :: list_capacity = 64            !! more than nine cells have slots
 
   !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
   !> in its lower half, and in its upper half the crowded cells among the nine around this one; and it holds a mark.
@@ -21,11 +21,10 @@ module cells
     integer(int32) :: slot(count_slot)
   contains
     procedure :: in_slots
-    procedure :: near_crowd
-    procedure :: is_marked
+    procedure :: needs_care
   end type cell_t
 
-  type :: cells_t
+  type :: cell_contents_t
     integer(int32) :: stride = 0                 !! from row to row
     type(cell_t), allocatable :: cell(:)         !! (0:)
     integer(int32), allocatable :: next(:)       !! (disks) chain of a crowded cell; 0: its end
@@ -38,13 +37,13 @@ module cells
     procedure :: chain
     procedure :: read_ahead
     procedure, private :: count_crowd
-  end type cells_t
+  end type cell_contents_t
 
 contains
 
   !> Of the cell in column cell(1) and row cell(2), both from 1.
   pure function number(self, cell) result(c)
-    class(cells_t), intent(in) :: self
+    class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32) :: c
 
@@ -53,7 +52,7 @@ contains
 
   !> Makes rows of `stride` empty cells for n_disks disks.
   subroutine empty(self, stride, rows, n_disks)
-    class(cells_t), intent(inout) :: self
+    class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: stride, rows, n_disks
     integer(int32) :: c
 
@@ -69,7 +68,7 @@ contains
 
   !> Marks cell c, or takes its mark away.
   pure subroutine mark(self, c, yes)
-    class(cells_t), intent(inout) :: self
+    class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c
     logical, intent(in) :: yes
 
@@ -80,7 +79,7 @@ contains
 
   !> Puts disk i into cell c.
   pure subroutine insert(self, c, i)
-    class(cells_t), intent(inout) :: self
+    class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
     integer(int32) :: n, head
 
@@ -101,7 +100,7 @@ contains
 
   !> Takes disk i out of cell c.
   pure subroutine remove(self, c, i)
-    class(cells_t), intent(inout) :: self
+    class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
     integer(int32) :: n, k, link
 
@@ -130,7 +129,7 @@ contains
 
   !> Tells the cells around that cell c became crowded (1), or no longer is (-1).
   pure subroutine count_crowd(self, c, change)
-    class(cells_t), intent(inout) :: self
+    class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
     integer(int32) :: k, m
 
@@ -149,25 +148,17 @@ contains
     n = iand(self%slot(count_slot), counted)
   end function in_slots
 
-  !> Whether the cell was marked.
-  elemental function is_marked(self) result(yes)
-    class(cell_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%slot(count_slot) >= marked
-  end function is_marked
-
-  !> Whether one of the nine cells around is crowded; true for marked cells.
-  elemental function near_crowd(self) result(yes)
+  !> Whether predictions in this cell take more than the plain way: it is marked, or near a crowded cell.
+  elemental function needs_care(self) result(yes)
     class(cell_t), intent(in) :: self
     logical :: yes
 
     yes = self%slot(count_slot) >= crowd
-  end function near_crowd
+  end function needs_care
 
   !> The first disk in the chain of cell c, which is the last one in its slots; 0 if the cell is not crowded.
   pure function chain(self, c) result(i)
-    class(cells_t), intent(in) :: self
+    class(cell_contents_t), intent(in) :: self
     integer(int32), intent(in) :: c
     integer(int32) :: i
 
@@ -226,7 +217,7 @@ contains
   !> Asks for what predictions for some disks will need: what describes a disk, its cells, the disks in them; and of its
   !> partner, one stage later, the same but for the disks, most of which are among the first ones.
   subroutine read_ahead(self, disk, tag, stage, disks)
-    class(cells_t), intent(in) :: self
+    class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: stage
@@ -279,4 +270,4 @@ contains
 
   end subroutine read_ahead
 
-end module cells
+end module cell_contents

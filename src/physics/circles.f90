@@ -1,0 +1,138 @@
+!> Circular obstacles: disks bounce off the outside, or are kept inside.
+module circles
+  use free_flight, only: time_to_circle
+  use kinds, only: pi, real64
+  use shapes, only: shape_t, spare
+  implicit none
+  private
+  public :: circle_t, new_circle
+
+  type, extends(shape_t) :: circle_t
+    real(real64) :: radius = 0.0_real64         !! [length]
+  contains
+    procedure :: contact_time
+    procedure :: gap
+    procedure :: normal
+    procedure :: reaches
+    procedure :: covers
+    procedure :: extent
+    procedure :: area
+    procedure :: misfit
+    procedure, private :: distance_at_contact
+  end type circle_t
+
+contains
+
+  !> The circle with this centre; `encloses`: the disks are inside.
+  pure function new_circle(centre, radius, encloses) result(circle)
+    real(real64), intent(in) :: centre(2)       !! [length]
+    real(real64), intent(in) :: radius          !! [length]
+    logical, intent(in) :: encloses
+    type(circle_t) :: circle
+
+    circle%middle = centre
+    circle%radius = radius
+    circle%encloses = encloses
+  end function new_circle
+
+  !> Between the two centres.
+  pure function distance_at_contact(self, radius) result(rho)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: radius          !! of the disk [length]
+    real(real64) :: rho
+
+    rho = merge(self%radius - radius, self%radius + radius, self%encloses)
+  end function distance_at_contact
+
+  !> Time until a disk touches the circle.
+  pure function contact_time(self, d, v, g, radius) result(s)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), v(2), g(2), radius
+    real(real64) :: s
+
+    s = time_to_circle(d, v, g, self%distance_at_contact(radius), self%encloses)
+  end function contact_time
+
+  !> Distance between the circle and the rim of a disk.
+  pure function gap(self, d, radius) result(length)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), radius
+    real(real64) :: length
+
+    length = norm2(d) - self%distance_at_contact(radius)
+    if (self%encloses) length = -length
+  end function gap
+
+  !> Unit vector from the circle to a disk that touches it.
+  pure function normal(self, d) result(direction)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: d(2)
+    real(real64) :: direction(2)
+
+    direction = merge(-d, d, self%encloses)/norm2(d)
+  end function normal
+
+  !> Whether a disk with its centre in a rectangle can touch the circle.
+  pure function reaches(self, d, half, radius) result(yes)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), half(2), radius
+    logical :: yes
+
+    if (self%encloses) then
+      yes = norm2(abs(d) + half) >= self%distance_at_contact(radius)/(1 + spare)
+    else
+      yes = norm2(max(abs(d) - half, 0.0_real64)) <= self%distance_at_contact(radius)*(1 + spare)
+    end if
+  end function reaches
+
+  !> Whether the circle keeps disks out of a whole rectangle.
+  pure function covers(self, d, half, radius) result(yes)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), half(2), radius
+    real(real64) :: corner(2), rho
+    logical :: yes
+
+    rho = self%distance_at_contact(radius)
+    if (self%encloses) then
+      corner = max(abs(d) - half, 0.0_real64)
+      yes = rho < 0 .or. corner(1)**2 + corner(2)**2 > rho**2
+    else
+      corner = abs(d) + half
+      yes = corner(1)**2 + corner(2)**2 < rho**2
+    end if
+  end function covers
+
+  !> Half the sides of the square around the circle.
+  pure function extent(self) result(half)
+    class(circle_t), intent(in) :: self
+    real(real64) :: half(2)
+
+    half = self%radius
+  end function extent
+
+  !> Area of the circle.
+  pure function area(self)
+    class(circle_t), intent(in) :: self
+    real(real64) :: area
+
+    area = pi*self%radius**2
+  end function area
+
+  !> A circle must meet the box and fit between periodic sides.
+  pure function misfit(self, lower, upper, periodic) result(problem)
+    class(circle_t), intent(in) :: self
+    real(real64), intent(in) :: lower(2), upper(2)
+    logical, intent(in) :: periodic(2)
+    character(len=:), allocatable :: problem
+    integer :: axis
+
+    problem = ""
+    if (norm2(min(max(self%middle, lower), upper) - self%middle) >= self%radius) &
+      problem = "centre: the obstacle is outside the box"
+    do axis = 1, 2
+      if (periodic(axis) .and. 2*self%radius > upper(axis) - lower(axis)) problem = &
+        "radius: the obstacle is wider than the box along the periodic axis "//merge("x", "y", axis == 1)
+    end do
+  end function misfit
+
+end module circles

@@ -1,0 +1,91 @@
+!> Whom or what a disk meets, as one number: another disk (> 0), a side of the box (0, -1, -2, -3: left, right,
+!> bottom, top), an obstacle (-4, -5, ...), or the end of its cell (far below). The event log writes the same numbers.
+module partners
+  use kinds, only: int32
+  implicit none
+  private
+  public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, wall_index
+  public :: obstacle_code, obstacle_number, crossing, side_crossed, leaves_margin, nothing
+
+  integer(int32), parameter :: n_sides = 4
+  integer(int32), parameter :: first_obstacle = -n_sides
+  integer(int32), parameter :: first_crossing = -2000000000
+  integer(int32), parameter :: leaves_margin = first_crossing - n_sides    !! a big disk: see `big_disks`
+  integer(int32), parameter :: nothing = -huge(1_int32)
+  character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
+
+contains
+
+  !> Whether the code, which is not a disk, is a side of the box.
+  elemental function is_side(code) result(yes)
+    integer(int32), intent(in) :: code
+    logical :: yes
+
+    yes = code > first_obstacle
+  end function is_side
+
+  !> Whether the code, which is not a disk, is a side or an obstacle: not the end of a cell.
+  elemental function is_wall(code) result(yes)
+    integer(int32), intent(in) :: code
+    logical :: yes
+
+    yes = code > first_crossing
+  end function is_wall
+
+  !> The axis across a side.
+  elemental function axis_of(side) result(axis)
+    integer(int32), intent(in) :: side
+    integer(int32) :: axis
+
+    axis = 1 - side/2
+  end function axis_of
+
+  !> Which way one leaves through a side: +1 right and top, -1 left and bottom.
+  elemental function sense_of(side) result(sense)
+    integer(int32), intent(in) :: side
+    integer(int32) :: sense
+
+    sense = 2*modulo(side, 2) - 1
+  end function sense_of
+
+  !> The place of a side in arrays: left, right, bottom, top.
+  elemental function wall_index(side) result(k)
+    integer(int32), intent(in) :: side
+    integer(int32) :: k
+
+    k = 1 - side
+  end function wall_index
+
+  !> The code of the m-th obstacle.
+  elemental function obstacle_code(m) result(code)
+    integer(int32), intent(in) :: m
+    integer(int32) :: code
+
+    code = first_obstacle + 1 - m
+  end function obstacle_code
+
+  !> The number of the obstacle with a code.
+  elemental function obstacle_number(code) result(m)
+    integer(int32), intent(in) :: code
+    integer(int32) :: m
+
+    m = first_obstacle + 1 - code
+  end function obstacle_number
+
+  !> The code of leaving a cell where side `side` would be.
+  elemental function crossing(side) result(code)
+    integer(int32), intent(in) :: side
+    integer(int32) :: code
+
+    code = first_crossing + side
+  end function crossing
+
+  !> The side where a disk leaves its cell, from the code of the crossing.
+  elemental function side_crossed(code) result(side)
+    integer(int32), intent(in) :: code
+    integer(int32) :: side
+
+    side = code - first_crossing
+  end function side_crossed
+
+end module partners

@@ -1,0 +1,182 @@
+!> Straight walls from one point to another, solid on both sides. Their ends are points that disks bounce off.
+!>
+!> A disk touches the wall when its centre reaches the stadium around it: two straight sides at the distance of
+!> its radius, and two half circles around the ends. The stadium is convex, so its straight sides are only
+!> ever entered from outside, and what misses them by rounding hits a half circle at the same moment.
+module segments
+  use free_flight, only: flight, time_to_circle, time_to_line
+  use kinds, only: never, real64
+  use shapes, only: nearest_image, shape_t, spare
+  implicit none
+  private
+  public :: segment_t, new_segment
+
+  type, extends(shape_t) :: segment_t
+    real(real64) :: half(2) = 0.0_real64        !! from the middle to an end [length]
+    real(real64) :: along(2) = [1.0_real64, 0.0_real64]   !! unit vector
+    real(real64) :: length = 0.0_real64         !! half of it [length]
+  contains
+    procedure :: from_nearest
+    procedure :: contact_time
+    procedure :: gap
+    procedure :: normal
+    procedure :: reaches
+    procedure :: covers
+    procedure :: extent
+    procedure :: area
+    procedure :: misfit
+    procedure, private :: from_outline
+  end type segment_t
+
+contains
+
+  !> The straight wall between two points.
+  pure function new_segment(from, to) result(segment)
+    real(real64), intent(in) :: from(2), to(2)  !! [length]
+    type(segment_t) :: segment
+
+    segment%middle = 0.5_real64*(from + to)
+    segment%half = 0.5_real64*(to - from)
+    segment%length = norm2(segment%half)
+    if (segment%length > 0) segment%along = segment%half/segment%length
+  end function new_segment
+
+  !> From the middle of the image that is nearest to x: of a long wall not always the one with the nearest middle.
+  pure function from_nearest(self, x, period) result(d)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: x(2), period(2)
+    real(real64) :: d(2), nearest(2), candidate(2)
+    integer :: i, j, reach(2)
+
+    nearest = x - self%middle
+    nearest = nearest - nearest_image(nearest, period)
+    reach = merge(1, 0, period < never)
+    d = nearest
+    do j = -reach(2), reach(2)
+      do i = -reach(1), reach(1)
+        candidate = nearest + merge([i, j]*period, 0.0_real64, reach == 1)
+        if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
+      end do
+    end do
+  end function from_nearest
+
+  !> Time until a disk touches the wall.
+  pure function contact_time(self, d, v, g, radius) result(s)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), v(2), g(2), radius
+    real(real64) :: s, across(2)
+    integer :: side
+
+    s = min(time_to_circle(d - self%half, v, g, radius, .false.), time_to_circle(d + self%half, v, g, radius, .false.))
+    do side = -1, 1, 2
+      across = side*[-self%along(2), self%along(1)]
+      s = min(s, time_to_side(self, across, d, v, g, radius))
+    end do
+  end function contact_time
+
+  !> Time until a disk touches one straight side, on which `across` points away from the wall; `never` if it
+  !> passes beyond an end. The side is entered once at most: its distance is a parabola in time.
+  pure function time_to_side(self, across, d, v, g, radius) result(s)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: across(2), d(2), v(2), g(2), radius
+    real(real64) :: s, away, speed, fall, disc
+
+    away = dot_product(d, across) - radius
+    speed = -dot_product(v, across)             ! towards the wall, as `fall` is
+    fall = -dot_product(g, across)
+    if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
+    s = never
+    if (away >= 0) then
+      s = time_to_line(away, speed, fall)
+    else if (fall > 0 .and. speed < 0) then     ! rises beyond an end, and may fall onto the wall
+      disc = speed**2 + 2*fall*away
+      if (disc >= 0) s = (sqrt(disc) - speed)/fall
+    end if
+    if (.not. s < never) return
+    if (abs(dot_product(flight(d, v, g, s), self%along)) > self%length) s = never
+  end function time_to_side
+
+  !> From the nearest point of the wall to a point.
+  pure function from_outline(self, d) result(offset)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2)
+    real(real64) :: offset(2), place
+
+    place = dot_product(d, self%along)
+    offset = d - min(max(place, -self%length), self%length)*self%along
+  end function from_outline
+
+  !> Distance between the wall and the rim of a disk.
+  pure function gap(self, d, radius) result(length)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), radius
+    real(real64) :: length
+
+    length = norm2(self%from_outline(d)) - radius
+  end function gap
+
+  !> Unit vector from the wall to a disk that touches it.
+  pure function normal(self, d) result(direction)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2)
+    real(real64) :: direction(2)
+
+    direction = self%from_outline(d)
+    direction = direction/norm2(direction)
+  end function normal
+
+  !> Whether a disk with its centre in a rectangle can touch the wall: separating axes, corners not rounded.
+  pure function reaches(self, d, half, radius) result(yes)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), half(2), radius
+    real(real64) :: across(2), room(2)
+    logical :: yes
+
+    across = [-self%along(2), self%along(1)]
+    room = (half + radius)*(1 + spare)
+    yes = all(abs(d) <= room + abs(self%half)*(1 + spare)) .and. &
+      abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*norm2(d)
+  end function reaches
+
+  !> Whether the wall keeps disks out of a whole rectangle: as the stadium is convex, out of its corners.
+  pure function covers(self, d, half, radius) result(yes)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: d(2), half(2), radius
+    logical :: yes
+    integer :: i, j
+
+    yes = all([((self%gap(d + [i, j]*half, radius) < 0, i=-1, 1, 2), j=-1, 1, 2)])
+  end function covers
+
+  !> Half the sides of the rectangle around the wall.
+  pure function extent(self) result(half)
+    class(segment_t), intent(in) :: self
+    real(real64) :: half(2)
+
+    half = abs(self%half)
+  end function extent
+
+  !> A wall has no thickness.
+  pure function area(self)
+    class(segment_t), intent(in) :: self
+    real(real64) :: area
+
+    area = 0
+  end function area
+
+  !> A wall has some length, and both ends lie in the box.
+  pure function misfit(self, lower, upper, periodic) result(problem)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: lower(2), upper(2)
+    logical, intent(in) :: periodic(2)
+    character(len=:), allocatable :: problem
+    real(real64) :: slack(2)
+
+    problem = ""
+    slack = spare**2*max(abs(lower), abs(upper))
+    if (.not. self%length > 0) problem = "to: is the same point as from"
+    if (any(self%middle - abs(self%half) < lower - slack .or. self%middle + abs(self%half) > upper + slack)) &
+      problem = "from: both ends must lie in the box"
+  end function misfit
+
+end module segments

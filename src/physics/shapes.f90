@@ -1,0 +1,122 @@
+!> The seam behind which the kinds of fixed obstacles stand. Search, start, time steps and observables ask an
+!> obstacle's shape all they need to know, and know no centre, radius or end themselves.
+module shapes
+  use kinds, only: real64
+  implicit none
+  private
+  public :: shape_t, nearest_image, spare
+
+  !> Relative margin above all rounding, for questions whose answer may err on one side only.
+  real(real64), parameter :: spare = 1.0e-6_real64
+
+  !> The outline of an obstacle. Points are given relative to its middle.
+  type, abstract :: shape_t
+    real(real64) :: middle(2) = 0.0_real64      !! [length]
+    logical :: encloses = .false.               !! keeps the disks inside, not outside
+  contains
+    procedure :: from_nearest
+    procedure(contact_time), deferred :: contact_time
+    procedure(gap), deferred :: gap
+    procedure(normal), deferred :: normal
+    procedure(reaches), deferred :: reaches
+    procedure(covers), deferred :: covers
+    procedure(extent), deferred :: extent
+    procedure(area), deferred :: area
+    procedure(misfit), deferred :: misfit
+  end type shape_t
+
+  abstract interface
+    !> Time until the rim of a disk touches the outline: zero if it does already (or overlaps by rounding)
+    !> and moves on into it, `never` if it will not.
+    pure function contact_time(self, d, v, g, radius) result(s)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: d(2)          !! from the middle to the disk's centre [length]
+      real(real64), intent(in) :: v(2)          !! [length/time]
+      real(real64), intent(in) :: g(2)          !! [length/time**2]
+      real(real64), intent(in) :: radius        !! of the disk [length]
+      real(real64) :: s
+    end function contact_time
+
+    !> Distance between the outline and the rim of a disk; negative if they overlap.
+    pure function gap(self, d, radius) result(length)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: d(2), radius
+      real(real64) :: length
+    end function gap
+
+    !> Unit vector from the outline to a disk that touches it.
+    pure function normal(self, d) result(direction)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: d(2)
+      real(real64) :: direction(2)
+    end function normal
+
+    !> Whether a disk whose centre is in the rectangle d +- half can touch the outline. Yes, if in doubt.
+    pure function reaches(self, d, half, radius) result(yes)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: d(2), half(2), radius
+      logical :: yes
+    end function reaches
+
+    !> Whether no disk can have its centre anywhere in the rectangle d +- half. No, if in doubt; but for a
+    !> point (half = 0) the answer is exact.
+    pure function covers(self, d, half, radius) result(yes)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: d(2), half(2), radius
+      logical :: yes
+    end function covers
+
+    !> Half the sides of the smallest rectangle around the outline.
+    pure function extent(self) result(half)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64) :: half(2)                   !! [length]
+    end function extent
+
+    !> Area that it takes away from the box or, if it encloses the disks, that it leaves.
+    pure function area(self)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64) :: area                      !! [length**2]
+    end function area
+
+    !> What is wrong with it in a box, as `variable: what`; empty if nothing is.
+    pure function misfit(self, lower, upper, periodic) result(problem)
+      import :: real64, shape_t
+      class(shape_t), intent(in) :: self
+      real(real64), intent(in) :: lower(2), upper(2)
+      logical, intent(in) :: periodic(2)
+      character(len=:), allocatable :: problem
+    end function misfit
+  end interface
+
+contains
+
+  !> From the middle of its nearest image to x. What encloses the disks has no images.
+  pure function from_nearest(self, x, period) result(d)
+    class(shape_t), intent(in) :: self
+    real(real64), intent(in) :: x(2)            !! [length]
+    real(real64), intent(in) :: period(2)       !! `never` between walls [length]
+    real(real64) :: d(2)
+
+    d = x - self%middle
+    if (.not. self%encloses) d = d - nearest_image(d, period)
+  end function from_nearest
+
+  !> The whole periods in a separation: dx less these leads to the nearest image.
+  pure function nearest_image(dx, period) result(shift)
+    real(real64), intent(in) :: dx(2)           !! [length]
+    real(real64), intent(in) :: period(2)       !! `never` between walls [length]
+    real(real64) :: shift(2)
+
+    shift = 0
+    if (abs(dx(1)) < 0.5_real64*period(1) .and. abs(dx(2)) < 0.5_real64*period(2)) return    ! nearly always
+    shift = period*anint(dx/period)
+  end function nearest_image
+
+end module shapes

@@ -1,0 +1,118 @@
+!> Contacts with disks that the plain way through nine cells does not reach: those of crowded cells, those seen
+!> through a periodic side, and single ones.
+module cell_scans
+  use kinds, only: int32, int64, real64
+  use cell_contents, only: append, cell_contents_t
+  use neighbour_search, only: earliest_contact, list_capacity, prospect_t
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: scan_around_edge, scan_cell, scan_chains_around, scan_one
+
+contains
+
+  !> The contact with one disk, seen `shift` away.
+  pure subroutine scan_one(sim, i, j, shift, near)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: shift(2)           !! [length]
+    type(prospect_t), intent(inout) :: near
+
+    near%n = 1
+    near%list(1) = j - 1
+    call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+  end subroutine scan_one
+
+  !> Contacts with the disks of one cell, seen `shift` away.
+  pure subroutine scan_cell(cells, sim, i, c, shift, near)
+    type(cell_contents_t), intent(in) :: cells
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, c
+    real(real64), intent(in) :: shift(2)           !! [length]
+    type(prospect_t), intent(inout) :: near
+    integer(int64) :: n
+
+    n = 0
+    call append(cells%cell(c), near%list, n)
+    near%n = int(n, int32)
+    call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+    call scan_chain(cells, sim, i, c, near, shift)
+  end subroutine scan_cell
+
+  !> Contacts with the chained disks of a crowded cell.
+  pure subroutine scan_chain(cells, sim, i, c, near, shift)
+    type(cell_contents_t), intent(in) :: cells
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, c
+    type(prospect_t), intent(inout) :: near
+    real(real64), intent(in), optional :: shift(2) !! of the cell, seen there [length]
+    integer(int32) :: j
+
+    j = cells%chain(c)
+    do while (j > 0)
+      near%n = 0
+      do while (j > 0 .and. near%n < list_capacity)
+        near%n = near%n + 1
+        near%list(near%n) = j - 1
+        j = cells%next(j)
+      end do
+      call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+    end do
+  end subroutine scan_chain
+
+  !> Contacts with the chained disks of the nine cells around disk i.
+  pure subroutine scan_chains_around(cells, sim, i, near)
+    type(cell_contents_t), intent(in) :: cells
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: row, c
+
+    do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
+      do c = row - 1, row + 1
+        call scan_chain(cells, sim, i, c, near)
+      end do
+    end do
+  end subroutine scan_chains_around
+
+  !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
+  !> together. In a box of fewer than three columns a cell stands for several of its images.
+  pure subroutine scan_around_edge(cells, n_cells, sim, i, near)
+    type(cell_contents_t), intent(in) :: cells
+    integer(int32), intent(in) :: n_cells(2)       !! columns, rows
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    type(prospect_t), intent(inout) :: near
+    real(real64) :: shift(2)
+    integer(int32) :: there(2, -1:1), image(2, -1:1), k, image_x, image_y, dx, dy, c
+    integer(int64) :: n
+
+    do k = -1, 1
+      there(:, k) = sim%tag(i)%cell + k
+      image(:, k) = merge(merge(1, 0, there(:, k) > n_cells) - merge(1, 0, there(:, k) < 1), 0, sim%box%periodic)
+      there(:, k) = there(:, k) - image(:, k)*n_cells
+    end do
+    do image_y = minval(image(2, :)), maxval(image(2, :))
+      do image_x = minval(image(1, :)), maxval(image(1, :))
+        shift = [image_x, image_y]*sim%box%edges()
+        n = 0
+        do dy = -1, 1
+          do dx = -1, 1
+            if (image(1, dx) /= image_x .or. image(2, dy) /= image_y) cycle
+            c = there(1, dx) + cells%stride*there(2, dy)
+            call append(cells%cell(c), near%list, n)
+          end do
+        end do
+        near%n = int(n, int32)
+        call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+        do dy = -1, 1
+          do dx = -1, 1
+            if (image(1, dx) /= image_x .or. image(2, dy) /= image_y) cycle
+            call scan_chain(cells, sim, i, there(1, dx) + cells%stride*there(2, dy), near, shift)
+          end do
+        end do
+      end do
+    end do
+  end subroutine scan_around_edge
+
+end module cell_scans
