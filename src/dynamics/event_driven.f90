@@ -176,7 +176,7 @@ contains
     integer(int32) :: stage, n, disks(most_coming)
 
     do stage = 1, stages
-      call self%queue%coming(sim%tag, stage, n, disks)
+      call self%queue%list_coming(sim%tag, stage, n, disks)
       call self%search%read_ahead(sim, stage, disks(:n))
     end do
     look = min(look, sim%events + events_ahead)

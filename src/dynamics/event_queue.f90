@@ -8,141 +8,81 @@
 !> heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
+  use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, stages, window_none
   use disks, only: disk_t, tag_t
   use event_heap, only: event_heap_t, event_t, need_order, precedes
   implicit none
   private
   public :: event_queue_t, most_coming, stages
 
-  integer(int32), parameter :: list_capacity = 64
-  integer(int32), parameter :: bucket_capacity = 15
-  integer(int32), parameter :: few = 5000          !! disks, nearly all of whose events may have buckets
-  integer(int32), parameter :: windows_ahead(*) = [20, 15, 10]               !! to announce, stage by stage
-  integer(int32), parameter :: stages = size(windows_ahead)
-  integer(int32), parameter :: most_coming = windows_ahead(1)*bucket_capacity  !! disks announced at once
-  integer(int32), parameter :: nowhere = -1        !! as tag%window
+  integer(int32), parameter :: near_capacity = 64
   real(real64), parameter :: last_window = 2.0e9_real64
-  real(real64), parameter :: events_per_window = 4.0_real64
   integer, parameter :: sample_size = 100
-
-  type :: bucket_t                                 ! one cache line
-    integer(int32) :: n = 0
-    integer(int32) :: disk(bucket_capacity)
-  end type bucket_t
-
-  type :: entry_t
-    integer(int32) :: disk
-    integer(int32) :: window                       !! in which it expects its event
-  end type entry_t
-
-  !> Events of one span, this turn of the ring or later.
-  type :: span_t
-    integer(int32) :: n = 0
-    type(entry_t), allocatable :: entry(:)         !! (n)
-  end type span_t
 
   type :: event_queue_t
     private
-    logical :: calendar = .true.
+    type(calendar_t) :: calendar
     type(event_heap_t) :: heap
-    type(event_t) :: list(0:list_capacity)         !! (n_list) latest first, after one that is never due
-    integer(int32) :: n_list = 0
-    logical :: list_is_open = .false.              !! it takes events; else the heap does
-    type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
-    type(span_t), allocatable :: span(:)           !! (0:) a ring as well; a span is half a turn of the other
-    integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
-    integer(int32) :: last_span = 0                !! likewise, of spans
-    integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
+    type(event_t) :: near(0:near_capacity)         !! (n_near) latest first, after one that is never due
+    integer(int32) :: n_near = 0
+    logical :: near_is_open = .false.              !! it takes events; else the heap does
+    logical :: windowed = .true.                   !! the calendar is in use, not the heap alone
     integer(int32) :: window = 0                   !! number of the current window since the epoch
-    integer(int32) :: ring_end = 0                 !! the first window that has no bucket yet
     integer(int32) :: n_disks = 0
-    integer(int32) :: announced(stages) = 0        !! the last window that was announced
     real(real64) :: width = never                  !! of a window [time]
     real(real64) :: per_time = 0.0_real64          !! windows per time, 1/width
     real(real64) :: next_window = 1.0_real64       !! window + 1
     integer(int64) :: n_taken = 0                  !! events since the last filling
-    real(real64) :: filled_at = 0.0_real64         !! moment of the last filling [time]
+    real(real64) :: filled_at = 0.0_real64         !! time of the last filling [time]
   contains
     procedure :: fill
     procedure :: schedule
     procedure :: first
     procedure :: drop_first
     procedure :: forget
-    procedure :: coming
-    ! Bound to the type so that these rare parts stay out of the frequent ones.
+    procedure :: list_coming
+    ! Bound to the type so that these rare parts are not inlined into the frequent ones.
     procedure, private :: insert_near
     procedure, private :: insert_into_heap
     procedure, private :: first_in_heap
     procedure, private :: open_next_window
     procedure, private :: take_from_heap
     procedure, private :: open_next_span
-    procedure, private :: lengthen
   end type event_queue_t
 
 contains
 
   !> Files the expected events of all disks anew.
-  subroutine fill(self, disk, tag, now, calendar)
+  subroutine fill(self, disk, tag, now, windowed)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
     type(tag_t), intent(inout) :: tag(:)
     real(real64), intent(in) :: now                !! since the epoch [time]
-    logical, intent(in) :: calendar                !! .false.: everything into the heap
+    logical, intent(in) :: windowed                !! .false.: everything into the heap
     integer(int32) :: i
 
     self%n_disks = size(disk, kind=int32)
-    self%n_list = 0
-    self%list(0)%time = huge(now)
+    self%n_near = 0
+    self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
-    tag%window = nowhere
+    tag%window = window_none
     self%width = max(window_width(self, disk, now), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
-    self%calendar = calendar .and. self%width < never
-    self%list_is_open = self%calendar
+    self%windowed = windowed .and. self%width < never
+    self%near_is_open = self%windowed
     self%n_taken = 0
     self%filled_at = now
     self%per_time = 0                              ! one window without end
-    if (self%calendar) then
+    if (self%windowed) then
       self%per_time = 1/self%width
-      call make_rings(self)
+      call self%calendar%empty(self%n_disks)
     end if
     self%window = int(now*self%per_time, int32)
-    self%ring_end = shiftl(shiftr(self%window, self%log_span) + 2, self%log_span)
-    self%announced = self%window
+    call self%calendar%begin(self%window)
     self%next_window = self%window + 1
     do i = 1, self%n_disks
       call schedule(self, disk, tag, i)
     end do
   end subroutine fill
-
-  !> Empty buckets and spans, enough to hold most events: twice as many as there are disks. Those of many disks should
-  !> leave the cache to the disks, and be about as many buckets as spans, as all are written to by turns.
-  subroutine make_rings(self)
-    class(event_queue_t), intent(inout) :: self
-    integer(int32) :: s, length
-
-    length = min(2*self%n_disks, merge(2048, max(512, 3*nint(sqrt(real(self%n_disks)))), self%n_disks <= few))
-    self%log_span = 3
-    do while (shiftl(2_int32, self%log_span) < length)
-      self%log_span = self%log_span + 1
-    end do
-    self%last_bucket = shiftl(2_int32, self%log_span) - 1
-    self%last_span = 3
-    do while (events_per_window*shiftl(self%last_span, self%log_span) < 2.0_real64*self%n_disks)
-      self%last_span = 2*self%last_span + 1
-    end do
-    if (allocated(self%bucket)) then
-      if (size(self%bucket) /= self%last_bucket + 1 .or. size(self%span) /= self%last_span + 1) &
-        deallocate (self%bucket, self%span)
-    end if
-    if (.not. allocated(self%bucket)) then
-      allocate (self%bucket(0:self%last_bucket), self%span(0:self%last_span))
-      do s = 0, self%last_span
-        allocate (self%span(s)%entry(16))
-      end do
-    end if
-    self%bucket%n = 0
-    self%span%n = 0
-  end subroutine make_rings
 
   !> The width of a window that holds a few events: by the rate since the last filling or, at first, by the
   !> median wait of a sample of disks. `never` if nothing is expected at all.
@@ -154,7 +94,7 @@ contains
     integer :: i, k, n_waits
 
     width = never
-    if (self%n_taken > sample_size .and. self%calendar) then
+    if (self%n_taken > sample_size .and. self%windowed) then
       width = events_per_window*(self%width*self%next_window - self%filled_at)/self%n_taken
       return
     end if
@@ -180,65 +120,26 @@ contains
     integer(int32), intent(in) :: i
     integer(int32) :: window
     real(real64) :: number
+    logical :: full
 
     number = disk(i)%event_time*self%per_time
     if (.not. number >= self%next_window) then     ! NaN as well, to be found
-      tag(i)%window = nowhere
+      tag(i)%window = window_none
       call self%insert_near(disk, i)
-    else
-      window = int(merge(number, last_window, number < last_window), int32)
-      if (window == tag(i)%window) return
-      tag(i)%window = window
-      if (window < self%ring_end) then
-        call file(self, self%bucket, disk, tag, i, window)
-      else
-        call file_far(self, self%span, i, window)
-      end if
-    end if
-  end subroutine schedule
-
-  !> Into the bucket of its window, which is not the current one.
-  subroutine file(self, bucket, disk, tag, i, window)
-    class(event_queue_t), intent(inout) :: self
-    type(bucket_t), intent(inout) :: bucket(0:*)
-    type(disk_t), intent(in) :: disk(*)
-    type(tag_t), intent(inout) :: tag(*)
-    integer(int32), intent(in) :: i, window
-    integer(int32) :: k, n
-
-    k = iand(window, self%last_bucket)
-    n = bucket(k)%n + 1
-    if (n > bucket_capacity) then
-      tag(i)%window = nowhere
-      call self%insert_into_heap(disk, i)
       return
     end if
-    bucket(k)%disk(n) = i
-    bucket(k)%n = n
-  end subroutine file
-
-  !> Into the list of the span of its window.
-  subroutine file_far(self, span, i, window)
-    class(event_queue_t), intent(inout) :: self
-    type(span_t), intent(inout) :: span(0:*)
-    integer(int32), intent(in) :: i, window
-    integer(int32) :: s, n
-
-    s = iand(shiftr(window, self%log_span), self%last_span)
-    n = span(s)%n + 1
-    if (n > size(span(s)%entry)) call self%lengthen(s)
-    span(s)%entry(n)%disk = i
-    span(s)%entry(n)%window = window
-    span(s)%n = n
-  end subroutine file_far
-
-  !> Makes room for as many entries of a span again.
-  subroutine lengthen(self, s)
-    class(event_queue_t), intent(inout) :: self
-    integer(int32), intent(in) :: s
-
-    self%span(s)%entry = [self%span(s)%entry, self%span(s)%entry]
-  end subroutine lengthen
+    window = int(merge(number, last_window, number < last_window), int32)
+    if (window == tag(i)%window) return
+    tag(i)%window = window
+    if (window < self%calendar%ring_end) then
+      call self%calendar%put_near(i, window, full)
+      if (.not. full) return
+      tag(i)%window = window_none
+      call self%insert_into_heap(disk, i)
+    else
+      call self%calendar%put_far(i, window)
+    end if
+  end subroutine schedule
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
   subroutine insert_near(self, disk, i)
@@ -246,10 +147,10 @@ contains
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
 
-    if (self%list_is_open) then
-      call insert(self%list, self%n_list, event_of(disk, i))
-      self%n_list = self%n_list + 1
-      self%list_is_open = self%n_list < list_capacity
+    if (self%near_is_open) then
+      call insert(self%near, self%n_near, event_of(disk, i))
+      self%n_near = self%n_near + 1
+      self%near_is_open = self%n_near < near_capacity
     else
       call hand_over(self, disk)
       call self%insert_into_heap(disk, i)
@@ -262,10 +163,10 @@ contains
     type(disk_t), intent(in) :: disk(*)
     integer(int32) :: k
 
-    do k = 1, self%n_list
-      if (expected(disk, self%list(k))) call self%heap%update(self%list(k))
+    do k = 1, self%n_near
+      if (expected(disk, self%near(k))) call self%heap%update(self%near(k))
     end do
-    self%n_list = 0
+    self%n_near = 0
   end subroutine hand_over
 
   subroutine insert_into_heap(self, disk, i)
@@ -306,10 +207,10 @@ contains
     integer(int32), intent(out) :: i
 
     do
-      do while (self%n_list > 0)
-        i = self%list(self%n_list)%disk
-        if (expected(disk, self%list(self%n_list))) return
-        self%n_list = self%n_list - 1
+      do while (self%n_near > 0)
+        i = self%near(self%n_near)%disk
+        if (expected(disk, self%near(self%n_near))) return
+        self%n_near = self%n_near - 1
       end do
       if (self%heap%n > 0) then
         call self%first_in_heap(disk, i)
@@ -343,8 +244,8 @@ contains
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i                !! as given by `first`
 
-    if (self%n_list > 0) then
-      self%n_list = self%n_list - 1
+    if (self%n_near > 0) then
+      self%n_near = self%n_near - 1
     else
       call self%heap%remove(i)
     end if
@@ -357,35 +258,20 @@ contains
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
 
-    self%n_list = self%n_list - merge(1, 0, self%list(self%n_list)%disk == i)
+    self%n_near = self%n_near - merge(1, 0, self%near(self%n_near)%disk == i)
   end subroutine forget
 
-  !> Announces disks that probably have events in the next windows, each window once at each stage, the earlier the
-  !> lower. After the first stage only those whose entry is not void.
-  subroutine coming(self, tag, stage, n, disks)
+  !> Lists disks that probably have events soon: see `calendar`.
+  subroutine list_coming(self, tag, stage, n, disks)
     class(event_queue_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: stage
     integer(int32), intent(out) :: n
     integer(int32), intent(out) :: disks(most_coming)    !! (n)
-    integer(int32) :: window, last, k
-    logical :: expected
 
     n = 0
-    if (.not. self%calendar) return
-    last = min(self%window + windows_ahead(stage), self%ring_end - 1)
-    do window = max(self%announced(stage), self%window) + 1, last
-      associate (bucket => self%bucket(iand(window, self%last_bucket)))
-        do k = 1, bucket%n
-          disks(n + 1) = bucket%disk(k)
-          expected = stage == 1
-          if (.not. expected) expected = tag(bucket%disk(k))%window == window
-          n = n + merge(1, 0, expected)
-        end do
-      end associate
-    end do
-    self%announced(stage) = last
-  end subroutine coming
+    if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
+  end subroutine list_coming
 
   !> What disk i expects.
   pure function event_of(disk, i) result(event)
@@ -415,11 +301,11 @@ contains
 
     self%window = self%window + 1
     self%next_window = self%window + 1
-    self%list_is_open = .true.
-    call take_bucket(self%bucket(iand(self%window, self%last_bucket)), disk, self%per_time, self%next_window, &
-      self%list, self%n_list)
+    self%near_is_open = .true.
+    call take_bucket(self%calendar%bucket(iand(self%window, self%calendar%last_bucket)), disk, self%per_time, &
+      self%next_window, self%near, self%n_near)
     if (self%heap%n > 0) call self%take_from_heap(disk)
-    if (iand(self%window, shiftl(1_int32, self%log_span) - 1) == 0) call self%open_next_span(disk, tag)
+    if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
   !> Empties a bucket into a sorted list: what its disks expect before the next window. Whatever else it
@@ -469,7 +355,7 @@ contains
     type(disk_t), intent(in) :: disk(*)
     integer(int32) :: i
 
-    do while (self%list_is_open)
+    do while (self%near_is_open)
       call self%first_in_heap(disk, i)
       if (i == 0) return
       call self%heap%remove(i)
@@ -478,30 +364,24 @@ contains
     call hand_over(self, disk)
   end subroutine take_from_heap
 
-  !> Files the events of the span that now is the next one into their buckets; those of a later turn stay, if they
-  !> still are what their disks expect. Or, if the windows do not fit, files all events anew.
+  !> Files the events of the next span into their buckets or, if windows have turned out far too narrow or too wide, all
+  !> events anew.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
     type(tag_t), intent(inout) :: tag(*)
-    type(entry_t) :: entry
-    integer(int32) :: s, k, n
+    integer(int32), allocatable :: surplus(:)
+    integer(int32) :: k, n
 
     if (ill_fitting(self)) then
-      call fill(self, disk(1:self%n_disks), tag(1:self%n_disks), self%width*self%window, calendar=.true.)
+      call fill(self, disk(1:self%n_disks), tag(1:self%n_disks), self%width*self%window, windowed=.true.)
       return
     end if
-    s = iand(shiftr(self%ring_end, self%log_span), self%last_span)
-    self%ring_end = self%ring_end + shiftl(1_int32, self%log_span)
-    n = self%span(s)%n
-    self%span(s)%n = 0
+    allocate (surplus(64))
+    call self%calendar%open_span(tag, n, surplus)
     do k = 1, n
-      entry = self%span(s)%entry(k)
-      if (entry%window < self%ring_end) then
-        call file(self, self%bucket, disk, tag, entry%disk, entry%window)
-      else if (tag(entry%disk)%window == entry%window) then    ! appends at most where it has read
-        call file_far(self, self%span, entry%disk, entry%window)
-      end if
+      tag(surplus(k))%window = window_none
+      call self%insert_into_heap(disk, surplus(k))
     end do
   end subroutine open_next_span
 

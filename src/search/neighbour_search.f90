@@ -105,7 +105,7 @@ contains
     real(real64), intent(in), optional :: shift(2)  !! of the candidates' image [length]
     real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
-    integer(int32) :: k, j, partner
+    integer(int32) :: k, n, j, partner
     logical :: fresh, falling
 
     fresh = iand(known, latest_clock) > 0
@@ -114,7 +114,8 @@ contains
     x = xi; y = yi; u = ui; v = vi; late = clock; best = near%time; partner = near%partner
     margin = margin_of_times*(abs(clock) + tiny(clock)/epsilon(clock)**2)
     from = 2*clock - margin
-    do k = 1, near%n
+    n = near%n
+    do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
       if (.not. fresh) then                   ! else the same numbers come out, with si = 0
@@ -140,17 +141,16 @@ contains
       latest = min(best, disk(j)%event_time)
       in_time = (from - (2 + margin_of_times)*latest)*b - c
       in_time = merge(in_time, disc, in_time < disc)
-      if (in_time > 0) then
-        t_j = late + max(c, 0.0_real64)/(sqrt(disc) + abs(b))
-        if (b >= 0) cycle
+      if (in_time > 0 .and. b < 0) then
+        t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
         if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or else it is now
-          if (b + (du*du + dv*dv)*(now - late) >= 0) cycle
-          t_j = now
+          t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
-        if (.not. t_j < best) then            ! seldom
-          if (t_j > best .or. .not. before(i, j + 1, partner)) cycle
+        if (t_j < best) then
+          best = t_j; partner = j + 1
+        else if (.not. t_j > best) then       ! seldom
+          if (before(i, j + 1, partner)) partner = j + 1
         end if
-        best = t_j; partner = j + 1
       end if
     end do
     near%time = best; near%partner = partner
