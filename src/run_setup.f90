@@ -46,7 +46,7 @@ contains
         allocate (all_pairs_t :: events%search)
         events%search%everyone = settings%search == "rescan"
       end if
-      events%calendar = settings%queue == "calendar"
+      events%windowed = settings%queue == "calendar"
       call move_alloc(events, evolution)
     end if
   end subroutine choose_evolution

@@ -3,6 +3,7 @@ module renumbering
   use kinds, only: int32, real64
   use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
+  use sorting, only: sort_by_count
   implicit none
   private
   public :: renumber
@@ -13,28 +14,20 @@ contains
 
   !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
   !> few pages hold a neighbourhood. The order follows from the state alone and is the same for every search
-  !> and queue; `tag%id` keeps the names.
+  !> and queue; `tag%id` keeps the order of the input.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:)
-    integer(int32) :: n(2), c(2), i, k
+    integer(int32) :: n(2), c(2), i
 
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
     n = tile*((n + tile - 1)/tile)
-    allocate (first(0:product(n)), place(sim%n_disks()), cell(sim%n_disks()))
-    first = 0
+    allocate (place(sim%n_disks()), cell(sim%n_disks()))
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*n, 0.0_real64), n - 1.0_real64), int32)
-      cell(i) = tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
-      first(cell(i) + 1) = first(cell(i) + 1) + 1
+      cell(i) = 1 + tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
     end do
-    do k = 1, product(n)
-      first(k) = first(k) + first(k - 1)
-    end do
-    do i = 1, sim%n_disks()
-      first(cell(i)) = first(cell(i)) + 1
-      place(i) = first(cell(i))
-    end do
+    call sort_by_count(cell, product(n), first, place)
     call permute(sim%disk, sim%tag, place)
   end subroutine renumber
 

@@ -139,8 +139,7 @@ contains
       inset = merge(0.0_real64, radius, packing%box%periodic)
       first = 1 + sum(species(:s - 1)%count)
       call packing%open_species(s, radius, species(s)%count, packing%box%lower + inset, packing%box%upper - inset)
-      call insert_at_random(packing, s, first, species(s)%count, packing%box%lower + inset, &
-        packing%box%upper - inset, stream, placed)
+      call insert_at_random(packing, s, first, stream, placed)
       complete = placed == species(s)%count
       if (.not. complete) return
     end do

@@ -12,6 +12,7 @@ module packing
   !> The cells of one species.
   type :: layer_t
     real(real64) :: radius = 0.0_real64             !! [length]
+    integer(int32) :: count = 0                     !! number of disks to come
     real(real64) :: lower(2) = 0.0_real64           !! all its centres lie between these [length]
     real(real64) :: upper(2) = 0.0_real64
     real(real64) :: density(2) = 0.0_real64         !! cells per length [1/length]
@@ -69,6 +70,7 @@ contains
     n = max(int(extent/side), 1)
     associate (layer => self%layer(s))
       layer%radius = radius
+      layer%count = count
       layer%lower = lower
       layer%upper = upper
       layer%density = 0

@@ -189,7 +189,7 @@ contains
       ! Where room ends differs from trial to trial, the more so the fewer the disks.
       do trial = 1, max(1, many_trials/me%count)
         call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
-        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), me%count, lower, upper, stream, placed)
+        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), stream, placed)
         if (placed == me%count) return
         if (me%count > nearly*placed + few) exit
       end do

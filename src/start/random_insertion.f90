@@ -21,20 +21,21 @@ module random_insertion
 
 contains
 
-  !> Inserts disks first, first + 1, ... of a species with centres in a rectangle, until `count` are
-  !> placed or no room is left.
-  pure subroutine insert_at_random(packing, s, first, count, lower, upper, stream, placed)
+  !> Inserts the disks of a species, numbered from `first`, until all are placed or no room is left.
+  pure subroutine insert_at_random(packing, s, first, stream, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! a species that is open
-    integer(int32), intent(in) :: first, count
-    real(real64), intent(in) :: lower(2), upper(2)  !! corners of the rectangle [length]
+    integer(int32), intent(in) :: first
     type(random_stream_t), intent(inout) :: stream
-    integer(int32), intent(out) :: placed
+    integer(int32), intent(out) :: placed           !! how many
     type(voxels_t) :: voxels
-    integer(int32) :: k, blocker, failures
-    real(real64) :: p(2), radius
+    integer(int32) :: k, blocker, failures, count
+    real(real64) :: p(2), radius, lower(2), upper(2)
 
     radius = packing%layer(s)%radius
+    count = packing%layer(s)%count
+    lower = packing%layer(s)%lower
+    upper = packing%layer(s)%upper
     call tile(voxels, lower, upper, shape(packing%layer(s)%head))
     placed = 0
     failures = 0
@@ -49,8 +50,8 @@ contains
       else
         failures = failures + 1
       end if
-      if (covered(voxels, k, packing, radius, blocker)) call drop_voxel(voxels, k)
-      ! Halving costs four searches per voxel; half as many attempts in vain are a sign for it.
+      if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) call drop_voxel(voxels, k)
+      ! Halving costs four searches per voxel; it pays when half as many attempts have failed.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
         failures = 0
@@ -89,18 +90,7 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + p)*voxels%side
   end subroutine draw_point
 
-  !> Whether a disk, or an obstacle, leaves no room in voxel k.
-  pure function covered(voxels, k, packing, radius, by) result(yes)
-    type(voxels_t), intent(in) :: voxels
-    integer(int32), intent(in) :: k
-    type(packing_t), intent(in) :: packing
-    real(real64), intent(in) :: radius
-    integer(int32), intent(in) :: by
-    logical :: yes
-
-    yes = packing%covers(by, middle(voxels, k), 0.5_real64*voxels%side, radius)
-  end function covered
-
+  !> The centre of voxel k.
   pure function middle(voxels, k) result(p)
     type(voxels_t), intent(in) :: voxels
     integer(int32), intent(in) :: k
@@ -109,7 +99,7 @@ contains
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
 
-  !> Forgets voxel k; the last one takes its number.
+  !> Removes voxel k; the last one takes its number.
   pure subroutine drop_voxel(voxels, k)
     type(voxels_t), intent(inout) :: voxels
     integer(int32), intent(in) :: k

@@ -186,7 +186,7 @@ contains
       allocate (all_pairs_t :: dynamics%search)
       dynamics%search%everyone = index(method, "rescan") > 0
     end if
-    dynamics%calendar = index(method, "heap") == 0
+    dynamics%windowed = index(method, "heap") == 0
     call dynamics%start(sim)
   end subroutine prepare
 
