@@ -37,7 +37,7 @@ contains
 
     segment%middle = 0.5_real64*(from + to)
     segment%half = 0.5_real64*(to - from)
-    segment%length = norm2(segment%half)
+    segment%length = sqrt(dot_product(segment%half, segment%half))
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
@@ -110,9 +110,10 @@ contains
   pure function gap(self, d, radius) result(length)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2), radius
-    real(real64) :: length
+    real(real64) :: length, offset(2)
 
-    length = norm2(self%from_outline(d)) - radius
+    offset = self%from_outline(d)
+    length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
   !> Unit vector from the wall to a disk that touches it.
@@ -122,7 +123,7 @@ contains
     real(real64) :: direction(2)
 
     direction = self%from_outline(d)
-    direction = direction/norm2(direction)
+    direction = direction/sqrt(dot_product(direction, direction))
   end function normal
 
   !> Whether a disk with its centre in a rectangle can touch the wall: separating axes, corners not rounded.
@@ -135,7 +136,7 @@ contains
     across = [-self%along(2), self%along(1)]
     room = (half + radius)*(1 + spare)
     yes = all(abs(d) <= room + abs(self%half)*(1 + spare)) .and. &
-      abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*norm2(d)
+      abs(dot_product(d, across)) <= dot_product(room, abs(across)) + spare*sqrt(dot_product(d, d))
   end function reaches
 
   !> Whether the wall keeps disks out of a whole rectangle: as the stadium is convex, out of its corners.

@@ -2,17 +2,20 @@
 module test_systems
   use kinds, only: dp => real64, int32, int64, never
   use all_pairs, only: all_pairs_t
-  use box_geometry, only: box_t, obstacle_reach, obstacle_t
+  use box_geometry, only: box_t, obstacle_gap, obstacle_t
   use cell_grid, only: cell_grid_t
+  use circles, only: new_circle
   use disks, only: disk_t, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use random_stream, only: random_stream_t
+  use segments, only: new_segment
+  use shapes, only: shape_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: few_disks, system, systems, prepare, evolve, difference
+  public :: add_obstacle, few_disks, system, systems, prepare, evolve, difference
   public :: total_energy, momentum, angular_momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, disk_named
 
@@ -23,7 +26,8 @@ module test_systems
     "walls round pegs gravity smooth", "walls pegs inelastic", "channel", "channel gravity pegs mixture", &
     "channel inelastic contact", "periodic", "periodic few", "periodic dense mixture", &
     "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture", &
-    "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact"]
+    "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact", &
+    "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute"]
 
 contains
 
@@ -52,7 +56,7 @@ contains
   end function few_disks
 
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
-  !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` to bounce off and a
+  !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
   !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the first
   !> disk hits; `inelastic`; `smooth` walls; `contact` time; `few`, `dilute` or `dense`.
   function system(words, seed) result(sim)
@@ -98,18 +102,39 @@ contains
     end function has
   end function system
 
-  !> Circles: three of different size, one of them astride the left side, or one container.
+  !> Circles: three of different size, one of them astride the left side, or one container; and straight walls.
   subroutine add_obstacles(sim, words)
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: words
-    allocate (sim%box%obstacle(0))
-    if (index(words, "pegs") > 0) sim%box%obstacle = [ &
-      obstacle_t("small", [-1.0_dp, 1.1_dp], 0.15_dp, .false.), &
-      obstacle_t("middle", [0.9_dp, 1.9_dp], 0.2_dp, .false.), &
-      obstacle_t("large", [1.2_dp, 1.2_dp], 0.3_dp, .false.)]
-    if (index(words, "round") > 0) sim%box%obstacle = [sim%box%obstacle, &
-      obstacle_t("round", [0.5_dp, 1.5_dp], 0.98_dp, .true.)]
+    if (index(words, "pegs") > 0) then
+      call add_obstacle(sim%box, "small", new_circle([-1.0_dp, 1.1_dp], 0.15_dp, .false.))
+      call add_obstacle(sim%box, "middle", new_circle([0.9_dp, 1.9_dp], 0.2_dp, .false.))
+      call add_obstacle(sim%box, "large", new_circle([1.2_dp, 1.2_dp], 0.3_dp, .false.))
+    end if
+    if (index(words, "round") > 0) call add_obstacle(sim%box, "round", new_circle([0.5_dp, 1.5_dp], 0.98_dp, .true.))
+    if (index(words, "slants") > 0) then
+      call add_obstacle(sim%box, "short", new_segment([-1.2_dp, 1.0_dp], [-0.6_dp, 1.4_dp]))
+      call add_obstacle(sim%box, "long", new_segment([0.2_dp, 1.9_dp], [1.9_dp, 1.1_dp]))
+    end if
   end subroutine add_obstacles
+
+  !> Adds an obstacle to a box.
+  pure subroutine add_obstacle(box, name, shape)
+    type(box_t), intent(inout) :: box
+    character(len=*), intent(in) :: name
+    class(shape_t), intent(in) :: shape
+    type(obstacle_t), allocatable :: more(:)
+    integer :: m, n
+
+    n = box%n_obstacles()
+    allocate (more(n + 1))
+    do m = 1, n
+      more(m) = box%obstacle(m)
+    end do
+    more(n + 1)%name = name
+    allocate (more(n + 1)%shape, source=shape)
+    call move_alloc(more, box%obstacle)
+  end subroutine add_obstacle
 
   !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
   !> site, with velocity components uniform in (-1,1).
@@ -164,9 +189,9 @@ contains
     logical :: yes
     integer :: k
     yes = .true.
-    do k = 1, size(sim%box%obstacle)
-      associate (o => sim%box%obstacle(k))
-        yes = yes .and. (norm2(separation(sim%box, site, o%centre)) > obstacle_reach(o, radius) .neqv. o%inside)
+    do k = 1, sim%box%n_obstacles()
+      associate (shape => sim%box%obstacle(k)%shape)
+        yes = yes .and. .not. shape%covers(shape%from_nearest(site, sim%box%periods()), [0.0_dp, 0.0_dp], radius)
       end associate
     end do
     do k = 1, size(sim%disk)
@@ -288,9 +313,8 @@ contains
   !> concerned; negative if any overlap.
   pure function tightest_gap(sim) result(gap)
     type(simulation_t), intent(in) :: sim
-    real(dp) :: gap, x(2), dx(2), reach
-    integer(int32) :: i, j
-    integer :: m
+    real(dp) :: gap, x(2), dx(2)
+    integer(int32) :: i, j, m
     gap = never
     do i = 1, sim%n_disks()
       x = sim%position(i)
@@ -300,10 +324,8 @@ contains
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
         gap = min(gap, minval(merge(never, min(x - sim%box%lower, sim%box%upper - x) - r, sim%box%periodic))/(2*r))
-        do m = 1, n_obstacles(sim)
-          reach = obstacle_reach(sim%box%obstacle(m), r)
-          dx(1) = norm2(separation(sim%box, x, sim%box%obstacle(m)%centre)) - reach
-          gap = min(gap, merge(-dx(1), dx(1), sim%box%obstacle(m)%inside)/(2*r))
+        do m = 1, sim%box%n_obstacles()
+          gap = min(gap, obstacle_gap(sim%box, m, x, r)/(2*r))
         end do
       end associate
     end do
@@ -317,13 +339,6 @@ contains
     dx = b - a
     dx = dx - merge(box%edges()*anint(dx/box%edges()), 0.0_dp, box%periodic)
   end function separation
-
-  pure function n_obstacles(sim) result(n)
-    type(simulation_t), intent(in) :: sim
-    integer :: n
-    n = 0
-    if (allocated(sim%box%obstacle)) n = size(sim%box%obstacle)
-  end function n_obstacles
 
   !> Where the disk with this id is in memory.
   pure function disk_named(sim, id) result(i)
