@@ -49,6 +49,30 @@ def test_promises_are_held_by_tests_that_exist():
     assert [word for word in named if word not in known] == []
 
 
+def procedures_of(module):
+    """The names of all procedures of a module, named as in `physics/collisions`."""
+    path = ROOT / "src" / f"{module}.f90"
+    code = path.read_text() if path.exists() else ""
+    return re.findall(r"^ *(?!end\b)[^!'\"\n]*?\b(?:subroutine|function) +(\w+) *\(", code, re.M)
+
+
+def test_procedures_that_the_page_where_names_exist():
+    """On docs/where.md `folder/file: procedure` is one in src/."""
+    named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", (ROOT / "docs" / "where.md").read_text())
+    assert len(named) > 30
+    missing = [f"{module}: {name}" for module, name in named if name not in procedures_of(module)]
+    assert missing == []
+
+
+def test_modules_that_keep_a_promise_exist():
+    """In the tables of docs/reliability.md the third column names modules of src/ and scripts."""
+    cells = re.findall(r"^\|(?: [^|]+ \|){2} ([^|]+) \|", PROMISES.read_text(), re.M)
+    named = [word for cell in cells for word in re.findall(r"`(\w[\w/.]*\w)`", cell)]
+    assert len(named) > 40
+    places = [ROOT / word if "." in word else ROOT / "src" / f"{word}.f90" for word in named]
+    assert [str(place) for place in places if not place.exists()] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_scripts_and_inputs_that_are_named_exist(page):
     folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
