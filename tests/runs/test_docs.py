@@ -13,6 +13,7 @@ from synthetic_run import ROOT, write_run
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
 PROMISES = ROOT / "docs" / "reliability.md"
+INVARIANTS = ROOT / "docs" / "architecture.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
@@ -36,14 +37,15 @@ def test_the_readme_leads_to_every_page():
     assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
 
 
-def test_promises_are_held_by_tests_that_exist():
-    """In the tables of docs/reliability.md the second column names files and tests."""
+@pytest.mark.parametrize("page", [PROMISES, INVARIANTS], ids=lambda page: page.name)
+def test_promises_are_held_by_tests_that_exist(page):
+    """In the tables the second column names files and tests."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
     )
     known = {name for pair in known for name in pair}
-    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", PROMISES.read_text(), re.M)
+    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", page.read_text(), re.M)
     named = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
     assert len(named) > 20
     assert [word for word in named if word not in known] == []
