@@ -21,15 +21,14 @@ GROUPS = {
 HEAD = """\
 # Input: every variable
 
-A file is made of groups `&name ... /` that hold `variable = value`; only what differs from the
+A file consists of groups `&name ... /` with lines `variable = value`; only what differs from the
 default is needed. The rules, and the ways to describe disks, are in
 [input/README](../input/README.md); [input/reference.nml](../input/reference.nml) is a file with
-all variables. `ricochet --explain VARIABLE` says the same as this page, which
-`docs/input_page.py` makes from it.
+all variables. `docs/input_page.py` generates this page from `ricochet --explain`.
 
-A variable is set from the command line as `--set GROUP.VARIABLE=VALUE`; a species or an obstacle
-goes by its name: `--set species.projectile.mass=50`. Units are those of the file itself: whatever
-it takes as length, time and mass.
+On the command line a variable is set with `--set GROUP.VARIABLE=VALUE`; a species or an obstacle is
+addressed by its name: `--set species.projectile.mass=50`. The file chooses the units of length,
+time and mass.
 """
 
 ENTRY = re.compile(

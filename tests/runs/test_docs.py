@@ -13,6 +13,7 @@ from synthetic_run import ROOT, write_run
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
 PROMISES = ROOT / "docs" / "reliability.md"
+INVARIANTS = ROOT / "docs" / "architecture.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
@@ -36,17 +37,42 @@ def test_the_readme_leads_to_every_page():
     assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
 
 
-def test_promises_are_held_by_tests_that_exist():
-    """In the tables of docs/reliability.md the second column names files and tests."""
+@pytest.mark.parametrize("page", [PROMISES, INVARIANTS], ids=lambda page: page.name)
+def test_promises_are_held_by_tests_that_exist(page):
+    """In the tables the second column names files and tests."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
     )
     known = {name for pair in known for name in pair}
-    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", PROMISES.read_text(), re.M)
+    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", page.read_text(), re.M)
     named = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
     assert len(named) > 20
     assert [word for word in named if word not in known] == []
+
+
+def procedures_of(module):
+    """The names of all procedures of a module, named as in `physics/collisions`."""
+    path = ROOT / "src" / f"{module}.f90"
+    code = path.read_text() if path.exists() else ""
+    return re.findall(r"^ *(?!end\b)[^!'\"\n]*?\b(?:subroutine|function) +(\w+) *\(", code, re.M)
+
+
+def test_procedures_that_the_page_where_names_exist():
+    """On docs/where.md `folder/file: procedure` is one in src/."""
+    named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", (ROOT / "docs" / "where.md").read_text())
+    assert len(named) > 30
+    missing = [f"{module}: {name}" for module, name in named if name not in procedures_of(module)]
+    assert missing == []
+
+
+def test_modules_that_keep_a_promise_exist():
+    """In the tables of docs/reliability.md the third column names modules of src/ and scripts."""
+    cells = re.findall(r"^\|(?: [^|]+ \|){2} ([^|]+) \|", PROMISES.read_text(), re.M)
+    named = [word for cell in cells for word in re.findall(r"`(\w[\w/.]*\w)`", cell)]
+    assert len(named) > 40
+    places = [ROOT / word if "." in word else ROOT / "src" / f"{word}.f90" for word in named]
+    assert [str(place) for place in places if not place.exists()] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

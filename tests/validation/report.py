@@ -9,12 +9,25 @@ from .case import Verdict
 
 HEAD = """# Physics validation
 
-Written by `python tests/validate.py --report docs/validation`. Every case runs the program on an
-input of its own and compares what it wrote with an exact result, a derivation, or published
-numbers. Where a case has several values, the table shows the one that comes nearest to its
-tolerance; *used* is its deviation over the allowed one. Names of sources: EX the exam problem, LAB
-the laboratory exercise, URB the gravity box, D a derivation, R an independent simulator, DSMC
-direct simulation of the Boltzmann equation, KR Kolafa and Rottner (2006).
+Written by `python tests/validate.py --report docs/validation`. Every case runs the program on its
+own input and compares the output with an exact result, a derivation, or published numbers. If a
+case has several values, the table shows the one closest to its tolerance; *used* is its deviation
+divided by the allowed one. Sources: EX the exam problem, LAB the laboratory exercise, URB the
+gravity box, D a derivation, R an independent simulator, DSMC direct simulation of the Boltzmann
+equation, KR Kolafa and Rottner (2006).
+
+| cases | topic |
+|---|---|
+| P1 to P3 | one and two disks: walls, bounces, collisions, scattering, against exact formulas |
+| P4 | ten disks on a line: the exact trajectory of hard rods, until rounding has grown |
+| P5, P6 | speeds of a gas and a mixture: Maxwell's law, moments, the way to equilibrium |
+| P7, P8 | collision rates and pressure from dilute gas to crystal, against the equation of state |
+| P9 | inelastic gases: Haff's law, mixtures without equipartition, the TC model, collapse |
+| P10 | craters: scaling, energy, size against mass, collapse; random placement up to saturation |
+| P11 | disks under gravity: energy, equipartition, barometric law, contacts that time steps miss |
+| P12 | billiards: a round container, Sinai's, a light disk around a heavy one |
+| P13 | symmetries: conservation, reversal, boosts, scaling, no overlaps |
+| P14 | velocity correlations and diffusion |
 
 """
 
@@ -23,24 +36,24 @@ NOTES = """
 ## References that needed a second look
 
 - **P11-10**: the share of collisions that time steps miss is P(q) with q = g Δt / s, not
-  g Δt / 2s. Two disks overlap on a chord of length 2l, but are treated only while they approach,
-  on its first half: a contact is seen for the time l / g, not 2l / g (`post/missed.py`). The share
-  is then about four times that of the table: at Δt = .001 still within 2 %, at .004 not.
+  g Δt / 2s. Two disks overlap on a chord of length 2l, but collide only while they approach, on its
+  first half: a contact is visible for the time l / g, not 2l / g (`post/missed.py`). The share is
+  then about four times that of the table: at Δt = .001 still within 2 %, at .004 not.
 - **P6-03**: R finds 1.39(1) between walls at packing .154 after 2 collisions per disk. The program
-  gives 1.468(6), by time steps 1.485(11), in the dilute limit 1.449(8), the Boltzmann equation
-  1.455. After 4 and 6 it gives 1.149(6) and 1.055(6), R 1.14(1) and 1.03(1).
-- **P9-07**: the fractions hold to .01 up to packing .1. Beyond, disks that have met meet again and
-  the intervals scatter more: at packing .2 and .4 the fraction is .850 and .846 for w t_c = 1
+  gives 1.468(6), with time steps 1.485(11), in the dilute limit 1.449(8); the Boltzmann equation
+  gives 1.455. After 4 and 6 collisions it gives 1.149(6) and 1.055(6), R 1.14(1) and 1.03(1).
+- **P9-07**: the fractions hold to .01 up to packing .1. Beyond, the same disks meet again and the
+  intervals scatter more: at packing .2 and .4 the fraction is .850 and .846 for w t_c = 1
   (table .86), .612 and .608 for .5 (.62).
-- **P10-04**: not every bed collapses before a tenth of the energy is left; of 18 tried 14 did.
+- **P10-04**: not every bed collapses before a tenth of the energy is left; 14 of 18 did.
 - **P7-07**: the contact values of section 7 are approximate. To first order in the density they are
   1 + sum over k of n_k times the area where circles of radii s_ik and s_jk about the two centres
-  overlap. For radii 1 : 2 that is +.26, +.16, -.29 % (11, 12, 22) at packing .1, beside -.2 %
-  of like pairs for N_i - 1 partners: what is measured, +.11(5), +.14(7), -.45(6) %.
+  overlap. For radii 1 : 2 that is +.26, +.16, -.29 % (11, 12, 22) at packing .1, and -.2 % for
+  pairs of one species, which have N_i - 1 partners; measured are +.11(5), +.14(7), -.45(6) %.
 - **P8-05**: the formula of the crystal is good to .2 %: the program finds -.15, -.21, -.15, -.07,
-  -.01 % at packing .74, .77, .80, .83, .86 (errors .03 to .01), and 0 close to .9069.
-- **P8-03** is a remark, not a case. What the program gives up to packing .70 agrees with Li et al.
-  (2022) within its errors of .03 to .2 %.
+  -.01 % at packing .74, .77, .80, .83, .86 (errors .03 to .01), and 0 near .9069.
+- **P8-03** is a remark, not a case. Up to packing .70 the program agrees with Li et al. (2022)
+  within its errors of .03 to .2 %.
 """
 
 
