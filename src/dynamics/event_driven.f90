@@ -108,9 +108,9 @@ contains
       if (reached(self, sim, limits)) return
       if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       t_limit = min(limits%time - sim%epoch, last_time)
-      pause = next_pause(self, sim, limits)
-      if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause)
-      call self%run_events(sim, t_limit, pause, turns, event)
+      pause_at = next_pause(self, sim, limits)
+      if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
+      call self%run_events(sim, t_limit, pause_at, turns, event)
       if (.not. event%time <= t_limit) then
         if (event%time /= event%time) &
           call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
@@ -123,9 +123,9 @@ contains
     end do
   end subroutine advance
 
-  !> The loop: event after event, up to the number `pause` of collisions, to the limit of time, or as long as
+  !> The loop: event after event, up to the number `pause_at` of collisions, to the limit of time, or as long as
   !> there are turns. Hot path only; rare work is left to the caller.
-  subroutine run_events(self, sim, t_limit, pause, turns, event)
+  subroutine run_events(self, sim, t_limit, pause_at, turns, event)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
@@ -147,7 +147,7 @@ contains
       events = sim%events
       call execute(self, sim, i, code, t)
       if (self%search%everyone .and. sim%events > events) call self%predict_all(sim)
-      if (sim%events >= pause) exit
+      if (sim%events >= pause_at) exit
     end do
     event = event_t(t, i, code)
   end subroutine run_events
@@ -176,7 +176,7 @@ contains
   end function next_pause
 
   !> Prefetches what the next events will read, and pauses soon to do so again.
-  subroutine read_ahead(self, sim, pause)
+  subroutine read_ahead(self, sim, pause_at)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(inout) :: pause
@@ -186,7 +186,7 @@ contains
       call self%queue%list_coming(sim%tag, stage, n, disks)
       call self%search%read_ahead(sim, stage, disks(:n))
     end do
-    pause = min(pause, sim%events + events_ahead)
+    pause_at = min(pause_at, sim%events + events_ahead)
   end subroutine read_ahead
 
   !> Executes the event of disk i, and predicts the disks concerned again.
