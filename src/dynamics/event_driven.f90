@@ -101,7 +101,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_t) :: event
     real(real64) :: t_limit
-    integer(int64) :: turns, pause
+    integer(int64) :: turns, pause_at
 
     turns = limits%turns
     do while (turns > 0)
@@ -129,7 +129,7 @@ contains
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
-    integer(int64), intent(in) :: pause
+    integer(int64), intent(in) :: pause_at
     integer(int64), intent(inout) :: turns         !! that are left
     type(event_t), intent(out) :: event            !! the last one; beyond the limit of time: not executed
     real(real64) :: t
@@ -179,7 +179,7 @@ contains
   subroutine read_ahead(self, sim, pause_at)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int64), intent(inout) :: pause
+    integer(int64), intent(inout) :: pause_at
     integer(int32) :: stage, n, disks(most_coming)
 
     do stage = 1, stages
