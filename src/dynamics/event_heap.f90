@@ -1,12 +1,12 @@
-!> An array-backed min-heap of events, at most one per disk, with access by disk: earliest first, ties in
-!> a fixed order that does not depend on who expects the event or how it was filed.
+!> An array-backed min-heap of events with four children per node, at most one event per disk, with access by disk:
+!> earliest first, ties in a fixed order that does not depend on which disk expects the event or how it was filed.
 module event_heap
   use kinds, only: int32, real64
   implicit none
   private
   public :: event_t, event_heap_t, need_order, precedes
 
-  integer(int32), parameter :: arity = 4         !! children per node: shallower than 2, same cache lines
+  integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
 
   !> An event that a disk expects.
   type :: event_t
@@ -28,8 +28,9 @@ module event_heap
 
 contains
 
-  !> Order of events: by time, then by the lower and the higher disk concerned. Both disks of a pair may
-  !> expect the same collision; it takes its turn no matter which of them does.
+  !> Order of events: by time, then by the lower and the higher disk concerned. Both disks of a pair may expect the same
+  !> collision; its place does not depend on which of them does. The twin of this rule for candidates of one disk is
+  !> `neighbour_search: before`; change both or none.
   elemental function precedes(a, b) result(yes)
     type(event_t), intent(in) :: a, b
     logical :: yes
@@ -50,7 +51,7 @@ contains
     end if
   end function precedes
 
-  !> Not zero if two events at the same moment need an order: most are one collision that both disks expect.
+  !> Not zero if two simultaneous events need an order: most are one collision that both disks expect.
   elemental function need_order(a, b) result(bits)
     type(event_t), intent(in) :: a, b
     integer(int32) :: bits
@@ -86,7 +87,7 @@ contains
     if (self%slot(event%disk) == k) call sift_down(self, k, event)
   end subroutine update
 
-  !> Takes a disk's event out; nothing happens if there is none.
+  !> Removes a disk's event, if there is one.
   pure subroutine remove(self, disk)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: disk

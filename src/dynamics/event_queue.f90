@@ -1,11 +1,9 @@
 !> What happens next: a calendar over the heap (G. Paul, J. Comput. Phys. 221, 615 (2007)).
 !>
-!> The near future, one window of time, is a short sorted list; if it grows long, the heap takes over until
-!> the window is done. Events of the next windows lie in append-only buckets of one cache line, one bucket per
-!> window; later ones in unordered lists, one per span of many windows, so that those who append, at any
-!> distance, write to few places; those that find their bucket full in the heap. Nothing is searched or
-!> unlinked: an entry counts only if it still is what its disk expects. Without buckets all events are in the
-!> heap.
+!> The near future, one window of time, is a short sorted list; if it grows long, the heap takes over until the window
+!> is done. Later events go to the calendar; those whose bucket is full go to the heap. Nothing is ever searched or
+!> removed singly: an entry counts only if it is still what its disk expects. Without the calendar all events are in
+!> the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, stages, window_none
@@ -52,7 +50,7 @@ module event_queue
 
 contains
 
-  !> Files the expected events of all disks anew.
+  !> Files the events of all disks anew.
   subroutine fill(self, disk, tag, now, windowed)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -112,7 +110,7 @@ contains
       /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
   end function window_width
 
-  !> Files what disk i expects. Its former entry, if any, turns void by itself.
+  !> Files the event of disk i. An earlier entry, if any, becomes invalid by itself.
   subroutine schedule(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -169,6 +167,7 @@ contains
     self%n_near = 0
   end subroutine hand_over
 
+  !> Into the heap.
   subroutine insert_into_heap(self, disk, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -177,8 +176,8 @@ contains
     call self%heap%update(event_of(disk, i))
   end subroutine insert_into_heap
 
-  !> Puts an event into its place in a sorted list of n. Times decide nearly always: of events at the same
-  !> moment most are one collision that both disks expect, and these need no order.
+  !> Inserts an event into a sorted list of n. Times nearly always decide: most simultaneous events are one collision
+  !> that both disks expect, and these need no order.
   pure subroutine insert(list, n, event)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
@@ -220,7 +219,7 @@ contains
     end do
   end subroutine first
 
-  !> The disk whose event comes first of those in the heap; 0: none is due in this window.
+  !> The disk with the first event in the heap; 0: none is due in this window.
   subroutine first_in_heap(self, disk, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -239,7 +238,7 @@ contains
     i = 0
   end subroutine first_in_heap
 
-  !> Takes the event that `first` found out of the queue.
+  !> Removes the event that `first` found.
   subroutine drop_first(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i                !! as given by `first`
@@ -252,8 +251,8 @@ contains
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
 
-  !> Tells that the event of disk i is void by now. Only saves time: of a collision that both disks expected
-  !> the second entry comes right after the first.
+  !> Drops the event of disk i if it is next. Only saves time: when both disks of a collision expected it, the second
+  !> entry follows the first.
   subroutine forget(self, i)
     class(event_queue_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -273,7 +272,7 @@ contains
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> What disk i expects.
+  !> The event of disk i.
   pure function event_of(disk, i) result(event)
     type(disk_t), intent(in) :: disk(*)
     integer(int32), intent(in) :: i
@@ -282,7 +281,7 @@ contains
     event = event_t(disk(i)%event_time, i, disk(i)%partner)
   end function event_of
 
-  !> Whether an entry still is what its disk expects.
+  !> Whether an entry is still what its disk expects.
   pure function expected(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
     type(event_t), intent(in) :: event
@@ -308,9 +307,8 @@ contains
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
-  !> Empties a bucket into a sorted list: what its disks expect before the next window. Whatever else it
-  !> holds is void. Events are so few that each is put in its place by counting the later ones, without a branch
-  !> on times.
+  !> Empties a bucket into a sorted list: the events that its disks expect before the next window; other entries are
+  !> no longer valid. They are so few that each finds its place by counting the later ones, without a branch on times.
   pure subroutine take_bucket(bucket, disk, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
@@ -349,7 +347,7 @@ contains
     end do
   end subroutine take_bucket
 
-  !> Moves what is due in this window from the heap into the list; if that is too much, all into the heap.
+  !> Moves what is due in this window from the heap into the list; if that overflows, everything into the heap.
   subroutine take_from_heap(self, disk)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)

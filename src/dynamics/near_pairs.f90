@@ -1,6 +1,6 @@
-!> Who overlaps, at the positions of a time step: disks with obstacles, and disks with disks. Tested are all
-!> pairs, or only those near each other: no other can touch before a disk has moved by half the `skin`, so
-!> that one list of them serves many steps (Verlet, Phys. Rev. 159, 98 (1967)).
+!> Which disks overlap at the positions of a time step, with obstacles and with each other. Either all pairs are tested,
+!> or only those near each other: others cannot touch before a disk has moved by half the `skin`, so one list serves
+!> many steps (Verlet, Phys. Rev. 159, 98 (1967)).
 module near_pairs
   use kinds, only: int32, pi, real64
   use partners, only: obstacle_code, obstacle_number
@@ -24,8 +24,8 @@ module near_pairs
     real(real64) :: sigma = 0.0_real64         !! distance of the centres of two disks at contact [length]
   end type pair_t
 
-  !> First the obstacles in their order, each with disks ascending; then pairs of disks, ascending in i, then
-  !> in the partner.
+  !> First the obstacles in order, each with its disks ascending; then pairs of disks, ascending in i, then in the
+  !> partner.
   type :: pair_list_t
     integer :: n = 0
     type(pair_t), allocatable :: pair(:)       !! (n, and room for more)
@@ -61,7 +61,7 @@ contains
     self%skin = -1
   end subroutine start
 
-  !> Lists who overlaps when the disks are at x; the plain way, which needs no memory.
+  !> Lists the overlaps when the disks are at x, testing all pairs.
   pure subroutine find_all_contacts(sim, x, contacts)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)        !! (2,disks) [length]
@@ -72,7 +72,7 @@ contains
     call add_overlaps(contacts, sim, x)
   end subroutine find_all_contacts
 
-  !> The same through the list of those near each other.
+  !> The same from the list of near pairs.
   subroutine find_contacts(self, sim, x, step, contacts)
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -85,7 +85,7 @@ contains
     call add_overlaps_listed(contacts, self%list, sim, x)
   end subroutine find_contacts
 
-  !> Takes in that disk i goes on from another place, a period away.
+  !> Notes that disk i has been moved by a period.
   subroutine shift(self, i, dx)
     class(near_pairs_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -134,7 +134,7 @@ contains
     end do
   end subroutine add_overlaps_listed
 
-  !> Adds the disks whose rim is less than some length away from an obstacle's. Obstacles are few: no cells.
+  !> Adds the disks whose rim is less than some length away from an obstacle. Obstacles are few: no bins.
   pure subroutine add_obstacles(list, sim, x, length)
     type(pair_list_t), intent(inout) :: list
     type(simulation_t), intent(in) :: sim
@@ -163,6 +163,7 @@ contains
     d2 = dx*dx + dy*dy
   end function distance2
 
+  !> Empties a list.
   pure subroutine empty(list)
     type(pair_list_t), intent(inout) :: list
 
@@ -170,6 +171,7 @@ contains
     if (.not. allocated(list%pair)) allocate (list%pair(100))
   end subroutine empty
 
+  !> Appends a pair to a list.
   pure subroutine append(list, pair)
     type(pair_list_t), intent(inout) :: list
     type(pair_t), intent(in) :: pair
@@ -184,7 +186,7 @@ contains
     list%pair(list%n) = pair
   end subroutine append
 
-  !> Whether the list still serves disks at x: nobody has moved by half the skin.
+  !> Whether the list is still valid for disks at x: none has moved by half the skin.
   pure function holds(self, x) result(yes)
     class(near_pairs_t), intent(in) :: self
     real(real64), intent(in) :: x(:, :)
@@ -201,7 +203,7 @@ contains
     yes = 4*farthest2 < (self%skin*(1 - spare))**2
   end function holds
 
-  !> Lists who is near whom when the disks are at x.
+  !> Lists the near pairs when the disks are at x.
   subroutine make_list(self, sim, x, step)
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -222,8 +224,7 @@ contains
     call sort_pairs(self%list%pair(n_obstacles + 1:self%list%n), sim%n_disks())
   end subroutine make_list
 
-  !> Wide enough to serve many steps, not so wide that most of the pairs are far. It decides about the cost
-  !> and nothing else.
+  !> Wide enough to serve many steps, not so wide that most pairs are far apart. Affects the cost only.
   pure function wanted_skin(sim, step) result(skin)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: step
@@ -240,7 +241,7 @@ contains
     skin = max(min(2*steps_per_list*step*sqrt(fastest2), reach - diameter), least_skin*diameter)
   end function wanted_skin
 
-  !> The cells are as wide as a mean disk and the skin reach; wider in a vast box.
+  !> Bins are as wide as a mean disk and the skin; wider in a vast box.
   subroutine sort_into_bins(bins, sim, x, skin)
     type(bins_t), intent(inout) :: bins
     type(simulation_t), intent(in) :: sim
@@ -266,7 +267,7 @@ contains
     end do
   end subroutine sort_into_bins
 
-  !> The cell at x, from (0,0): beyond a periodic side cells go on, beyond a wall the last one does.
+  !> The bin at x, from (0,0): bins continue beyond a periodic side, the last one continues beyond a wall.
   pure function column_and_row(bins, box, x) result(c)
     type(bins_t), intent(in) :: bins
     type(box_t), intent(in) :: box
@@ -282,8 +283,8 @@ contains
     end do
   end function column_and_row
 
-  !> Adds the pairs of disk i with disks near it that are smaller, or equal and behind it. So a small disk
-  !> looks only at cells close by, however large the largest disk is.
+  !> Adds the pairs of disk i with disks near it that are smaller, or equal with a higher number. So a small disk
+  !> searches only bins close by, however large the largest disk is.
   subroutine add_smaller_neighbours(list, bins, box, i, x, radius, skin)
     type(pair_list_t), intent(inout) :: list
     type(bins_t), intent(in) :: bins
@@ -306,7 +307,7 @@ contains
 
   contains
 
-    !> The same for the cells from c to d of a row.
+    !> The same for bins c to d of a row.
     subroutine add_run(c, d)
       integer(int32), intent(in) :: c, d
       integer(int32) :: k, j
@@ -324,7 +325,7 @@ contains
     end subroutine add_run
   end subroutine add_smaller_neighbours
 
-  !> Puts pairs of disks into order: by partner, then, keeping that where i is the same, by i.
+  !> Sorts pairs of disks by i, then by partner.
   subroutine sort_pairs(pair, n_disks)
     type(pair_t), intent(inout) :: pair(:)
     integer(int32), intent(in) :: n_disks

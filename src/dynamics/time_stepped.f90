@@ -1,8 +1,8 @@
-!> Time-stepped dynamics: exact free flight over a fixed step; then every disk beyond a wall turns round, and
-!> every pair that overlaps and approaches collides, once. A contact is noticed up to one step late, a
-!> short one not at all: this is the method to compare the event-driven one with.
+!> Time-stepped dynamics: exact free flight over a fixed step; then every disk beyond a wall is reflected, and every
+!> pair that overlaps and approaches collides once. A contact is noticed up to one step late, a short one not at all:
+!> this is the method to compare the event-driven one with.
 !>
-!> As there, a disk's own state changes only at its own collisions: no error adds up from step to step.
+!> As there, a disk's own state changes only at its own collisions, so no error accumulates from step to step.
 module time_stepped
   use kinds, only: int32, int64, never, real64
   use box_geometry, only: box_t, wall_normal
@@ -11,7 +11,7 @@ module time_stepped
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
-  use free_flight, only: slowest
+  use free_flight, only: flight, slowest
   use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
   use partners, only: axis_of, n_sides, nothing, sense_of
   use shapes, only: nearest_image
@@ -40,6 +40,7 @@ module time_stepped
 
 contains
 
+  !> Makes room for positions, and forgets near pairs.
   subroutine start(self, sim)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -85,7 +86,7 @@ contains
     end do
   end function steps_taken
 
-  !> Whether nothing moves, and nothing ever will.
+  !> Whether nothing moves and nothing ever will.
   pure function at_rest(sim) result(yes)
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -98,8 +99,8 @@ contains
     end do
   end function at_rest
 
-  !> All that happens at `sim%now`. First sides, then obstacles, then pairs of disks; each in ascending order,
-  !> so that it does not matter how they are found.
+  !> All collisions at `sim%now`: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
+  !> result does not depend on how they are found.
   subroutine take_step(self, sim, error)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -134,8 +135,8 @@ contains
     end do
   end subroutine take_step
 
-  !> A step is never cut in two: there must be room for all its collisions. So the log is to be emptied when
-  !> it is half full, and grows only if one step needs more than the other half.
+  !> A step is never split: the log must have room for all its collisions. So it is emptied when it is half full, and
+  !> grows only if one step needs more than the other half.
   pure function is_half_full(log) result(yes)
     type(event_log_t), intent(in) :: log
     logical :: yes
@@ -144,6 +145,7 @@ contains
     if (log%is_on()) yes = 2*log%n >= size(log%time)
   end function is_half_full
 
+  !> Makes room in the log for more collisions.
   pure subroutine make_room(log, n)
     type(event_log_t), intent(inout) :: log
     integer, intent(in) :: n                        !! collisions that may come
@@ -159,8 +161,7 @@ contains
     log = larger
   end subroutine make_room
 
-  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN). The same numbers as
-  !> `flight`, which a disk's own state takes when it collides.
+  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN).
   pure subroutine fly(disk, box, t, x, outside, n)
     type(disk_t), intent(in) :: disk(:)
     type(box_t), intent(in) :: box
@@ -176,8 +177,8 @@ contains
     n = 0
     do i = 1, size(disk, kind=int32)
       s = t - disk(i)%clock
-      x(1, i) = disk(i)%x(1) + (disk(i)%v(1) + 0.5_real64*g(1)*s)*s
-      x(2, i) = disk(i)%x(2) + (disk(i)%v(2) + 0.5_real64*g(2)*s)*s
+      x(1, i) = flight(disk(i)%x(1), disk(i)%v(1), g(1), s)
+      x(2, i) = flight(disk(i)%x(2), disk(i)%v(2), g(2), s)
       if (x(1, i) >= box%lower(1) + inset(1)*disk(i)%radius .and. x(1, i) <= box%upper(1) - inset(1)*disk(i)%radius &
         .and. x(2, i) >= box%lower(2) + inset(2)*disk(i)%radius &
         .and. x(2, i) <= box%upper(2) - inset(2)*disk(i)%radius) cycle
@@ -186,7 +187,7 @@ contains
     end do
   end subroutine fly
 
-  !> Takes disk i through the periodic sides that it is beyond, and turns it round at such walls.
+  !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
   subroutine meet_sides(self, sim, i)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -215,8 +216,8 @@ contains
     end do
   end subroutine meet_sides
 
-  !> Turns disk i round, which is beyond a side or an obstacle, if it moves further out. Where it is it
-  !> stays: so its energy does.
+  !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out. It keeps its position and so its
+  !> potential energy.
   subroutine meet_wall(self, sim, i, code)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -238,9 +239,9 @@ contains
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, self%log)
   end subroutine meet_disk
 
-  !> What is wrong with the step, '' if nothing. The fastest disk may fall through the whole box, and then
-  !> has the speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact cannot
-  !> hold against gravity, and sinks by up to g dt**2/2 in each: the TC model prevents it.
+  !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the
+  !> speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact sinks by up to g dt**2/2 per
+  !> step under gravity; the TC model prevents it.
   pure function step_warning(sim, dt) result(text)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: dt                  !! [time]
@@ -267,7 +268,7 @@ contains
     end if
   end function step_warning
 
-  !> A number with three digits.
+  !> A number with three significant digits.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text

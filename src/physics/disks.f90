@@ -1,22 +1,23 @@
-!> The disks: what moves. Split by access: a record of one cache line that every prediction reads, and a
-!> tag of half a line that is touched when a disk has an event of its own.
+!> What moves. Disks are split by access: a record of one cache line, which every prediction reads, and a tag of half a
+!> line, which is needed only when a disk has an event of its own. Each begins with its state, which a checkpoint
+!> stores; what follows is derived, and rebuilt at every start.
 module disks
   use kinds, only: int16, int32, real64
   implicit none
   private
   public :: disk_t, tag_t, species_t
 
-  !> Position, velocity and clock change only at the disk's own collisions (and when it leaves through a
-  !> periodic side); everybody else sees it by extrapolation.
+  !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
+  !> disks see it by extrapolation.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
     real(real64) :: clock = 0.0_real64          !! time of the last own collision, since the epoch [time]
     real(real64) :: radius = 0.0_real64         !! [length]
-    ! The event expected next: derived, rebuilt at every start, never stored in a checkpoint.
+    ! Derived: the event expected next, written by the search.
     real(real64) :: event_time = 0.0_real64     !! since the epoch [time]
-    integer(int32) :: partner = 0               !! a disk (> 0), or a code of `neighbour_search`
-    integer(int32) :: stamp = 0                 !! grows with every change of x, v: shows stale events
+    integer(int32) :: partner = 0               !! a disk (> 0), or another code of `partners`
+    integer(int32) :: stamp = 0                 !! grows with every change of x, v: reveals stale events
   end type disk_t
 
   type :: tag_t
@@ -24,7 +25,7 @@ module disks
     integer(int32) :: id = 0                    !! number in the order of the input file
     integer(int32) :: collisions = 0            !! collisions of any kind since the start of the run
     integer(int32) :: image(2) = 0              !! periods travelled: true position = x + image*edges
-    ! Bookkeeping of the search and the queue: derived, like the expected event.
+    ! Derived: bookkeeping of search and queue.
     integer(int16) :: cell(2) = 0_int16         !! column and row of the cell grid
     integer(int32) :: window = 0                !! of time in which the queue filed the expected event
     integer(int32) :: partner_stamp = 0         !! the partner's stamp when the event was predicted

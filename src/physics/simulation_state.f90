@@ -1,4 +1,5 @@
-!> The state of a simulation: all that a checkpoint holds and nothing else.
+!> All that a simulation is. What the input gives is not in a checkpoint; what is marked as derived in `disks` is not
+!> either; all the rest is.
 module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
@@ -15,8 +16,8 @@ module simulation_state
     type(box_t) :: box
     type(contact_law_t) :: law
     type(species_t), allocatable :: species(:)
-    ! Changing
-    type(disk_t), allocatable :: disk(:)          !! (n) in the order of the cells, `tag%id` names them
+    ! Stored in a checkpoint
+    type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
@@ -48,6 +49,7 @@ contains
     t = self%epoch + self%now
   end function time
 
+  !> Number of disks.
   pure function n_disks(self) result(n)
     class(simulation_t), intent(in) :: self
     integer(int32) :: n
@@ -55,7 +57,7 @@ contains
     n = size(self%disk, kind=int32)
   end function n_disks
 
-  !> Where disk i is now. Looking at a disk never changes it.
+  !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
     class(simulation_t), intent(in) :: self
     integer(int32), intent(in) :: i

@@ -1,7 +1,7 @@
-!> Few big disks among many small ones. The cells are made for the small; a big disk is registered in every
-!> cell from which a small one could touch it while it stays within a margin of where it was registered.
-!> So a small disk asks its own cell alone for big ones, and a big disk looks through the ring of cells
-!> along its rim: nobody pays for a size that is not near.
+!> Few big disks among many small ones. The cells are made for the small ones; a big disk is registered in every cell
+!> from which a small one could touch it while it stays within a margin of where it was registered. So a small disk
+!> finds big ones in its own cell, and a big disk searches the ring of cells along its rim: no disk pays for sizes
+!> that do not occur nearby.
 module big_disks
   use kinds, only: int32, real64
   use cell_faces, only: cell_faces_t

@@ -1,5 +1,5 @@
-!> Which disks are in which cell, in a form that is copied as a whole: three disks and their number, 16 bytes.
-!> A cell with more of them chains the surplus behind its last disk.
+!> Which disks are in which cell: three slots and their count, 16 bytes that are copied as a whole. A cell with more
+!> disks chains the rest behind its last slot.
 module cell_contents
   use kinds, only: int16, int32, int64
   use disks, only: disk_t, tag_t
@@ -15,8 +15,8 @@ module cell_contents
   integer(int32), parameter :: crowd = counted + 1           !! unit of the crowded cells around
   integer(int32), parameter :: marked = shiftl(crowd, 8)     !! beyond nine crowded cells
 
-  !> Disks are counted from 0 here, as it suits those who read them. The last slot counts the disks in the slots
-  !> in its lower half, and in its upper half the crowded cells among the nine around this one; and it holds a mark.
+  !> Disks are counted from 0, as the kernel does. The last slot holds three things: in its lower half the number of
+  !> disks in the slots, in its upper half the number of crowded cells among the nine around this one, and a mark.
   type :: cell_t
     integer(int32) :: slot(count_slot)
   contains
@@ -41,7 +41,7 @@ module cell_contents
 
 contains
 
-  !> Of the cell in column cell(1) and row cell(2), both from 1.
+  !> Number of the cell in column cell(1) and row cell(2), both from 1.
   pure function number(self, cell) result(c)
     class(cell_contents_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
@@ -98,7 +98,7 @@ contains
     if (self%next(head) == 0) call self%count_crowd(c, 1)
   end subroutine insert
 
-  !> Takes disk i out of cell c.
+  !> Removes disk i from cell c.
   pure subroutine remove(self, c, i)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, i
@@ -127,7 +127,7 @@ contains
     if (self%chain(c) == 0) call self%count_crowd(c, -1)
   end subroutine remove
 
-  !> Tells the cells around that cell c became crowded (1), or no longer is (-1).
+  !> Notes in the nine cells around that cell c became crowded (1), or no longer is (-1).
   pure subroutine count_crowd(self, c, change)
     class(cell_contents_t), intent(inout) :: self
     integer(int32), intent(in) :: c, change
@@ -168,7 +168,7 @@ contains
     if (self%next(i) == 0) i = 0
   end function chain
 
-  !> How many slots lie before the one of disk i, which is in this cell; 2 if it is in the chain.
+  !> Number of slots before the one of disk i, which is in this cell; 2 if it is in the chain.
   elemental function slots_before(self, i) result(n)
     type(cell_t), intent(in) :: self
     integer(int32), intent(in) :: i
@@ -178,9 +178,9 @@ contains
     n = first + iand(first, merge(0, 1, self%slot(2) == i - 1))
   end function slots_before
 
-  !> Lists the disks in the slots of the nine cells around c, where disk i is, without i. Whole cells are copied
-  !> without a branch on how many they hold. If i is not in the slots of its crowded cell, the first disk of the
-  !> chain is left out.
+  !> Lists the disks in the slots of the nine cells around c, which contains disk i, without i. Whole cells are copied,
+  !> without a branch on how many disks they hold. If i is not in the slots of its crowded cell, the first disk of the
+  !> chain is left out instead.
   subroutine gather(cell, c, stride, i, list, n)
     type(cell_t), intent(in) :: cell(0:*)
     integer(int32), intent(in) :: c, stride, i
@@ -214,8 +214,8 @@ contains
     n = n + cell%in_slots()
   end subroutine append
 
-  !> Asks for what predictions for some disks will need: what describes a disk, its cells, the disks in them; and of its
-  !> partner, one stage later, the same but for the disks, most of which are among the first ones.
+  !> Prefetches what predictions for some disks will read, stage by stage: their records, their cells, the disks in
+  !> those; and, one stage later, the record and the cells of their partners.
   subroutine read_ahead(self, disk, tag, stage, disks)
     class(cell_contents_t), intent(in) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -240,6 +240,7 @@ contains
     end do
   contains
 
+    !> The record and tag of a disk.
     subroutine fetch(i)
       integer(int32), intent(in) :: i
 
@@ -247,6 +248,7 @@ contains
       call prefetch(disk(i)%stamp)
     end subroutine fetch
 
+    !> The nine cells around c.
     subroutine fetch_cells(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m
@@ -257,6 +259,7 @@ contains
       end do
     end subroutine fetch_cells
 
+    !> The first disk of each of them.
     subroutine fetch_disks(c)
       integer(int32), intent(in) :: c
       integer(int32) :: m, l

@@ -1,7 +1,7 @@
 !> The faces of the cells of a grid, and when a disk leaves its cell; the sides of the box are faces as well.
 !>
-!> Cells overlap as far as can be: disks in cells with one between them just cannot touch. Where cells overlap, a disk
-!> may be in any of them, best in the one that it leaves last. It leaves wide cells less often then: by half and more.
+!> Neighbouring cells overlap as far as correctness allows: disks two cells apart can never touch. Where cells overlap, a
+!> disk may belong to any of them, best to the one that it leaves last. With wide cells this halves the crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
   use box_geometry, only: box_t, side_time
@@ -71,7 +71,7 @@ contains
     line(1, n) = line_t(self%box%upper(axis), -inset, high)
   end subroutine cut
 
-  !> Of the cells that the disk is in, the one that it leaves last on its way.
+  !> Of the cells that contain the disk, the one that it leaves last.
   pure subroutine choose_cell(self, disk, now, cell)
     class(cell_faces_t), intent(in) :: self
     type(disk_t), intent(in) :: disk
@@ -84,7 +84,7 @@ contains
     cell(2) = cell(2) + ahead(self%row, self%overlap(2), disk%x(2), disk%v(2), self%box%gravity(2), s, cell(2))
   end subroutine choose_cell
 
-  !> Along one axis: a step into the next cell if the disk is in that one too, and moves towards it.
+  !> Along one axis: 1 or -1 if the disk is in the next cell as well, and moves towards it; else 0.
   pure function ahead(line, overlap, x, v, g, s, cell) result(step)
     type(line_t), intent(in) :: line(0:1, *)
     real(real64), intent(in) :: overlap, x, v, g, s

@@ -156,7 +156,7 @@ contains
     near%time = best; near%partner = partner
   end subroutine earliest_contact
 
-  !> The state of a disk, in numbers.
+  !> The state of a disk as scalars.
   pure subroutine read_state(d, x, y, u, v, clock, radius)
     type(disk_t), intent(in) :: d
     real(real64), intent(out) :: x, y, u, v, clock, radius
@@ -166,7 +166,7 @@ contains
     clock = d%clock; radius = d%radius
   end subroutine read_state
 
-  !> A coordinate after the time s; on a straight line with fewer steps, to the same number.
+  !> A coordinate after the time s; a straight line takes fewer operations and gives the same number.
   elemental function moved(x, v, g, s, falling) result(there)
     real(real64), intent(in) :: x, v, g, s
     logical, intent(in) :: falling            !! otherwise g is zero
@@ -179,7 +179,7 @@ contains
     end if
   end function moved
 
-  !> A velocity after the time s, likewise.
+  !> The velocity after the time s, likewise.
   elemental function sped_up(v, g, s, falling) result(after)
     real(real64), intent(in) :: v, g, s
     logical, intent(in) :: falling
@@ -189,7 +189,8 @@ contains
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
-  !> Whether, at the same moment, i meets disk j before its other partner (a disk or, if <= 0, a wall).
+  !> Whether, of simultaneous events, i meets disk j before its other partner (a disk or, if <= 0, a wall). The twin of
+  !> this rule for events in the queue is `event_heap: precedes`; change both or none.
   elemental function before(i, j, other) result(yes)
     integer(int32), intent(in) :: i, j, other
     logical :: yes

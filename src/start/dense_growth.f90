@@ -1,7 +1,6 @@
-!> Dense random packings: disks start small, move as an elastic gas, and grow until they have their
-!> size (the idea of Lubachevsky and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in
-!> jumps between short runs, each into the gap that it finds at that moment; so the event-driven
-!> dynamics serves as it is.
+!> Dense random packings: disks start small, move as an elastic gas, and grow to their full size (the idea of Lubachevsky
+!> and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in jumps between short runs, each disk into the gap
+!> around it at that moment, so that the event-driven dynamics serves unchanged.
 module dense_growth
   use kinds, only: int32, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -24,7 +23,7 @@ module dense_growth
   real(real64), parameter :: caution = 0.9_real64       !! part of the gap to take
   integer, parameter :: run_length = 2                  !! collisions per disk between jumps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
-  integer, parameter :: patience = 50                   !! jumps to gain a tenth of what is lacking
+  integer, parameter :: jumps_per_check = 50            !! in which a tenth of what is lacking must be gained
 
 contains
 
@@ -52,7 +51,7 @@ contains
       lack = 1 - minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
       if (lack <= 0) exit
       jump = jump + 1
-      if (modulo(jump, patience) == 0) then
+      if (modulo(jump, jumps_per_check) == 0) then
         if (lack > 0.9_real64*lack_before) then
           call fail_to_grow(sim, error)
           return
@@ -68,6 +67,7 @@ contains
     end do
   end subroutine grow_disks
 
+  !> Reports the packing that was reached.
   subroutine fail_to_grow(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -145,7 +145,7 @@ contains
     end do
   end subroutine fill
 
-  !> Lets the disks move for some collisions per disk and brings all of them to the present.
+  !> Moves the disks for some collisions per disk and brings all of them to the present.
   subroutine move(evolution, sim, length, error)
     type(event_driven_t), intent(inout) :: evolution
     type(simulation_t), intent(inout) :: sim
@@ -165,8 +165,8 @@ contains
     end do
   end subroutine move
 
-  !> Lets every disk grow into the gap that it sees, up to the scale `cap`. Disks that see each
-  !> other share the gap so that both reach the same scale, unless one is larger already.
+  !> Grows every disk into the gap around it, up to the scale `cap`. Neighbours share a gap so that both reach the same
+  !> scale, unless one is larger already.
   subroutine grow(sim, cap)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: cap                     !! part of the full size

@@ -1,6 +1,5 @@
-!> Disks being placed, and the question whether another one fits. Each species has its own grid of
-!> cells: the disks of a species share one radius, so a search costs the same whatever the sizes of
-!> the others.
+!> Disks being placed, and whether another one fits. Each species has its own grid of cells: its disks share one radius,
+!> so a search costs the same whatever the sizes of the others.
 module packing
   use kinds, only: int32, real64
   use shapes, only: nearest_image
@@ -19,7 +18,7 @@ module packing
     integer(int32), allocatable :: head(:, :)       !! first disk in the cell, 0: none
   end type layer_t
 
-  !> A disk that is placed; one record, because disks that are near are far apart in memory.
+  !> A placed disk; one record, because disks close in space are far apart in memory.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
     integer(int32) :: species = 0                   !! 0: not placed yet
@@ -45,6 +44,7 @@ module packing
 
 contains
 
+  !> A packing without disks, with room for some.
   pure function empty_packing(box, n_disks, n_species) result(packing)
     type(box_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
@@ -80,7 +80,7 @@ contains
     end associate
   end subroutine open_species
 
-  !> Adds disk k of species s at the point p, unasked whether it fits.
+  !> Adds disk k of species s at the point p, without checking whether it fits.
   pure subroutine add(self, k, s, p)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k, s
@@ -94,9 +94,8 @@ contains
     self%layer(s)%head(c(1), c(2)) = k
   end subroutine add
 
-  !> Who keeps disks of this radius out of the whole rectangle `centre` +- `half`: a disk (its
-  !> number), an obstacle (minus its number), or nobody (0). With half = 0 it tells whether a disk
-  !> fits there.
+  !> What keeps disks of this radius out of the whole rectangle `centre` +- `half`: a disk (its number), an obstacle
+  !> (minus its number), or nothing (0). With half = 0: whether a disk fits there.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]

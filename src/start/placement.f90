@@ -77,6 +77,7 @@ contains
     n = sum(species(:s - 1)%count)
   end function offset
 
+  !> Places a species whose positions are given, directly or by a rule.
   subroutine place_fixed(packing, species, s, disk, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
@@ -132,7 +133,7 @@ contains
       minval(x(1:2, :), dim=2), maxval(x(1:2, :), dim=2))
     do k = 1, species(s)%count
       if (any(x(1:2, k) < lower - slack .or. x(1:2, k) > upper + slack)) then
-        call fail(error, exit_usage, called(species, s, k)//" is not wholly in its region")
+        call fail(error, exit_usage, disk_text(species, s, k)//" is not wholly in its region")
         return
       end if
       call packing%find_blocker(x(1:2, k), [0.0_real64, 0.0_real64], species(s)%radius - slack, blocker)
@@ -145,15 +146,16 @@ contains
   end subroutine add_checked
 
   !> A disk by its species and its number there, for messages.
-  pure function called(species, s, k) result(text)
+  pure function disk_text(species, s, k) result(text)
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
     integer(int32), intent(in) :: k
     character(len=:), allocatable :: text
 
     text = "species."//species(s)%name//".placement: disk "//written(k)
-  end function called
+  end function disk_text
 
+  !> Reports what disk k of species s overlaps.
   subroutine fail_overlap(packing, species, s, k, blocker, error)
     type(packing_t), intent(in) :: packing
     type(species_settings_t), intent(in) :: species(:)
@@ -163,15 +165,16 @@ contains
     integer :: other
 
     if (blocker < 0) then
-      call fail(error, exit_usage, called(species, s, k)//" is on the wrong side of obstacle """// &
+      call fail(error, exit_usage, disk_text(species, s, k)//" is on the wrong side of obstacle """// &
         packing%box%obstacle(-blocker)%name//'"')
     else
       other = packing%disk(blocker)%species
-      call fail(error, exit_usage, called(species, s, k)//" overlaps disk "// &
+      call fail(error, exit_usage, disk_text(species, s, k)//" overlaps disk "// &
         written(blocker - offset(species, other))//" of """//species(other)%name//'"')
     end if
   end subroutine fail_overlap
 
+  !> Places a species by random sequential insertion.
   subroutine place_at_random(packing, species, s, seed, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
@@ -186,7 +189,7 @@ contains
     associate (me => species(s))
       call stream%seed(seed, [s, purpose])
       call centre_range(me%region, packing%box, me%radius, lower, upper)
-      ! Where room ends differs from trial to trial, the more so the fewer the disks.
+      ! The fewer the disks, the more the number that fits varies from trial to trial.
       do trial = 1, max(1, many_trials/me%count)
         call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
         call insert_at_random(packing, int(s, int32), 1 + offset(species, s), stream, placed)

@@ -11,8 +11,7 @@ module regular_places
 
 contains
 
-  !> Whether the region reaches from side to side of a periodic axis, so that disks may poke
-  !> through.
+  !> Whether the region spans a periodic axis, so that disks may stick out of it.
   pure function spans(region, box) result(yes)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
@@ -114,6 +113,7 @@ contains
     end if
   end subroutine measure_lattice
 
+  !> Places 1 to n of the lattice.
   pure function lattice(n, columns, lower, step, periodic) result(x)
     integer, intent(in) :: n, columns
     real(real64), intent(in) :: lower(2), step(2)
