@@ -6,12 +6,12 @@
 !> the heap.
 module event_queue
   use kinds, only: int32, int64, never, real64
-  use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, stages, window_none
+  use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
   use disks, only: disk_t, tag_t
   use event_heap, only: event_heap_t, event_t, need_order, precedes
   implicit none
   private
-  public :: event_queue_t, most_coming, stages
+  public :: event_queue_t
 
   integer(int32), parameter :: near_capacity = 64
   real(real64), parameter :: last_window = 2.0e9_real64

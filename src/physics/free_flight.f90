@@ -1,10 +1,10 @@
-!> Kinematics of free flight, as pure functions: where a disk is after a while, and when it touches a
-!> line, another disk or a circle. Times are measured from the state that is passed in.
+!> Kinematics of free flight, as pure functions: where a disk is after a while, and when it touches a line or a circle.
+!> Times are measured from the state that is passed in. When two disks touch is in `neighbour_search`.
 module free_flight
   use kinds, only: never, real64
   implicit none
   private
-  public :: flight, flight_velocity, time_to_contact, time_to_line, time_to_circle, slowest
+  public :: flight, flight_velocity, time_to_line, time_to_circle, slowest
 
   !> What is slower than this is at rest: times would overflow. [length/time]
   real(real64), parameter :: slowest = 1/never
@@ -29,24 +29,6 @@ contains
 
     then = v + g*s
   end function flight_velocity
-
-  !> Time until two disks touch, `never` if they do not. Zero if they touch or overlap by rounding and
-  !> approach. The root is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant is
-  !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs.
-  pure function time_to_contact(dx, dv, sigma) result(s)
-    real(real64), intent(in) :: dx(2)     !! separation x_j - x_i [length]
-    real(real64), intent(in) :: dv(2)     !! relative velocity [length/time]
-    real(real64), intent(in) :: sigma     !! distance of the centres at contact [length]
-    real(real64) :: s, b, c, disc
-
-    s = never
-    b = dx(1)*dv(1) + dx(2)*dv(2)
-    if (b >= 0) return
-    disc = sigma*sigma*(dv(1)*dv(1) + dv(2)*dv(2)) - (dx(1)*dv(2) - dx(2)*dv(1))**2
-    if (disc <= 0) return
-    c = dx(1)*dx(1) + dx(2)*dx(2) - sigma*sigma
-    s = max(c, 0.0_real64)/(sqrt(disc) - b)
-  end function time_to_contact
 
   !> Time until a line at `distance` ahead is crossed in the forward direction, `never` if it is not.
   !> Each branch takes the form of the quadratic's root that does not cancel.

@@ -92,6 +92,10 @@ contains
   !> wins (`before`). A contact time before `now` is a rounding artefact: after a perfectly inelastic collision two
   !> disks stay in contact to the last bits, and shifting one by a period can change those bits.
   !>
+  !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant
+  !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs. Disks that touch, or overlap by
+  !> rounding, and approach collide now.
+  !>
   !> Most candidates fail one combined test: the root is not real, or not before the best so far, or not before the
   !> candidate's own event, when the candidate will predict again with i among its candidates. A root before t
   !> needs c < -2 b (t - late), here with a margin above rounding.

@@ -17,7 +17,7 @@ module test_systems
   private
   public :: add_obstacle, few_disks, system, systems, prepare, evolve, difference
   public :: total_energy, momentum, angular_momentum, tightest_gap
-  public :: draw_between, draw_vector, draw_magnitude, disk_named
+  public :: draw_between, draw_vector, draw_magnitude, disk_named, time_to_contact
 
   !> What has to hold in every system holds in these, each feature with and without most others.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
@@ -339,6 +339,16 @@ contains
     dx = b - a
     dx = dx - merge(box%edges()*anint(dx/box%edges()), 0.0_dp, box%periodic)
   end function separation
+
+  !> When two disks touch, by the textbook formula.
+  pure function time_to_contact(dx, dv, sigma) result(s)
+    real(dp), intent(in) :: dx(2), dv(2), sigma
+    real(dp) :: s, b, disc
+    s = never
+    b = dot_product(dx, dv)
+    disc = sigma**2*dot_product(dv, dv) - (dx(1)*dv(2) - dx(2)*dv(1))**2
+    if (b < 0 .and. disc > 0) s = max(dot_product(dx, dx) - sigma**2, 0.0_dp)/(sqrt(disc) - b)
+  end function time_to_contact
 
   !> Where the disk with this id is in memory.
   pure function disk_named(sim, id) result(i)
