@@ -1,4 +1,4 @@
-"""post/read_run.py: what it reads, and what it says about files that it cannot read."""
+"""The reader of output files, and what all scripts answer to a wrong command line."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
-from read_run import Obstacle, RunError, read_run
+from ricochet import Obstacle, RunError, read_run
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_frames_are_indexed_like_an_array(small):
 
 
 def frames_seen_by_another_program(path):
-    code = f"from read_run import read_run; print(read_run({str(path)!r}).frames)"
+    code = f"from ricochet import read_run; print(read_run({str(path)!r}).frames)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT / "post"
     )
@@ -113,6 +113,15 @@ def test_restitution_per_pair_of_species(tmp_path):
     [
         (["snapshot", "run.h5", "--cuont", "3"], "did you mean --count?"),
         (["snapshot", "run.h5", "--colour=sped"], "did you mean speed?"),
+        (["animate", "run.h5", "--frames", "3"], "--frames 3 is a single frame; use --count"),
+        (["player", "run.h5", "--frames=300"], "--frames 300 is a single frame; use --count"),
+        (["player", "run.h5", "--disk", "1"], "there is no --disk any more; use --disks"),
+        (["export", "run.h5", "--every=2"], "there is no --every any more; use --frames ::N"),
+        (["trajectory", "run.h5", "--first", "2"], "no --first any more; use --frames 0:N"),
+        (["speeds", "run.h5", "--first", "2"], "no --first any more; use --frames 0:N, or N:"),
+        (["gravity", "run.h5", "--after", "20"], "there is no --after any more; use --skip X"),
+        (["lyapunov", "run.h5", "--skip", "0.2"], "no --skip any more; use --fit-from SHARE"),
+        (["haff", "run.h5", "--out", "a.png"], "unknown argument --out; did you mean --output?"),
         (["snapshot", "rum.h5"], "no such file; did you mean run.h5?"),
     ],
 )
@@ -126,12 +135,15 @@ def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, w
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (["snapshot", "--frames", "0,a"], "'0,a' is no list"),
-        (["snapshot", "--count", "0"], "'0' is no whole number above 0"),
-        (["animate", "--frames", "-3"], "'-3' is no whole number above 0"),
-        (["trajectory", "--disks", "one"], "'one' is no list"),
+        (["snapshot", "--frames", "0,a"], "'0,a' is not a list"),
+        (["snapshot", "--frames", "::0"], "'::0' is not a list"),
+        (["snapshot", "--frames", "0:1:1:1"], "'0:1:1:1' is not a list"),
+        (["snapshot", "--frames", "-4:-5,3"], "no frame 3, there are 3"),
+        (["snapshot", "--count", "0"], "'0' is not a whole number above 0"),
+        (["animate", "--count", "-3"], "'-3' is not a whole number above 0"),
+        (["trajectory", "--disks", "one"], "'one' is not a list"),
         (["trajectory", "--disks", "0"], "no disk 0"),
-        (["export", "--every", "0.5"], "'0.5' is no whole number above 0"),
+        (["export", "--count", "0.5"], "'0.5' is not a whole number above 0"),
     ],
 )
 def test_numbers_that_are_none_are_refused(small, capsys, wrong, words):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from read_run import Run, RunError, read_run
+from ricochet import Run, RunError, read_run
 
 from .case import Case, Member, Verdict, failed, judge
 

@@ -1,15 +1,15 @@
-"""Read a Ricochet run: the only module that knows where things are in the HDF5 file.
+"""Read a Ricochet run: the only module that knows the layout of the HDF5 file.
 
-    from read_run import read_run
+    from ricochet import read_run
     run = read_run("runs/gas.h5")
     run.time                 # (T,)    times of the frames
-    run.position[-1]         # (N, 2)  one frame, read from the file when asked for
+    run.position[-1]         # (N, 2)  one frame, read from the file on demand
     run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
-T frames of N disks.  All quantities are in the units of the input file ("reduced units").
-Frames are read on demand, so a file may be larger than the memory.  A file that is still
-being written (`.part`) is read up to its last committed frame.
+T frames, N disks, S species.  All quantities are in the units of the input file ("reduced units").
+Frames are read on demand, so a file may be larger than memory.  A file that is still being written
+(`.part`) is read up to its last committed frame.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,20 +38,38 @@ class Series(NamedTuple):
 
 
 class Events(NamedTuple):
-    """The event log: collisions of any kind in their order, (E,) each."""
+    """The event log: collisions of any kind in chronological order, (E,) each.
+
+    `j` is the id of the other disk, or 0, -1, -2, -3 for the left, right, bottom and top side, then
+    -4, -5, ... for the obstacles followed by the straight walls.
+    """
 
     time: np.ndarray
     i: np.ndarray  # id of a disk
-    j: np.ndarray  # its partner; 0, -1, -2, -3 left, right, bottom, top side, -4, ... obstacles
-    impulse: np.ndarray  # length of the change of momentum
+    j: np.ndarray
+    impulse: np.ndarray  # magnitude of the change of momentum
 
 
 class Obstacle(NamedTuple):
-    """A circular wall; `inside` tells that the disks are kept in."""
+    """A circular wall, which keeps disks out, or in (`inside`)."""
 
     centre: np.ndarray
     radius: float
     inside: bool
+
+
+class Species(NamedTuple):
+    """What the disks of one species have in common."""
+
+    name: str
+    mass: float
+    radius: float
+    disks: np.ndarray  # (N,) mask
+
+    @property
+    def label(self) -> str:
+        """Name and mass, for a legend."""
+        return f"{self.name}, m = {self.mass:g}"
 
 
 @dataclass(frozen=True)
@@ -66,19 +84,18 @@ class Frames:
         return self.count
 
     def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
-        backwards = False
         if isinstance(frame, slice):
-            start, stop, step = frame.indices(self.count)
-            backwards = step < 0
-            if backwards:
-                picked = range(start, stop, step)[::-1]
-                start, stop, step = picked.start, picked.stop, picked.step
-            chosen = slice(start, max(start, stop), step)
+            chosen = range(self.count)[frame]
         else:
             for one in frame if isinstance(frame, list) else [frame]:
                 if not -self.count <= one < self.count:
                     raise RunError(f"{self.path}: no frame {one}, there are {self.count}")
             chosen = np.mod(frame, self.count).tolist()
+            chosen = evenly_spaced(chosen) if isinstance(chosen, list) else chosen
+        backwards = isinstance(chosen, range) and chosen.step < 0
+        if isinstance(chosen, range):
+            chosen = chosen[::-1] if backwards else chosen
+            chosen = slice(chosen.start, chosen.stop, chosen.step)
         with open_file(self.path) as file:
             data = file[f"{DISKS}/{self.name}/value"]
             if isinstance(chosen, list):  # far faster than a list as index in h5py
@@ -90,6 +107,15 @@ class Frames:
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return (self[k] for k in range(self.count))
+
+
+def evenly_spaced(chosen: list[int]) -> list[int] | range:
+    """The same numbers as a range if they are one: HDF5 reads that in one go."""
+    steps = set(np.diff(chosen).tolist())
+    if len(steps) != 1 or 0 in steps:
+        return chosen
+    step = steps.pop()
+    return range(chosen[0], chosen[-1] + step, step)
 
 
 @dataclass(frozen=True)
@@ -110,6 +136,7 @@ class Run:
     edges: np.ndarray  # (2,) lengths of the box
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
+    walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
     parameters: dict = field(repr=False)  # group -> variable -> value, as used
     provenance: dict = field(repr=False)
 
@@ -127,6 +154,15 @@ class Run:
     def upper(self) -> np.ndarray:
         """(2,) upper right corner of the box."""
         return self.lower + self.edges
+
+    @cached_property
+    def by_species(self) -> tuple[Species, ...]:
+        """The species in the order of the input file."""
+        masks = [self.of_species(name) for name in self.names]
+        return tuple(
+            Species(name, float(self.mass[mask][0]), float(self.radius[mask][0]), mask)
+            for name, mask in zip(self.names, masks, strict=True)
+        )
 
     def of_species(self, name: str) -> np.ndarray:
         """(N,) mask of the disks of one species."""
@@ -149,7 +185,7 @@ class Run:
         return self.position[frame] + self.image[frame] * self.edges
 
     def displacement(self, frame: int | slice | list[int], origin: int = 0) -> np.ndarray:
-        """(..., N) distance travelled as the crow flies since the frame `origin`."""
+        """(..., N) straight-line distance from the place in the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def observable(self, name: str) -> Series:
@@ -175,12 +211,12 @@ class Run:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """2 C / N with C the pair collisions since the start, at the times of the observables."""
+        """2 C / N, C the pair collisions since the start, at the times of the observables."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.count)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """The same at any times of the run, by linear interpolation."""
+        """The same at other times, by linear interpolation."""
         return np.interp(time, *self.collisions_per_disk)
 
     def parameter(self, group: str, variable: str, default: object = None) -> object:
@@ -196,8 +232,14 @@ class Run:
         return float(values[0]) if len(values) == 1 else np.nan
 
     @property
+    def time_step(self) -> float:
+        """The dt of a run by time steps; 0 for an event-driven one."""
+        steps = self.parameter("run", "dynamics", "events") == "steps"
+        return float(self.parameter("run", "dt")) if steps else 0.0
+
+    @property
     def seed(self) -> int:
-        """Seed of the random numbers."""
+        """Seed of the random number generator."""
         return int(self.parameter("run", "seed", self.parameters.get("seed", 0)))
 
     @property
@@ -216,7 +258,7 @@ def read_run(path: str | Path) -> Run:
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file for reading; whatever turns out to be wrong with it is a RunError."""
+    """The HDF5 file for reading; any fault found in it becomes a RunError."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -253,7 +295,7 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
 
 
 def checked(data: h5py.Dataset, count: int, item: tuple[int, ...] | None = None) -> h5py.Dataset:
-    """A dataset of numbers, `count` or more, or of arrays of them of the shape `item`."""
+    """The dataset, if it holds at least `count` numbers, or arrays of the shape `item`."""
     usual = data.dtype.kind in "iuf" and data.dtype.itemsize <= 8
     if not usual or len(data) < count or item not in (None, data.shape[1:]):
         raise ValueError(f"{data.name}: not {count} numbers, or arrays of the shape {item}")
@@ -301,6 +343,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         edges=vector(box, "edges", None),
         periodic=np.array([plain(b) == "periodic" for b in box.attrs["boundary"]]),
         obstacles=obstacles_of(parameters.get("obstacle", {})),
+        walls=walls_of(parameters.get("wall", {})),
         parameters=parameters,
         provenance=tree(file["provenance"]) if "provenance" in file else {},
     )
@@ -328,6 +371,14 @@ def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
     )
 
 
+def walls_of(group: dict) -> np.ndarray:
+    """(W, 2, 2) the straight walls in /parameters/wall."""
+    if "from" not in group:
+        return np.empty((0, 2, 2))
+    ends = [np.reshape(group[end], (-1, 2)).astype(float) for end in ("from", "to")]
+    return np.stack(ends, axis=1)
+
+
 def vector(group: h5py.Group, name: str, default: np.ndarray | None) -> np.ndarray:
     """A small vector that is a dataset or an attribute."""
     if name in group:
@@ -346,7 +397,7 @@ def tree(group: h5py.Group) -> dict:
 
 
 def plain(value: object) -> object:
-    """Text instead of bytes, numbers instead of arrays without an axis."""
+    """Text instead of bytes, Python numbers instead of arrays without an axis."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
