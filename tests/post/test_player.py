@@ -116,6 +116,13 @@ def test_frames_worked_on_together_give_what_one_by_one_gives(tmp_path, rng, mon
     assert player.film(run, frames, "speed", []) == together
 
 
+def test_walls_and_traced_disks_are_told_to_the_page(tmp_path):
+    walls = [((0.0, 0.25), (0.5, 0.0))]
+    run = read_run(still_run(tmp_path / "a.h5", np.full((2, 3, 2), 0.5), walls=walls))
+    facts, _ = player.film(run, [0, 1], "speed", [2, 0])
+    assert facts["walls"] == [[[0.0, 0.25], [0.5, 0.0]]] and facts["traced"] == [2, 0]
+
+
 def test_crossings_of_periodic_sides_are_counted(tmp_path):
     image = np.array([[[0, 0]], [[1, -2]], [[1, -2]]])
     run = read_run(
@@ -389,6 +396,35 @@ def test_obstacles_are_drawn(browser, tmp_path):
     browser.open(tmp_path / "a.html")
     corner, inner, free = colours_at(browser, (0.03, 0.03), (0.5, 0.3), (0.25, 0.5))
     assert corner == inner != free
+
+
+def test_straight_walls_and_their_images_are_drawn(browser, tmp_path):
+    path = still_run(
+        tmp_path / "a.h5",
+        np.array([[[0.5, 0.8]]]),
+        walls=[((0.2, 0.3), (0.6, 0.3)), ((0.9, 0.6), (1.1, 0.6))],
+        periodic=(True, False),
+    )
+    assert run_script("player", path, "-o", tmp_path / "a.html") == 0
+    browser.open(tmp_path / "a.html")
+    free, first, second, image = colours_at(
+        browser, (0.4, 0.5), (0.4, 0.3), (0.95, 0.6), (0.05, 0.6)
+    )
+    assert first == second == image != free
+    assert browser.complaints() == []
+
+
+def test_several_disks_are_traced(browser, tmp_path, rng):
+    path = bouncing_gas(tmp_path / "gas.h5", rng)
+    assert run_script("player", path, "--disks", "3,42", "-o", tmp_path / "a.html") == 0
+    browser.open(tmp_path / "a.html")
+    browser.run("step(20)")
+    assert browser.run("return state.traced") == [2, 41]
+    told = browser.run("return $('disk').innerText").splitlines()
+    assert [line.split(" at ")[0] for line in told] == ["disk 3 (light)", "disk 42 (heavy)"]
+    both = stage(browser)
+    browser.run("trace([2])")
+    assert stage(browser) != both
 
 
 def test_light_and_dark_differ(opened):

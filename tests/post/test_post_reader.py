@@ -1,7 +1,9 @@
 """The reader of output files, and what all scripts answer to a wrong command line."""
 
+import shutil
 import subprocess
 import sys
+import venv
 
 import h5py
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 from ricochet import Obstacle, RunError, read_run
+from ricochet.drawing import draw_box, plt
 
 
 @pytest.fixture
@@ -170,3 +173,38 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "new" / "a.png").exists()
+
+
+def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
+    """In a copy of what set-up reads, with a `.venv` that lacks no other package."""
+    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", "post/ricochet/__init__.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    environment = tmp_path / ".venv"
+    venv.create(environment, symlinks=True)
+    (environment / "purposes").write_text("demo\n")
+    wanted = [tmp_path / "requirements.txt", tmp_path / "tests" / "readers.txt"]
+    (environment / "requirements.txt").write_text("".join(path.read_text() for path in wanted))
+    subprocess.run([tmp_path / ".ci" / "set-up", "demo"], check=True)
+    code = "from importlib.util import find_spec; print(find_spec('ricochet').origin)"
+    command = [environment / "bin" / "python", "-c", code]
+    found = subprocess.run(command, cwd="/", capture_output=True, text=True, check=True).stdout
+    assert found.strip() == str(tmp_path / "post" / "ricochet" / "__init__.py")
+
+
+def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
+    x = np.full((1, 1, 2), 0.5)
+    path = write_run(tmp_path / "none.h5", x, x)
+    assert read_run(path).walls.shape == (0, 2, 2)
+    walls = [((0.1, 0.2), (0.9, 0.4)), ((0.5, 0.0), (0.5, 0.3))]
+    for periodic, copies in (((False, False), 1), ((True, False), 3), ((True, True), 9)):
+        run = read_run(write_run(tmp_path / "run.h5", x, x, walls=walls, periodic=periodic))
+        np.testing.assert_array_equal(run.walls, walls)
+        axes = plt.figure().add_subplot()
+        draw_box(axes, run)
+        drawn = [line.get_xydata() for line in axes.lines[4:]]  # the sides come first
+        plt.close()
+        assert len(drawn) == 2 * copies
+        for wall in walls:
+            shifted = [np.asarray(wall) + (i, 0) for i in ((-1, 0, 1) if periodic[0] else (0,))]
+            assert all(any(np.allclose(one, line) for line in drawn) for one in shifted)
