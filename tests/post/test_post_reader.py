@@ -177,7 +177,8 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
 
 def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
     """In a copy of what set-up reads, with a `.venv` that lacks no other package."""
-    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", "post/ricochet/__init__.py"):
+    package = "post/ricochet/__init__.py"
+    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     environment = tmp_path / ".venv"
@@ -189,7 +190,7 @@ def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
     code = "from importlib.util import find_spec; print(find_spec('ricochet').origin)"
     command = [environment / "bin" / "python", "-c", code]
     found = subprocess.run(command, cwd="/", capture_output=True, text=True, check=True).stdout
-    assert found.strip() == str(tmp_path / "post" / "ricochet" / "__init__.py")
+    assert found.strip() == str(tmp_path / package)
 
 
 def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
@@ -206,5 +207,5 @@ def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
         plt.close()
         assert len(drawn) == 2 * copies
         for wall in walls:
-            shifted = [np.asarray(wall) + (i, 0) for i in ((-1, 0, 1) if periodic[0] else (0,))]
-            assert all(any(np.allclose(one, line) for line in drawn) for one in shifted)
+            for i in (-1, 0, 1) if periodic[0] else (0,):
+                assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)
