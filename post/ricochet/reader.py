@@ -84,38 +84,23 @@ class Frames:
         return self.count
 
     def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
-        if isinstance(frame, slice):
-            chosen = range(self.count)[frame]
-        else:
-            for one in frame if isinstance(frame, list) else [frame]:
-                if not -self.count <= one < self.count:
-                    raise RunError(f"{self.path}: no frame {one}, there are {self.count}")
-            chosen = np.mod(frame, self.count).tolist()
-            chosen = evenly_spaced(chosen) if isinstance(chosen, list) else chosen
-        backwards = isinstance(chosen, range) and chosen.step < 0
-        if isinstance(chosen, range):
-            chosen = chosen[::-1] if backwards else chosen
-            chosen = slice(chosen.start, chosen.stop, chosen.step)
+        try:
+            chosen = np.arange(self.count)[frame]
+        except IndexError:
+            raise RunError(f"{self.path}: no frame {frame}, there are {self.count}") from None
+        steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
         with open_file(self.path) as file:
             data = file[f"{DISKS}/{self.name}/value"]
-            if isinstance(chosen, list):  # far faster than a list as index in h5py
+            if len(steps) == 1 and steps[0] > 0:
+                values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
+            elif chosen.ndim and chosen.size:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
             else:
-                values = data[chosen]
-        values = values.astype(float) if values.dtype.kind == "f" else values
-        return values[::-1] if backwards else values
+                values = data[chosen] if chosen.size else data[:0]
+        return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return (self[k] for k in range(self.count))
-
-
-def evenly_spaced(chosen: list[int]) -> list[int] | range:
-    """The same numbers as a range if they are one: HDF5 reads that in one go."""
-    steps = set(np.diff(chosen).tolist())
-    if len(steps) != 1 or 0 in steps:
-        return chosen
-    step = steps.pop()
-    return range(chosen[0], chosen[-1] + step, step)
 
 
 @dataclass(frozen=True)

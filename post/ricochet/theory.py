@@ -9,21 +9,12 @@ from .statistics import Law
 
 # Dilute gas of hard disks, by Monte Carlo solution of the Boltzmann equation (10^6 disks).
 # (collisions per disk, excess kurtosis a2), from equal speeds.
-RELAXATION = np.array(
-    [
-        (0, -0.5),
-        (1, -0.370),
-        (2, -0.264),
-        (3, -0.184),
-        (4, -0.125),
-        (5, -0.0855),
-        (6, -0.0565),
-        (8, -0.025),
-    ]
+RELAXATION = np.transpose(
+    [(0, 1, 2, 3, 4, 5, 6, 8), (-0.5, -0.370, -0.264, -0.184, -0.125, -0.0855, -0.0565, -0.025)]
 )
 # (collisions per disk, temperature ratio heavy / light), half m and half 4 m, from equal speeds.
-EQUIPARTITION = np.array(
-    [(0, 4), (1, 2.02), (2, 1.455), (3, 1.228), (4, 1.115), (5, 1.062), (6, 1.031), (8, 1.005)]
+EQUIPARTITION = np.transpose(
+    [(0, 1, 2, 3, 4, 5, 6, 8), (4, 2.02, 1.455, 1.228, 1.115, 1.062, 1.031, 1.005)]
 )
 
 
