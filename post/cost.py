@@ -91,11 +91,7 @@ def main() -> None:
         "microseconds": [float(c) for _, cost in measured.values() for c in cost],
     }
     exponents = [
-        {
-            "search": search,
-            "exponent": law.exponent,
-            "exponent_error": float(law.exponent_error),
-        }
+        {"search": search, "exponent": law.exponent, "exponent_error": float(law.exponent_error)}
         for search, law in laws.items()
     ]
     eta = ", ".join(f"{value:g}" for value in sorted({round(packing(run), 3) for run in runs}))

@@ -71,7 +71,7 @@ def sharing(energy: np.ndarray, temperature: float, count: int) -> np.ndarray:
 def crowded_heights(
     height: np.ndarray, species: list[Samples], pull: float, temperature: float, width: float
 ) -> list[np.ndarray]:
-    """Densities of the heights, with the area that disks take from each other.
+    """Densities at the heights (H,), with the area that disks take from each other.
 
     `width` is that of the box for centres.  A disk does not crowd itself.
     """
@@ -106,16 +106,17 @@ def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], c
     return log_slope(np.interp(ranks, integral, x), limits)
 
 
-def height_grid(run: Run, s: Samples) -> np.ndarray:
-    """All heights that a disk can have."""
-    return np.linspace(0, run.edges[1] - 2 * s.radius, 4001)
+def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """All heights that a disk can have, and the densities of `crowded_heights` there."""
+    free = run.edges - 2 * species[0].radius
+    grid = np.linspace(0, free[1], 4001)
+    return grid, crowded_heights(grid, species, abs(run.gravity[1]), kt, free[0])
 
 
 def table(run: Run, species: list[Samples], temperature: float) -> list[dict]:
-    """Fitted slopes over those of the exponential laws, and what the dashed laws make of them."""
+    """Fitted slopes over those of the exponential laws, and the same for the dashed laws."""
     g = float(np.abs(run.gravity[1]))
-    grid = height_grid(run, species[0])
-    crowded = crowded_heights(grid, species, g, temperature, run.edges[0] - 2 * species[0].radius)
+    grid, crowded = heights(run, species, temperature)
     rows = []
     for name, s, density in zip(run.names, species, crowded, strict=True):
         v_law, h_law = s.mass / (2 * temperature), s.mass * g / temperature
@@ -168,9 +169,8 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     """Squared speeds above, heights below; linear left, logarithmic right."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
-    light = min(s.mass for s in species)
-    squares, grid = np.linspace(0, 18 * kt / light, 1000), height_grid(run, species[0])
-    crowded = crowded_heights(grid, species, g, kt, run.edges[0] - 2 * species[0].radius)
+    squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
+    grid, crowded = heights(run, species, kt)
     v_labels = slopes(run, result, "speed", "shared")
     h_labels = slopes(run, result, "height", "crowded")
     for k, s in enumerate(species):
@@ -184,11 +184,11 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
         "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
     )
-    for row, title, lowest in zip(panels, titles, (1e-4, 1e-4), strict=True):
+    for row, title in zip(panels, titles, strict=True):
         row[0].set(ylabel="probability density", xlim=(0, None))
         row[0].legend(loc="upper right", title=title)
         top = row[0].get_ylim()[1]
-        row[1].set(yscale="log", ylim=(lowest * top, 1.5 * top))
+        row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
         row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
         row[1].plot([], [], color="black", lw=1, ls="--", label="finite number and size of disks")
         row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))

@@ -20,6 +20,8 @@ pairs of species i and j collide at a rate ~ N_i N_j / (h_i + h_j) / sqrt(mu), w
 are their scale heights.
 """
 
+from itertools import combinations_with_replacement
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -61,29 +63,17 @@ def missed_by_pair(step: float, temperature: float, reduced: float, diameter: fl
     return float(np.average(missed_share(q), weights=weight))
 
 
-def pair_weights(run: Run, temperature: float) -> np.ndarray:
-    """(S, S) collision rates of pairs of species, i <= j, up to a factor."""
-    _, mass, radius, masks = (np.array(part) for part in zip(*run.by_species, strict=True))
-    count = masks.sum(axis=1).astype(float)
-    reduced = mass[:, None] * mass / (mass[:, None] + mass)
-    pairs = np.triu(np.outer(count, count), 1) + np.diag(count * (count - 1) / 2)
-    weight = pairs * (radius[:, None] + radius) / np.sqrt(reduced)
-    pull = float(np.linalg.norm(run.gravity))
-    if pull > 0:
-        height = temperature / (mass * pull)
-        weight /= height[:, None] + height
-    return weight
-
-
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """P averaged over all kinds of pairs of a dilute gas in equilibrium."""
-    weight = pair_weights(run, temperature)
-    share = np.zeros_like(weight)
-    for i, j in zip(*np.nonzero(weight), strict=True):
-        a, b = run.by_species[i], run.by_species[j]
-        reduced = a.mass * b.mass / (a.mass + b.mass)
-        share[i, j] = missed_by_pair(step, temperature, reduced, a.radius + b.radius)
-    return float(np.sum(weight * share) / np.sum(weight))
+    """P averaged over all kinds of pairs of a dilute gas in equilibrium, by their rates."""
+    shares, rates = [], []
+    pull = float(np.linalg.norm(run.gravity))
+    for a, b in combinations_with_replacement(run.by_species, 2):
+        reduced, diameter = a.mass * b.mass / (a.mass + b.mass), a.radius + b.radius
+        pairs = comb(a.disks.sum(), 2) if a is b else a.disks.sum() * b.disks.sum()
+        height = temperature / pull * (1 / a.mass + 1 / b.mass) if pull else 1.0
+        rates.append(pairs * diameter / np.sqrt(reduced) / height)
+        shares.append(missed_by_pair(step, temperature, reduced, diameter))
+    return float(np.average(shares, weights=rates))
 
 
 def rate_and_temperature(run: Run, skip: float) -> tuple[float, float]:

@@ -61,13 +61,10 @@ def chosen_colour(run: Run, wish: str | None) -> str:
 def draw_box(axes: plt.Axes, run: Run) -> None:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners."""
     (x0, y0), (x1, y1) = run.lower, run.upper
-    for axis, (xs, ys) in (
-        (0, ((x0, x0), (y0, y1))),
-        (0, ((x1, x1), (y0, y1))),
-        (1, ((x0, x1), (y0, y0))),
-        (1, ((x0, x1), (y1, y1))),
-    ):
-        axes.plot(xs, ys, ls="--" if run.periodic[axis] else "-", clip_on=False, zorder=3, **WALL)
+    sides = (axes.axvline, x0, x1), (axes.axhline, y0, y1)
+    for (line, *ends), periodic in zip(sides, run.periodic, strict=True):
+        for end in ends:
+            line(end, ls="--" if periodic else "-", clip_on=False, zorder=3, **WALL)
     for wall in run.walls:
         for shift in periods(run):
             axes.plot(*(wall + shift).T, zorder=3, **WALL)

@@ -74,34 +74,18 @@ def positive(text: str) -> int:
     return int(text)
 
 
-#: Options that several scripts have: the same name means the same everywhere.
+#: Options that several scripts have (type, value, meaning): a name means the same everywhere.
 OPTIONS = {
-    "frames": {
-        "type": frame_list,
-        "metavar": "LIST",
-        "help": "which frames: numbers and ranges, such as 0,10,-1 or 100:200 or ::5",
-    },
-    "count": {
-        "type": positive,
-        "metavar": "N",
-        "help": "at most this many of the frames, evenly spread",
-    },
-    "skip": {
-        "type": float,
-        "metavar": "X",
-        "help": "leave out the first X collisions per disk",
-    },
-    "apart": {
-        "type": float,
-        "metavar": "X",
-        "help": "take frames at least X collisions per disk apart",
-    },
-    "disks": {"type": disk_list, "metavar": "IDS", "help": "which disks: ids such as 1,5,9"},
-    "colour": {
-        "type": one_of("species", *LABELS),
-        "metavar": "WHAT",
-        "help": f"species, {', '.join(LABELS)} [species, or speed if there is one]",
-    },
+    "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
+    "count": (positive, "N", "at most this many of the frames, evenly spread"),
+    "skip": (float, "X", "leave out the first X collisions per disk"),
+    "apart": (float, "X", "take frames at least X collisions per disk apart"),
+    "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
+    "colour": (
+        one_of("species", *LABELS),
+        "WHAT",
+        f"species, {', '.join(LABELS)} [species; speed if there is one]",
+    ),
 }
 
 #: Options of earlier versions, and what to write instead.
@@ -166,10 +150,9 @@ def command_line(doc: str, output: str, one: bool = False, csv: bool = True, **d
     if csv:
         parser.add_argument("--csv", type=Path, metavar="FILE", help="write the numbers to a table")
     for name, default in defaults.items():
-        option = dict(OPTIONS[name])
-        if default is not None:
-            option["help"] += f" [{default}]"
-        parser.add_argument(f"--{name}", default=default, **option)
+        convert, value, meaning = OPTIONS[name]
+        meaning += "" if default is None else f" [{default:g}]"
+        parser.add_argument(f"--{name}", type=convert, default=default, metavar=value, help=meaning)
     return parser
 
 
