@@ -28,10 +28,10 @@ from ricochet.drawing import (
 from ricochet.script import command_line, film_frames, launch, positive, text_of
 
 
-def film_path(asked: Path | None, run: Run) -> Path:
+def film_path(wish: Path | None, run: Run) -> Path:
     """Where to write: -o, else the name of the run in the current folder."""
     ffmpeg = animation.FFMpegWriter.isAvailable()
-    path = asked or Path(run.path.stem)
+    path = wish or Path(run.path.stem)
     if not path.suffix:
         path = path.with_suffix(".mp4" if ffmpeg else ".gif")
     if path.suffix == ".mp4" and not ffmpeg:

@@ -4,7 +4,8 @@
 
 Reads the collisions per second of processor time that each run records; of equal runs the best one
 counts.  Lines: powers of N fitted to the points with N in --fit.  Below that range the cost of the
-collision itself is not small beside the search; above it disks no longer fit into the caches.
+collision itself is not small compared with the search; above it disks no longer fit into the
+caches.
 """
 
 import numpy as np

@@ -48,7 +48,7 @@ def draw_cavity(axes: plt.Axes, run: Run) -> None:
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
-    """Energy left against time; the collisions beside it."""
+    """Energy left, and collisions, against time."""
     time, energy = run.observable("all/kinetic_energy")
     axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -4,7 +4,7 @@
 
 Needs event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
 pair collisions that is missing against the event-driven run of the same seed, after the first
---skip collisions per disk, averaged over the seeds; beside it the share expected from the rule.
+--skip collisions per disk, averaged over the seeds; and the share expected from the rule.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
 l = sqrt(s^2 - b^2), s their diameter.  They approach on its first half only, for the time l / g:

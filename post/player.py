@@ -46,7 +46,7 @@ def frames_that_fit(run: Run) -> int:
 
 
 def quantities(run: Run) -> list[str]:
-    """What disks can be coloured by, beside their species."""
+    """What disks can be coloured by, apart from their species."""
     return [name for name in LABELS if name != "collisions" or run.collisions is not None]
 
 

@@ -152,7 +152,7 @@ def draw_blocks(axes: plt.Axes, runs: list[Run], skip: float) -> None:
 
 
 def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None, skip: float) -> plt.Figure:
-    """Blocks; beside them the free paths, if there is an event log."""
+    """The pressure by blocks; with an event log also the free paths."""
     figure, panels = plt.subplots(1, 2 if paths else 1, figsize=(10 if paths else 6, 4.5))
     draw_blocks(np.atleast_1d(panels)[0], runs, skip)
     if paths:

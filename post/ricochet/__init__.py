@@ -3,10 +3,12 @@
     from ricochet import read_run
     run = read_run("runs/gas.h5")
 
-`reader` opens files; `statistics`, `theory`, `hard_disks`, `thermodynamics` and `crater` measure
-and compare; `drawing` draws disks and walls; `script` is what the command-line scripts share.
+`reader` opens files, `bridges` hands them to other programs; `statistics`, `theory`, `hard_disks`,
+`thermodynamics` and `crater` measure and compare; `drawing` draws disks and walls; `script` is what
+the command-line scripts share.
 """
 
-from .reader import Events, Obstacle, Run, RunError, Series, mdanalysis_universe, read_run
+from .bridges import mdanalysis_universe
+from .reader import Events, Obstacle, Run, RunError, Series, read_run
 
 __all__ = ["Events", "Obstacle", "Run", "RunError", "Series", "mdanalysis_universe", "read_run"]

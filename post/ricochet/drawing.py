@@ -17,7 +17,7 @@ STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
 WALL = {"color": "0.25", "linewidth": 1.2}
 
-#: What disks can be coloured by, beside their species.
+#: What disks can be coloured by, apart from their species.
 LABELS = {
     "speed": "speed (reduced units)",
     "displacement": "displacement (reduced units)",
@@ -88,7 +88,7 @@ def draw_box(axes: plt.Axes, run: Run) -> None:
 
 
 def periods(run: Run) -> np.ndarray:
-    """(M, 2) shifts to the place of a thing and to its periodic images beside the box."""
+    """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 

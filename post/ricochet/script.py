@@ -108,10 +108,10 @@ class Parser(argparse.ArgumentParser):
         return known
 
     def complaint(self, word: str) -> str:
-        """What is wrong with a word that is no option, nor the value of one."""
+        """What is wrong with a word that argparse could not place."""
         former = FORMER.get(word)
         if former and former.split()[0] in self._option_string_actions:
-            return f"there is no {word} any more; use {former}"
+            return f"{word} is now {former}"
         return f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}"
 
 

@@ -116,7 +116,7 @@ def test_frames_worked_on_together_give_what_one_by_one_gives(tmp_path, rng, mon
     assert player.film(run, frames, "speed", []) == together
 
 
-def test_walls_and_traced_disks_are_told_to_the_page(tmp_path):
+def test_walls_and_traced_disks_are_in_the_page(tmp_path):
     walls = [((0.0, 0.25), (0.5, 0.0))]
     run = read_run(still_run(tmp_path / "a.h5", np.full((2, 3, 2), 0.5), walls=walls))
     facts, _ = player.film(run, [0, 1], "speed", [2, 0])
@@ -420,8 +420,8 @@ def test_several_disks_are_traced(browser, tmp_path, rng):
     browser.open(tmp_path / "a.html")
     browser.run("step(20)")
     assert browser.run("return state.traced") == [2, 41]
-    told = browser.run("return $('disk').innerText").splitlines()
-    assert [line.split(" at ")[0] for line in told] == ["disk 3 (light)", "disk 42 (heavy)"]
+    lines = browser.run("return $('disk').innerText").splitlines()
+    assert [line.split(" at ")[0] for line in lines] == ["disk 3 (light)", "disk 42 (heavy)"]
     both = stage(browser)
     browser.run("trace([2])")
     assert stage(browser) != both

@@ -23,7 +23,7 @@ TINY = re.sub(r"count = \d+", "count = 2", MIXTURE).replace("time = 4", "time = 
 
 
 def bad_files(folder) -> dict[str, str]:
-    """Files that are no runs, each with the words that tell why."""
+    """Files that cannot be used, each with words of the message that says why."""
     good = write_run(folder / "good.h5", np.zeros((4, 50, 2)), np.zeros((4, 50, 2)))
     (folder / "empty.h5").touch()
     (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
