@@ -102,7 +102,8 @@ class Parser(argparse.ArgumentParser):
     """Wants options in full, and answers a wrong one with the right one."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
-        known, unknown = self.parse_known_args(joined(sys.argv[1:] if args is None else args))
+        words = joined(sys.argv[1:] if args is None else args)
+        known, unknown = self.parse_known_args(words, namespace)
         if unknown:
             self.error(self.complaint(unknown[0].split("=")[0]))
         return known
@@ -116,7 +117,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def joined(words: Iterable[str]) -> list[str]:
-    """The words, a list such as '-10:' joined to its option: it is not an option itself."""
+    """The words, with a list such as '-10:' joined to its option, lest it be taken for one."""
     result: list[str] = []
     for word in words:
         if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
@@ -171,9 +172,9 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Of --frames those after --skip and --apart; the last frame if none is that late."""
+    """Of --frames those after --skip and --apart; the last of them if none is that late."""
     frames = chosen_frames(run, args.frames, None)
-    return equilibrium_frames(run, args.skip, args.apart, frames) or [run.frames - 1]
+    return equilibrium_frames(run, args.skip, args.apart, frames) or frames[-1:]
 
 
 def film_frames(run: Run, args: argparse.Namespace) -> list[int]:
