@@ -96,11 +96,11 @@ contains
     integer, intent(in) :: axis
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: sound
-    logical :: open(2)
+    logical :: endless(2)
     real(real64) :: lower, upper, farthest
 
     sound = .false.
-    open = spans(s%region, box)
+    endless = spans(s%region, box)
     lower = s%region(2*axis - 1)
     upper = s%region(2*axis)
     farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
@@ -108,7 +108,7 @@ contains
       call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
     else if (lower < box%lower(axis) .or. upper > box%upper(axis)) then
       call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
-    else if (.not. open(axis) .and. 2*s%radius > (upper - lower)*(1 + rounding)) then
+    else if (.not. endless(axis) .and. 2*s%radius > (upper - lower)*(1 + rounding)) then
       call complain("radius", "a disk of diameter "//written(2*s%radius)// &
         " does not fit in its region of width "//written(upper - lower))
     else if (box%periodic(axis) .and. 4*s%radius > box%upper(axis) - box%lower(axis)) then
