@@ -24,8 +24,9 @@ module command_line
     logical :: force = .false.                     !! overwrite a finished output file
   end type command_t
 
-  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", "--resume", &
-    "--check", "--quiet", "--force", "--help", "--version", "--print-defaults", "--explain"]
+  character(len=16), parameter :: switches(*) = [character(len=16) :: "--resume", "--check", "--quiet", "--force", &
+    "--help", "--version", "--print-defaults"]
+  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", "--explain", switches]
   character(len=1), parameter :: eol = new_line("a")
 
 contains
@@ -89,31 +90,26 @@ contains
     type(command_t), intent(inout) :: command
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: name, value
-    integer :: equals
 
     name = arguments(k)%text
-    value = ""
-    equals = index(name, "=")
-    if (index(name, "--") == 1 .and. equals > 0) name = name(:equals - 1)
-    select case (name)
-    case ("-o", "--output", "--set", "--explain")
-      call take_value(arguments, k, name, value, error)
-    case default
-      if (name /= arguments(k)%text .and. any(options == name)) &
-        call fail(error, exit_usage, "option "//name//" takes no value")
-    end select
-    if (allocated(error)) return
+    if (index(name, "--") == 1) name = name(:index(name//"=", "=") - 1)
+    if (name /= arguments(k)%text .and. any(switches == name)) then
+      call fail(error, exit_usage, "option "//name//" takes no value")
+      return
+    end if
     select case (name)
     case ("-o", "--output")
-      command%output = value
+      call take_value(arguments, k, name, command%output, error)
     case ("--set")
+      call take_value(arguments, k, name, value, error)
       call append(command%overrides, value)
     case ("--explain")
       command%question = "explain"
-      command%topic = value
-    case ("-h", "--help", "--version", "--print-defaults")
+      call take_value(arguments, k, name, command%topic, error)
+    case ("-h", "--help")
+      command%question = "help"
+    case ("--version", "--print-defaults")
       command%question = name(3:)
-      if (name == "-h") command%question = "help"
     case ("--resume")
       command%resume = .true.
     case ("--check")
