@@ -1,7 +1,7 @@
 """Animate a run: disks of true size in time.
 
     python post/animate.py runs/gas.h5 -o gas.mp4              mp4 needs ffmpeg; else write .gif
-    python post/animate.py runs/crater.h5 --colour speed --frames 300 --fps 30
+    python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
 A name without an ending gets .mp4 if ffmpeg is there, and .gif if not; without -o it is that of
 the run.
@@ -13,36 +13,36 @@ import numpy as np
 from matplotlib import animation
 from tqdm import tqdm
 
-from drawing import (
+from ricochet import Run, RunError, read_run
+from ricochet.drawing import (
+    LABELS,
     caption,
-    command_line,
+    chosen_colour,
     disk_collection,
     draw_box,
-    launch,
     plt,
-    positive,
     species_colours,
     species_legend,
+    values_of,
 )
-from read_run import Run, RunError, read_run
-from snapshot import LABELS, default_colour, spread_frames, values_of
+from ricochet.script import command_line, film_frames, launch, positive, text_of
 
 
-def film_path(asked: Path | None, run: Run) -> Path:
-    """Where to write: as asked, or in the current folder under the name of the run."""
+def film_path(wish: Path | None, run: Run) -> Path:
+    """Where to write: -o, else the name of the run in the current folder."""
     ffmpeg = animation.FFMpegWriter.isAvailable()
-    path = asked or Path(run.path.stem)
+    path = wish or Path(run.path.stem)
     if not path.suffix:
         path = path.with_suffix(".mp4" if ffmpeg else ".gif")
     if path.suffix == ".mp4" and not ffmpeg:
-        raise RunError(f"{path}: mp4 needs ffmpeg, which is not installed; ask for .gif")
+        raise RunError(f"{path}: mp4 needs ffmpeg, which is not installed; write a .gif")
     if path.suffix not in (".mp4", ".gif"):
         raise RunError(f"{path}: a film ends in .mp4 or .gif")
     return path
 
 
 def colour_limits(run: Run, frames: list[int], colour: str) -> tuple[float, float]:
-    """A scale that holds for the whole film, from some of its frames."""
+    """A scale for the whole film, from some of its frames."""
     some = frames[:: max(1, len(frames) // 20)]
     top = max(float(np.quantile(values_of(run, frame, colour), 0.99)) for frame in some)
     return 0.0, top or 1.0
@@ -64,7 +64,7 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
         figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
     title = axes.set_title(" ")
     figure.canvas.draw()
-    figure.set_layout_engine("none")  # the layout is settled; solving it again costs most time
+    figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
     writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(fps=fps)
     path.parent.mkdir(parents=True, exist_ok=True)
     with writer.saving(figure, str(path), dpi=100):
@@ -78,17 +78,16 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
 
 
 def main() -> None:
-    parser = command_line(__doc__, "RUN.mp4", one=True)
-    parser.set_defaults(output=None)
-    parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
-    parser.add_argument("--frames", type=positive, default=300, help="at most this many [300]")
-    parser.add_argument("--fps", type=positive, default=25, help="frames per second [25]")
+    parser = command_line(
+        __doc__, "RUN.mp4", one=True, csv=False, frames=None, count=300, colour=None
+    )
+    parser.add_argument("--fps", type=positive, metavar="N", default=25, help="per second [25]")
     args = parser.parse_args()
     run = read_run(args.run)
     path = film_path(args.output, run)
-    frames = spread_frames(run, min(args.frames, run.frames))
-    animate(run, frames, args.colour or default_colour(run), path, args.fps)
-    print(f"film = {path}")
+    frames = film_frames(run, args)
+    animate(run, frames, chosen_colour(run, args.colour), path, args.fps)
+    print(text_of([{"film": path, "frames": len(frames), "of": run.frames}]))
 
 
 if __name__ == "__main__":

@@ -2,35 +2,21 @@
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
-Runs are put together by restitution xi; lines are means over the runs, bands are standard
-errors.  K is per disk and in units of its start value over all disks.  The lowest row shows
-the temperature ratio of the heaviest to the lightest species, 1 in equilibrium.
+Runs are combined by restitution xi; lines are means over the runs, bands are standard errors.  K is
+per disk and in units of its start value over all disks.  The lowest row shows the temperature ratio
+of the heaviest to the lightest species, 1 in equilibrium.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from drawing import (
-    COLOURS,
-    band,
-    caption,
-    command_line,
-    dilute_limit,
-    grouped,
-    launch,
-    plt,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run
-from theory import Estimate, estimate
-
-# Dilute elastic mixture, half m and half 4 m, equal speeds at the start: Boltzmann equation.
-EQUIPARTITION = np.array(
-    [(0, 4), (1, 2.02), (2, 1.455), (3, 1.228), (4, 1.115), (5, 1.062), (6, 1.031), (8, 1.005)]
-)
+from ricochet import Run
+from ricochet.drawing import COLOURS, band, caption, dilute_limit, plt
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate
+from ricochet.theory import EQUIPARTITION
+from ricochet.thermodynamics import lightest_and_heaviest
 
 
 class Cooling(NamedTuple):
@@ -56,19 +42,9 @@ def cooling(runs: list[Run], points: int = 201) -> Cooling:
     tau = np.linspace(0, min(c[-1] for _, c, _ in tracks), points)
     by_time = np.array([[np.interp(time, t, k) for k in ks] for t, _, ks in tracks])
     by_tau = np.array([[np.interp(tau, c, k) for k in ks] for _, c, ks in tracks])
-    heavy, light = 1 + heaviest(runs[0]), 1 + lightest(runs[0])
-    ratio = by_tau[:, heavy] / by_tau[:, light]
+    light, heavy = lightest_and_heaviest(runs[0])
+    ratio = by_tau[:, 1 + heavy] / by_tau[:, 1 + light]
     return Cooling((time, estimate(by_time)), (tau, estimate(by_tau)), estimate(ratio))
-
-
-def heaviest(run: Run) -> int:
-    """Index of the species with the largest mass."""
-    return int(np.argmax([run.mass[run.of_species(name)][0] for name in run.names]))
-
-
-def lightest(run: Run) -> int:
-    """Index of the species with the smallest mass."""
-    return int(np.argmin([run.mass[run.of_species(name)][0] for name in run.names]))
 
 
 def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.Figure:
@@ -105,34 +81,39 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
     return figure
 
 
+def table(groups: list, results: list[Cooling]) -> list[dict]:
+    """A row per restitution: energy and temperature ratio at the end."""
+    rows = []
+    for (xi, runs), found in zip(groups, results, strict=True):
+        energy = found.by_time[1]
+        left = measured("energy_left", Estimate(energy.mean[0, -1], energy.error[0, -1]))
+        ratio = Estimate(found.ratio.mean[-1], found.ratio.error[-1])
+        row = {"restitution": xi, "runs": len(runs)}
+        rows.append(row | left | measured("temperature_ratio", ratio))
+    return rows
+
+
+def curves(groups: list, results: list[Cooling]) -> dict[str, np.ndarray]:
+    """All curves against collisions per disk."""
+    names = ("all", *groups[0][1][0].names)
+    columns = {}
+    for (xi, _), result in zip(groups, results, strict=True):
+        tau, energy = result.by_collisions
+        columns[f"collisions_per_disk_xi{xi:g}"] = tau
+        for name, mean, error in zip(names, *energy, strict=True):
+            columns[f"K_{name}_xi{xi:g}"], columns[f"K_{name}_error_xi{xi:g}"] = mean, error
+        columns[f"ratio_xi{xi:g}"], columns[f"ratio_error_xi{xi:g}"] = result.ratio
+    return columns
+
+
 def main() -> None:
-    args = command_line(__doc__, "cooling.png", table=True).parse_args()
+    args = command_line(__doc__, "cooling.png").parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: run.restitution)
     results = [cooling(members) for _, members in groups]
-    for (xi, members), result in zip(groups, results, strict=True):
-        left = Estimate(result.by_time[1].mean[0, -1], result.by_time[1].error[0, -1])
-        ratio = Estimate(result.ratio.mean[-1], result.ratio.error[-1])
-        print(
-            f"restitution = {xi:g}  runs = {len(members)}  energy_left = {left}  "
-            f"temperature_ratio = {ratio}"
-        )
-    save(draw(groups, results), args.output, runs, "Cooling and equipartition of a mixture")
-    if args.csv:
-        write_csv(args.csv, columns(groups, results))
-
-
-def columns(groups: list, results: list[Cooling]) -> dict[str, np.ndarray]:
-    """All curves against collisions per disk."""
-    names = ("all", *groups[0][1][0].names)
-    table = {}
-    for (xi, _), result in zip(groups, results, strict=True):
-        tau, energy = result.by_collisions
-        table[f"collisions_per_disk_xi{xi:g}"] = tau
-        for name, mean, error in zip(names, *energy, strict=True):
-            table[f"K_{name}_xi{xi:g}"], table[f"K_{name}_error_xi{xi:g}"] = mean, error
-        table[f"ratio_xi{xi:g}"], table[f"ratio_error_xi{xi:g}"] = result.ratio
-    return table
+    figure, rows = draw(groups, results), table(groups, results)
+    title = "Cooling and equipartition of a mixture"
+    report(args, runs, title, figure, rows, data=curves(groups, results))
 
 
 if __name__ == "__main__":

@@ -2,12 +2,13 @@
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-Runs are put together by packing fraction; lines are means over the runs.  Frames must be equally
-far apart in time; lags are logarithmic, every frame is an origin.  The first 20 collisions per disk
-count for a2 alone.  Times are in units of the mean free time 1/w, lengths of the mean diameter.  At
-first the VACF falls as exp(-w t); the displacement is held against Enskog's D; a2 = <v^4> /
-(2 <v^2>^2) - 1 is 0 in equilibrium and -1/2 for equal speeds; psi6 = mean of exp(6 i theta) over
-the Delaunay neighbours, its size of each disk and of all: 1 in a perfect triangular crystal.
+Runs are combined by packing fraction; lines are means over the runs.  Frames must be equally far
+apart in time; lags are logarithmic, every frame is an origin.  The first --skip collisions per disk
+count for a2 alone (all frames count if the run is not twice as long).  Times are in units of the
+mean free time 1/w, lengths of the mean diameter.  At first the VACF falls as exp(-w t); the
+displacement is compared with Enskog's D; a2 = <v^4> / (2 <v^2>^2) - 1 is 0 in equilibrium and -1/2
+for equal speeds; psi6 = mean of exp(6 i theta) over the Delaunay neighbours, its modulus for single
+disks and for all: 1 in a perfect triangular crystal.
 """
 
 from collections.abc import Callable
@@ -15,23 +16,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-import hard_disks
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    dilute_limit,
-    grouped,
-    launch,
-    plt,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-from speeds import RELAXATION
-from theory import estimate, excess_kurtosis
-from thermodynamics import SETTLING, packing, temperature
+from ricochet import Run, RunError, hard_disks
+from ricochet.drawing import COLOURS, caption, dilute_limit, plt
+from ricochet.script import command_line, grouped, launch, read_all, report
+from ricochet.statistics import estimate, excess_kurtosis
+from ricochet.theory import RELAXATION
+from ricochet.thermodynamics import SKIP, packing, settled, temperature
 
 MOST_FRAMES = 50  # for g(r) and psi6
 
@@ -47,7 +37,7 @@ def mean_free_time(run: Run) -> float:
     """1 / w, over the whole run."""
     collisions = run.collisions_per_disk.value[-1]
     if not collisions > 0:
-        raise RunError(f"{run.path}: no disks have met so far")
+        raise RunError(f"{run.path}: has no collisions of two disks yet")
     return run.time[-1] / collisions
 
 
@@ -58,22 +48,20 @@ def check_frames(run: Run) -> None:
         raise RunError(f"{run.path}: needs 10 frames and more, written by frames_every_time")
 
 
-def settled(run: Run) -> slice:
+def later(run: Run, skip: float) -> slice:
     """Frames after the first collisions, without the last, which may be out of step."""
-    tau = run.collisions_per_disk_at(run.time)
-    first = int(np.searchsorted(tau, SETTLING)) if tau[-1] > 2 * SETTLING else 0
-    return slice(first, run.frames - 1)
+    return slice(settled(run.collisions_per_disk_at(run.time), skip), run.frames - 1)
 
 
-def velocity_memory(run: Run, at: np.ndarray) -> np.ndarray:
+def velocity_memory(run: Run, at: np.ndarray, skip: float = SKIP) -> np.ndarray:
     """Normalised velocity autocorrelation at lags in frames."""
-    v = run.velocity[settled(run)]
+    v = run.velocity[later(run, skip)]
     return np.array([np.mean(v[k:] * v[: len(v) - k]) for k in at]) / np.mean(v**2)
 
 
-def displacement(run: Run, at: np.ndarray) -> np.ndarray:
+def displacement(run: Run, at: np.ndarray, skip: float = SKIP) -> np.ndarray:
     """Mean square displacement at lags in frames, relative to the centre of mass."""
-    x = run.unwrapped(settled(run))
+    x = run.unwrapped(later(run, skip))
     x = x - np.average(x, axis=1, weights=run.mass, keepdims=True)
     return np.array([2 * np.mean((x[k:] - x[: len(x) - k]) ** 2) for k in at])
 
@@ -84,7 +72,7 @@ def frames_of(run: Run) -> np.ndarray:
 
 
 def pair_correlation(run: Run, edges: np.ndarray) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters; between walls of disks far from them."""
+    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them."""
     r = edges * 2 * run.radius.mean()
     size = np.where(run.periodic, run.edges, 0.0)
     sums = np.zeros(len(edges) - 1)
@@ -153,23 +141,23 @@ def mean_over(runs: list[Run], measure: Callable[[Run], np.ndarray]) -> np.ndarr
     return estimate([measure(run) for run in runs]).mean
 
 
-def analysed(runs: list[Run]) -> dict[str, np.ndarray]:
+def analysed(runs: list[Run], skip: float) -> dict[str, np.ndarray]:
     """All curves of runs at one packing fraction."""
     for run in runs:
         check_frames(run)
     first = runs[0]
-    at = lags(min(settled(run).stop - settled(run).start for run in runs))
+    at = lags(min(len(range(run.frames)[later(run, skip)]) for run in runs))
     reach = min(4.0, 0.45 * first.edges.min() / (2 * first.radius.mean()))
     edges = np.linspace(1, reach, 121)
     time = at * (first.time[1] - first.time[0])
     free = float(np.mean([mean_free_time(run) for run in runs]))
     diameter = 2 * first.radius.mean()
     tau, _ = kurtosis(first)
-    tau = tau[tau <= SETTLING]
+    tau = tau[tau <= skip]
     return {
         "wt": time / free,
-        "vacf": mean_over(runs, lambda run: velocity_memory(run, at)),
-        "msd": mean_over(runs, lambda run: displacement(run, at)) / diameter**2,
+        "vacf": mean_over(runs, lambda run: velocity_memory(run, at, skip)),
+        "msd": mean_over(runs, lambda run: displacement(run, at, skip)) / diameter**2,
         "enskog": diffusion_law(first, time) / diameter**2,
         "tau": tau,
         "a2": mean_over(runs, lambda run: kurtosis(run)[1][: len(tau)]),
@@ -218,31 +206,34 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figu
     return figure
 
 
-def columns(groups: list, results: list[dict]) -> dict[str, list]:
-    """All curves, one below the other: what, packing, abscissa, value."""
-    rows = [
-        (what, eta, float(x), float(y))
+def curves(groups: list, results: list[dict]) -> list[dict]:
+    """All curves, one below the other."""
+    return [
+        {"what": what, "packing": eta, "x": float(x), "y": float(y)}
         for (eta, _), found in zip(groups, results, strict=True)
         for what, abscissa in (("vacf", "wt"), ("msd", "wt"), ("a2", "tau"), ("g", "r"))
         for x, y in zip(found[abscissa], found[what], strict=False)
     ]
-    return dict(zip(("what", "packing", "x", "y"), map(list, zip(*rows, strict=True)), strict=True))
+
+
+def table(groups: list, results: list[dict]) -> list[dict]:
+    """A row per packing fraction: order at contact and of the bonds."""
+    rows = []
+    for (eta, members), found in zip(groups, results, strict=True):
+        local, of_all = map(float, found["psi6"])
+        row = {"packing": eta, "runs": len(members), "g_first_bin": float(found["g"][0])}
+        rows.append(row | {"psi6_local": local, "psi6_global": of_all})
+    return rows
 
 
 def main() -> None:
-    args = command_line(__doc__, "correlations.png", table=True).parse_args()
+    args = command_line(__doc__, "correlations.png", skip=SKIP).parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: round(packing(run), 6))
-    results = [analysed(members) for _, members in groups]
-    for (eta, members), found in zip(groups, results, strict=True):
-        local, of_all = found["psi6"]
-        print(
-            f"packing = {eta:g}  runs = {len(members)}  g_first_bin = {found['g'][0]:.4g}  "
-            f"psi6_local = {local:.4g}  psi6_global = {of_all:.4g}"
-        )
-    save(draw(groups, results), args.output, runs, "Correlations in a gas of hard disks")
-    if args.csv:
-        write_csv(args.csv, columns(groups, results))
+    results = [analysed(members, args.skip) for _, members in groups]
+    figure, rows = draw(groups, results), table(groups, results)
+    title = "Correlations in a gas of hard disks"
+    report(args, runs, title, figure, rows, data=curves(groups, results))
 
 
 if __name__ == "__main__":

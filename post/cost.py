@@ -2,18 +2,19 @@
 
     python post/cost.py runs/cost/*.h5 -o cost.png --csv cost.csv
 
-Reads the collisions per second of processor time that each run notes of itself; the best of equal
-runs counts.  Lines: powers of N fitted to the points with N in --fit.  Below it, what a collision
-costs anyway is not small beside the search; above it disks no longer fit into the caches, and each
-costs more to reach.
+Reads the collisions per second of processor time that each run records; of equal runs the best one
+counts.  Lines: powers of N fitted to the points with N in --fit.  Below that range the cost of the
+collision itself is not small compared with the search; above it disks no longer fit into the
+caches.
 """
 
 import numpy as np
 
-from drawing import COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv
-from read_run import Run, RunError
-from theory import PowerLaw, fit_power_law
-from thermodynamics import packing
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, plt
+from ricochet.script import command_line, launch, read_all, report
+from ricochet.statistics import PowerLaw, fit_power_law
+from ricochet.thermodynamics import packing
 
 LABELS = {
     "rescan": "everything anew at each collision",
@@ -26,7 +27,7 @@ def microseconds(run: Run) -> float:
     """Time per collision in microseconds."""
     rate = float(run.provenance.get("collisions_per_second", 0))
     if rate <= 0:
-        raise RunError(f"{run.path}: is not finished: does not say its collisions per second")
+        raise RunError(f"{run.path}: is not finished: records no collisions per second")
     return 1e6 / rate
 
 
@@ -54,7 +55,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 def draw(
     measured: dict, laws: dict[str, PowerLaw], low: float, high: float, title: str
 ) -> plt.Figure:
-    """Doubly logarithmic; the fits dotted where they are prolonged."""
+    """Doubly logarithmic; the fits are dotted outside their range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
         if search not in measured:
@@ -77,7 +78,7 @@ def draw(
 
 
 def main() -> None:
-    parser = command_line(__doc__, "cost.png", table=True)
+    parser = command_line(__doc__, "cost.png")
     parser.add_argument(
         "--fit", type=float, nargs=2, default=[128, 1e4], metavar="N", help="[128 1e4]"
     )
@@ -90,14 +91,13 @@ def main() -> None:
         "N": [int(k) for n, _ in measured.values() for k in n],
         "microseconds": [float(c) for _, cost in measured.values() for c in cost],
     }
-    print_table(table)
-    for search, law in laws.items():
-        print(f"exponent_{search} = {law.exponent:.3f} +- {law.exponent_error:.3f}")
+    exponents = [
+        {"search": search, "exponent": law.exponent, "exponent_error": float(law.exponent_error)}
+        for search, law in laws.items()
+    ]
     eta = ", ".join(f"{value:g}" for value in sorted({round(packing(run), 3) for run in runs}))
     figure = draw(measured, laws, *args.fit, f"packing fraction {eta}")
-    save(figure, args.output, runs, "Cost of a collision")
-    if args.csv:
-        write_csv(args.csv, table)
+    report(args, runs, "Cost of a collision", figure, table, exponents)
 
 
 if __name__ == "__main__":

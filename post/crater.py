@@ -5,105 +5,18 @@
 
 The projectile is the species of that name, or else the only disk that moves at the start; the
 others are the bed.  Sizes: `hit`, bed disks that collided with anything; `displaced`, bed disks
-now further than one radius from where they lay; `width` and `depth`, the extent of the first
+now further than one radius from their first position; `width` and `depth`, the extent of the first
 positions of the displaced ones, from the rim of the bed downwards.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from matplotlib.ticker import LogLocator
-from scipy.ndimage import gaussian_filter
 from scipy.spatial import ConvexHull
 
-from drawing import (
-    COLOURS,
-    WALL,
-    caption,
-    command_line,
-    disk_collection,
-    draw_box,
-    launch,
-    plt,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-
-
-class Crater(NamedTuple):
-    """The size of a crater by four definitions, and how the run ended."""
-
-    hit: int
-    displaced: int
-    width: float
-    depth: float
-    energy_left: float  # over the energy at the start
-    time: float
-    collisions: int
-    wall_collisions: int
-
-
-def projectile(run: Run) -> int:
-    """Index of the projectile."""
-    if run.count < 2:
-        raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
-    if "projectile" in run.names:
-        return int(np.flatnonzero(run.of_species("projectile"))[0])
-    moving = np.flatnonzero(run.speed(0) > 0)
-    if len(moving) != 1:
-        raise RunError(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
-    return int(moving[0])
-
-
-def bed(run: Run) -> np.ndarray:
-    """(N,) mask of the disks at rest at the start."""
-    mask = np.ones(run.count, dtype=bool)
-    mask[projectile(run)] = False
-    return mask
-
-
-def displaced(run: Run, frame: int = -1) -> np.ndarray:
-    """(N,) mask of the bed disks further than their radius from where they lay."""
-    return bed(run) & (run.displacement(frame) > run.radius)
-
-
-def crater(run: Run) -> Crater:
-    """The sizes of the crater in the last frame."""
-    if run.collisions is None:
-        raise RunError(f"{run.path}: has no collisions per disk")
-    moved, lying = displaced(run), bed(run)
-    start = run.position[0]
-    rim = np.max((start[:, 1] + run.radius)[lying])
-    bottom = np.min((start[:, 1] - run.radius)[moved], initial=rim)
-    return Crater(
-        hit=int(np.sum(run.collisions[-1][lying] > 0)),
-        displaced=int(moved.sum()),
-        width=float(np.ptp(start[moved, 0])) if moved.any() else 0.0,
-        depth=float(rim - bottom),
-        energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
-        time=float(run.time[-1]),
-        collisions=int(run.observable("collisions").value[-1]),
-        wall_collisions=int(run.observable("wall_collisions").value[-1].sum()),
-    )
-
-
-def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
-    """Area fraction smoothed over a few disks: x and y of the cells and values (y, x)."""
-    here = bed(run)
-    side = run.edges.max() / cells
-    shape = np.maximum(1, np.round(run.edges / side)).astype(int)
-    limits = np.stack([run.lower, run.upper], axis=1)
-    area, xs, ys = np.histogram2d(
-        *run.position[frame][here].T,
-        bins=shape,
-        range=limits,
-        weights=np.pi * run.radius[here] ** 2,
-    )
-    smooth = gaussian_filter(area, 2.5 * np.median(run.radius[here]) / side, mode="reflect")
-    fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
-    return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, fraction
+from ricochet import Run
+from ricochet.crater import Crater, bed, crater, displaced, packing_field, projectile
+from ricochet.drawing import COLOURS, WALL, caption, disk_collection, draw_box, plt
+from ricochet.script import command_line, launch, read_all, report
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
@@ -135,7 +48,7 @@ def draw_cavity(axes: plt.Axes, run: Run) -> None:
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
-    """Energy left against time; the collisions beside it."""
+    """Energy left, and collisions, against time."""
     time, energy = run.observable("all/kinetic_energy")
     axes.semilogy(time, energy / energy[0], color=COLOURS[0], label="kinetic energy $E/E_0$")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -181,7 +94,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     count = np.log10(1.0 + run.collisions[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
     draw_state(hits, run, 0, count, (0, top))
-    hits.set_title("collisions of each disk, drawn where it lay")
+    hits.set_title("collisions of each disk, drawn at its first position")
     scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
     bar = figure.colorbar(
         scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02, label="collisions"
@@ -202,17 +115,14 @@ def draw(run: Run, size: Crater) -> plt.Figure:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "crater.png", table=True)
-    args = parser.parse_args()
+    args = command_line(__doc__, "crater.png").parse_args()
     runs = read_all(args.runs)
     sizes = [crater(run) for run in runs]
-    if len(runs) == 1:
-        for key, value in sizes[0]._asdict().items():
-            print(f"{key} = {value:.6g}")
-        save(draw(runs[0], sizes[0]), args.output, runs, "Crater")
-    if args.csv:
-        columns = {key: [getattr(size, key) for size in sizes] for key in Crater._fields}
-        write_csv(args.csv, {"run": [run.path.name for run in runs], **columns})
+    figure = draw(runs[0], sizes[0]) if len(runs) == 1 else None
+    table = [
+        {"run": run.path.name, **size._asdict()} for run, size in zip(runs, sizes, strict=True)
+    ]
+    report(args, runs, "Crater", figure, table)
 
 
 if __name__ == "__main__":

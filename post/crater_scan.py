@@ -2,31 +2,23 @@
 
     python post/crater_scan.py runs/crater_scan/*.h5 -o crater_scan.png --csv crater_scan.csv
 
-Every run tells its own four parameters.  The most frequent value of each is the base; a run
+The four parameters are read from each run.  The most frequent value of each is the base; a run
 belongs to the scan of a parameter if the other three are at the base.  Points: means over the
 runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
 restitution, the fraction of normal energy lost in a collision).  Open symbols are left out of
 the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
-runs ended by time, with more energy left than the fraction asked for.
+runs ended by time, with more energy left than `stop.energy_fraction`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from crater import Crater, bed, crater, projectile
-from drawing import (
-    COLOURS,
-    command_line,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run
-from theory import Estimate, PowerLaw, estimate, fit_power_law
+from ricochet import Run
+from ricochet.crater import Crater, bed, crater, projectile
+from ricochet.drawing import COLOURS, plt
+from ricochet.script import command_line, launch, measured, read_all, report
+from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law
 
 AXES = {
     "mass": "mass of the projectile / mass of a bed disk, $M$",
@@ -180,41 +172,43 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
     return figure
 
 
-def table(scans: dict[str, list[Point]]) -> dict[str, list]:
-    """All points as columns."""
+def table(scans: dict[str, list[Point]]) -> list[dict]:
+    """A row per point."""
     rows = []
     for axis, points in scans.items():
         for p in points:
             row = {"scan": axis, "value": p.x, "runs": p.runs}
-            for name, (mean, error) in p.sizes.items():
-                row |= {name: float(mean), f"{name}_error": float(error)}
-            rows.append(
-                row
-                | {
-                    "energy_left": float(p.energy_left),
-                    "wall_collisions": float(p.wall_collisions),
-                    "ended_by_time": int(p.by_time),
-                    "in_fit": int(p.free),
-                }
-            )
-    return {name: [row[name] for row in rows] for name in rows[0]}
+            for name, size in p.sizes.items():
+                row |= measured(name, size)
+            row |= {"energy_left": float(p.energy_left)}
+            row |= {"wall_collisions": float(p.wall_collisions)}
+            rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
+    return rows
+
+
+def exponents(scans: dict[str, list[Point]]) -> list[dict]:
+    """A row per fit."""
+    return [
+        {
+            "scan": axis,
+            "size": name,
+            **measured("exponent", Estimate(fit.exponent, fit.exponent_error)),
+        }
+        for axis, points in scans.items()
+        for name, fit in fits_of(axis, points).items()
+        if fit
+    ]
 
 
 def main() -> None:
-    args = command_line(__doc__, "crater_scan.png", table=True).parse_args()
+    args = command_line(__doc__, "crater_scan.png").parse_args()
     runs = distinct(read_all(args.runs))
     keys, craters = [key_of(run) for run in runs], [crater(run) for run in runs]
     fraction = float(runs[0].parameter("stop", "energy_fraction", 0.1))
     few_hits = 0.01 * runs[0].count
     scans = {axis: scan_points(keys, craters, k, fraction, few_hits) for k, axis in enumerate(AXES)}
-    print_table(table(scans))
-    for axis, points in scans.items():
-        for name, fit in fits_of(axis, points).items():
-            if fit:
-                print(f"{axis}.{name}.exponent = {fit.exponent:z.4f} +- {fit.exponent_error:.4f}")
-    save(draw(scans, base_of(keys), fraction, runs), args.output, runs, "Crater size")
-    if args.csv:
-        write_csv(args.csv, table(scans))
+    figure = draw(scans, base_of(keys), fraction, runs)
+    report(args, runs, "Crater size", figure, table(scans), exponents(scans))
 
 
 if __name__ == "__main__":

@@ -10,29 +10,17 @@ the standard deviation from that line; and the largest change.
 
 import numpy as np
 
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from equipartition import windows
-from read_run import Run, RunError
-
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import command_line, launch, read_all, report
+from ricochet.statistics import windows
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
 
 
 def method(run: Run) -> str:
     """How the run was integrated, for the legend."""
-    if run.parameter("run", "dynamics", "events") == "steps":
-        return f"time steps, Δt = {float(run.parameter('run', 'dt')):g}"
-    return "event driven"
+    return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
 def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
@@ -87,23 +75,29 @@ def draw(runs: list[Run]) -> plt.Figure:
     return figure
 
 
+def table(runs: list[Run]) -> list[dict]:
+    """A row per run."""
+    rows = []
+    for run in runs:
+        time, change = total_change(run)
+        drift, spread = drift_and_spread(time, change)
+        rows.append(
+            {
+                "run": run.path.name,
+                "method": method(run),
+                "total_energy": float(run.observable("total_energy").value[0]),
+                "drift": drift,
+                "spread": spread,
+                "largest_change": float(np.abs(change).max()),
+            }
+        )
+    return rows
+
+
 def main() -> None:
-    args = command_line(__doc__, "energy.png", table=True).parse_args()
+    args = command_line(__doc__, "energy.png").parse_args()
     runs = read_all(args.runs)
-    changes = [total_change(run) for run in runs]
-    drift, spread = zip(*(drift_and_spread(*change) for change in changes), strict=True)
-    result = {
-        "run": [run.path.name for run in runs],
-        "method": [method(run) for run in runs],
-        "total_energy": [float(run.observable("total_energy").value[0]) for run in runs],
-        "drift": drift,
-        "spread": spread,
-        "largest_change": [float(np.abs(change).max()) for _, change in changes],
-    }
-    print_table(result)
-    save(draw(runs), args.output, runs, "Energy")
-    if args.csv:
-        write_csv(args.csv, result)
+    report(args, runs, "Energy", draw(runs), table(runs))
 
 
 if __name__ == "__main__":

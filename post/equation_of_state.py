@@ -3,41 +3,33 @@
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
 By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
-(walls).  Errors come from 20 blocks of each run.  Runs at equal packing fraction are put together.
-Disks between walls are denser away from them: the wall pressure belongs to the area open to the
-centres, and differs from the bulk by about 1/sqrt(N).  Elastic runs only; the first 20 collisions
-per disk are left out.
+(walls).  Errors come from 20 blocks of each run, after its first --skip collisions per disk (of the
+whole run, if it is not twice as long).  Runs at equal packing fraction are combined.  Elastic runs
+only.  Disks between walls are denser away from them: the wall pressure belongs to the area open to
+the centres, and differs from the bulk by about 1/sqrt(N).
 """
 
 import numpy as np
 
-import hard_disks
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    grouped,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-from theory import Estimate
-from thermodynamics import combined, packing, z_rate, z_virial, z_wall
+from ricochet import Run, RunError, hard_disks
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import columns, command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import Estimate, combined
+from ricochet.thermodynamics import SKIP, packing, z_rate, z_virial, z_wall
 
 NONE = Estimate(float("nan"), float("nan"))
+WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
-def pressures(run: Run) -> list[Estimate]:
-    """Z by virial, rate, walls; NaN where a way is closed."""
+def pressures(run: Run, skip: float = SKIP) -> list[Estimate]:
+    """Z by virial, rate, walls; NaN where a way does not apply."""
     if run.restitution != 1:
         raise RunError(f"{run.path}: is not elastic, it has no equation of state")
     equal = np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0
-    walled = not run.periodic.any() and not run.obstacles and np.ptp(run.radius) == 0
-    return [z_virial(run), z_rate(run) if equal else NONE, z_wall(run) if walled else NONE]
+    empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
+    walled = empty and np.ptp(run.radius) == 0
+    ways = ((z_virial, True), (z_rate, equal), (z_wall, walled))
+    return [way(run, skip) if applies else NONE for way, applies in ways]
 
 
 def reference(eta: float, count: int, periodic: bool) -> float:
@@ -49,23 +41,20 @@ def reference(eta: float, count: int, periodic: bool) -> float:
     return float(hard_disks.crystal(eta, count) if eta >= 0.72 else hard_disks.simulated(eta))
 
 
-def tabulated(groups: list[tuple[float, list[Run]]]) -> dict[str, list]:
+def table(groups: list[tuple[float, list[Run]]], skip: float) -> list[dict]:
     """A row per packing fraction."""
-    table = {"packing": [eta for eta, _ in groups], "runs": [len(runs) for _, runs in groups]}
-    rows = [
-        [combined(list(way)) for way in zip(*(pressures(run) for run in runs), strict=True)]
-        for _, runs in groups
-    ]
-    for k, name in enumerate(("virial", "rate", "walls")):
-        table[f"Z_{name}"] = [float(row[k].mean) for row in rows]
-        table[f"Z_{name}_error"] = [float(row[k].error) for row in rows]
-    table["Z_reference"] = [
-        reference(eta, runs[0].count, bool(runs[0].periodic.all())) for eta, runs in groups
-    ]
-    return table
+    rows = []
+    for eta, runs in groups:
+        row = {"packing": eta, "runs": len(runs)}
+        found = zip(*(pressures(run, skip) for run in runs), strict=True)
+        for name, way in zip(WAYS, found, strict=True):
+            row |= measured(f"Z_{name}", combined(list(way)))
+        periodic = bool(runs[0].periodic.all())
+        rows.append(row | {"Z_reference": reference(eta, runs[0].count, periodic)})
+    return rows
 
 
-def draw(table: dict[str, list], runs: list[Run]) -> plt.Figure:
+def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     """Z above, its deviation from the reference below."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     fluid = np.linspace(0, 0.72, 200)
@@ -79,19 +68,19 @@ def draw(table: dict[str, list], runs: list[Run]) -> plt.Figure:
         solid, hard_disks.crystal(solid), color="black", lw=1, ls="--",
         label="crystal, Alder, Hoover and Young 1968",
     )  # fmt: skip
-    eta, expected = np.array(table["packing"]), np.array(table["Z_reference"])
-    ways = (("virial", "o", 1), ("rate", "x", 1), ("walls", "s", 1))
-    for (name, marker, size), colour in zip(ways, COLOURS, strict=False):
-        z, error = np.array(table[f"Z_{name}"]), np.array(table[f"Z_{name}_error"])
+    found = {name: np.array(values) for name, values in columns(rows).items()}
+    eta, expected = found["packing"], found["Z_reference"]
+    for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
+        z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
         if np.isnan(z).all():
             continue
-        style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6 * size}
-        above.errorbar(eta, z, error, label=f"by {labels()[name]}", **style)
+        style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6}
+        above.errorbar(eta, z, error, label=f"by {way}", **style)
         below.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
     henderson = 100 * (hard_disks.henderson(fluid) / hard_disks.simulated(fluid) - 1)
     below.plot(fluid, henderson, color="0.6")
     below.axhline(0, color="black", lw=1, zorder=0)
-    largest = np.nanmax(np.abs(100 * (np.array(table["Z_virial"]) / expected - 1)), initial=0.1)
+    largest = np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(
         xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-3 * largest, 3 * largest)
     )
@@ -103,20 +92,11 @@ def draw(table: dict[str, list], runs: list[Run]) -> plt.Figure:
     return figure
 
 
-def labels() -> dict[str, str]:
-    """What the ways are called in the figure."""
-    return {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
-
-
 def main() -> None:
-    args = command_line(__doc__, "equation_of_state.png", table=True).parse_args()
+    args = command_line(__doc__, "equation_of_state.png", skip=SKIP).parse_args()
     runs = read_all(args.runs)
-    groups = grouped(runs, lambda run: round(packing(run), 6))
-    table = tabulated(groups)
-    print_table(table)
-    save(draw(table, runs), args.output, runs, "Equation of state of hard disks")
-    if args.csv:
-        write_csv(args.csv, table)
+    rows = table(grouped(runs, lambda run: round(packing(run), 6)), args.skip)
+    report(args, runs, "Equation of state of hard disks", draw(rows, runs), rows)
 
 
 if __name__ == "__main__":

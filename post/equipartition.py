@@ -2,33 +2,22 @@
 
     python post/equipartition.py runs/gravity_v0/*.h5 -o equipartition.png --csv times.csv
 
-Runs are put together by the width v0 of the start velocities; energies are means over the runs
-and over windows of --window.  T_therm is the middle of the first window from which the two agree
-within --within for three windows.  A single pair of energies is no measure: with 30 + 30 disks
-their ratio fluctuates by 26 % in equilibrium, so take many runs.  The equilibrium values in the
-table are means over the second half of the time.
+Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
+windows of --window.  T_therm is the middle of the first window from which the two agree within
+--within for three windows.  A single run is not enough: with 30 + 30 disks the ratio of the
+energies fluctuates by 26 % in equilibrium, so take many.  The equilibrium values in the table are
+means over the second half of the time.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from cooling import heaviest, lightest
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    grouped,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run
-from theory import Estimate, estimate
+from ricochet import Run
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate, windows
+from ricochet.thermodynamics import lightest_and_heaviest
 
 
 class Approach(NamedTuple):
@@ -38,15 +27,6 @@ class Approach(NamedTuple):
     light: Estimate  # (W,)
     heavy: Estimate
     thermalisation: float  # NaN if they never agree
-
-
-def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Means over windows of a series; incomplete last window left out."""
-    count = max(1, int(np.floor((time[-1] - time[0]) / width + 1e-9)))
-    index = np.minimum(((time - time[0]) / width).astype(int), count)
-    sums = np.bincount(index, value, count + 1)[:count]
-    numbers = np.bincount(index, minlength=count + 1)[:count]
-    return time[0] + (np.arange(count) + 0.5) * width, sums / np.maximum(numbers, 1)
 
 
 def thermalisation_time(
@@ -62,9 +42,9 @@ def thermalisation_time(
 
 def approach(runs: list[Run], width: float, within: float) -> Approach:
     """Means over runs of the windowed energies of the lightest and the heaviest species."""
-    names = (runs[0].names[lightest(runs[0])], runs[0].names[heaviest(runs[0])])
     both = []
-    for name in names:
+    for kind in lightest_and_heaviest(runs[0]):
+        name = runs[0].names[kind]
         tracks = [windows(*run.observable(f"{name}/kinetic_energy"), width) for run in runs]
         time = tracks[0][0]
         both.append(estimate([values for _, values in tracks]))
@@ -72,36 +52,38 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     return Approach(time, light, heavy, thermalisation_time(time, light.mean, heavy.mean, within))
 
 
-def settled(group: list[Run], quantity: Callable[[Run], str]) -> Estimate:
-    """Mean over runs of an observable's mean over the second half of the time."""
+def late_energy(runs: list[Run], which: int) -> Estimate:
+    """Mean over runs of K over the second half of the time; 0 the lightest, 1 the heaviest."""
     means = []
-    for run in group:
-        time, value = run.observable(quantity(run))
+    for run in runs:
+        name = run.names[lightest_and_heaviest(run)[which]]
+        time, value = run.observable(f"{name}/kinetic_energy")
         means.append(value[time >= (time[0] + time[-1]) / 2].mean())
     return estimate(means)
 
 
-def energy_per_disk(group: list[Run]) -> Estimate:
+def energy_per_disk(runs: list[Run]) -> Estimate:
     """Total energy at the start over the number of disks."""
-    return estimate([run.observable("total_energy").value[0] / run.count for run in group])
+    return estimate([run.observable("total_energy").value[0] / run.count for run in runs])
 
 
-def tabulated(groups: list, results: list[Approach]) -> dict[str, list]:
+def table(groups: list, results: list[Approach]) -> list[dict]:
     """A row per v0."""
-    members = [runs for _, runs in groups]
-    energy = [energy_per_disk(runs) for runs in members]
-    light = [settled(r, lambda run: f"{run.names[lightest(run)]}/kinetic_energy") for r in members]
-    heavy = [settled(r, lambda run: f"{run.names[heaviest(run)]}/kinetic_energy") for r in members]
-    columns = {"v0": [v0 for v0, _ in groups], "runs": [len(runs) for runs in members]}
-    columns["T_therm"] = [result.thermalisation for result in results]
-    for name, values in (("energy", energy), ("K_light", light), ("K_heavy", heavy)):
-        columns[name] = [float(value.mean) for value in values]
-        columns[f"{name}_error"] = [float(value.error) for value in values]
-    return columns
+    return [
+        {
+            "v0": v0,
+            "runs": len(runs),
+            "T_therm": result.thermalisation,
+            **measured("energy", energy_per_disk(runs)),
+            **measured("K_light", late_energy(runs, 0)),
+            **measured("K_heavy", late_energy(runs, 1)),
+        }
+        for (v0, runs), result in zip(groups, results, strict=True)
+    ]
 
 
 def start_width(run: Run) -> float:
-    """v0: the largest `speed` that the input asks for."""
+    """v0: the largest `speed` in the input."""
     species = run.parameters.get("species", {})
     return max(float(species.get(name, {}).get("speed", 0.0)) for name in run.names)
 
@@ -112,7 +94,7 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
     )
     names = groups[0][1][0].names
-    order = (lightest(groups[0][1][0]), heaviest(groups[0][1][0]))
+    order = lightest_and_heaviest(groups[0][1][0])
     for axes, (v0, runs), result in zip(panels.flat, groups, results, strict=True):
         for k, energy in zip(order, (result.light, result.heavy), strict=True):
             axes.errorbar(
@@ -134,7 +116,7 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
 
 
 def main() -> None:
-    parser = command_line(__doc__, "equipartition.png", table=True)
+    parser = command_line(__doc__, "equipartition.png")
     parser.add_argument("--window", type=float, default=0.5, help="time averaged over [0.5]")
     parser.add_argument("--within", type=float, default=0.1, help="relative difference [0.1]")
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
@@ -142,16 +124,8 @@ def main() -> None:
     runs = read_all(args.runs)
     groups = grouped(runs, start_width)
     results = [approach(members, args.window, args.within) for _, members in groups]
-    table = tabulated(groups, results)
-    print_table(table)
-    save(
-        draw(groups, results, args.until, args.within),
-        args.output,
-        runs,
-        "Equipartition under gravity",
-    )
-    if args.csv:
-        write_csv(args.csv, table)
+    figure = draw(groups, results, args.until, args.within)
+    report(args, runs, "Equipartition under gravity", figure, table(groups, results))
 
 
 if __name__ == "__main__":

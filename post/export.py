@@ -10,11 +10,10 @@ carries velocity, radius, mass, the box and the time.  Numbers keep all their di
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
 
-from drawing import command_line, launch, positive
-from read_run import Run, RunError, read_run
+from ricochet import Run, RunError, read_run
+from ricochet.script import chosen_frames, command_line, launch, text_of
 
 PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1:id:I:1"
 
@@ -54,28 +53,27 @@ def csv_frame(run: Run, frame: int) -> str:
     )
 
 
-def exported(run: Run, suffix: str, step: int) -> Iterator[str]:
+def exported(run: Run, suffix: str, frames: list[int]) -> Iterator[str]:
     """The text of the whole file, piece by piece."""
     if suffix == ".csv":
         yield "time,id,species,x,y,vx,vy,radius,mass\n"
     one = csv_frame if suffix == ".csv" else xyz_frame
-    for frame in tqdm(np.arange(0, run.frames, step), unit="frame", desc="export", disable=None):
-        yield one(run, int(frame))
+    for frame in tqdm(frames, unit="frame", desc="export", disable=None):
+        yield one(run, frame)
 
 
 def main() -> None:
-    parser = command_line(__doc__, "RUN.xyz", one=True)
-    parser.set_defaults(output=None)
-    parser.add_argument("--every", type=positive, default=1, help="every so many frames [1]")
+    parser = command_line(__doc__, "RUN.xyz", one=True, csv=False, frames=None, count=None)
     args = parser.parse_args()
     run = read_run(args.run)
     path = args.output or Path(run.path.name).with_suffix(".xyz")
     if path.suffix not in (".xyz", ".csv"):
         raise RunError(f"{path}: export ends in .xyz or .csv")
+    frames = chosen_frames(run, args.frames, args.count)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:
-        file.writelines(exported(run, path.suffix, args.every))
-    print(f"export = {path}")
+        file.writelines(exported(run, path.suffix, frames))
+    print(text_of([{"export": path, "frames": len(frames), "of": run.frames}]))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """A gas under gravity in equilibrium: squared speeds and heights against exponential laws.
 
-    python post/gravity.py runs/gravity/long.h5 -o gravity.png --after 20 --csv gravity.csv
+    python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean kinetic energy per disk after the time --after.  Laws, drawn solid:
-P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of the
+kT is the mean kinetic energy per disk after the first --skip collisions per disk.  Laws, drawn
+solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of the
 centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
 fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i
 is kept out of the area pi s_ij^2 about each other disk, which multiplies its density by
-exp(-sum_j pi s_ij^2 n_j(h)) to first order: few per cent, near the floor.
+exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near the floor.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -19,26 +19,19 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    launch,
-    plt,
-    print_table,
-    save,
-    species_label,
-    write_csv,
-)
-from read_run import Run, RunError, read_run
-from theory import Estimate, estimate
+from ricochet import Run, RunError, read_run
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.reader import Species
+from ricochet.script import command_line, launch, measured, report
+from ricochet.statistics import Estimate, estimate
+from ricochet.thermodynamics import equilibrium_frames
 
 SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
 
 
 class Samples(NamedTuple):
-    """Of one species after the start: (F, n) squared speeds, their x part, and heights."""
+    """Of one species in F frames: (F, n) squared speeds, their x part, and heights."""
 
     mass: float
     radius: float
@@ -47,19 +40,11 @@ class Samples(NamedTuple):
     height: np.ndarray
 
 
-def samples(run: Run, name: str, after: float) -> Samples:
-    """Squared speeds and heights above the lowest place."""
-    mask = run.of_species(name)
-    late = slice(int(np.searchsorted(run.time, after)), None)
-    squares = run.velocity[late][:, mask] ** 2
-    height = run.position[late][:, mask, 1] - (run.lower[1] + run.radius[mask])
-    return Samples(
-        float(run.mass[mask][0]),
-        float(run.radius[mask][0]),
-        squares.sum(axis=2),
-        squares[..., 0],
-        height,
-    )
+def samples(run: Run, kind: Species, frames: list[int]) -> Samples:
+    """Squared speeds, and heights above the lowest place."""
+    squares = run.velocity[frames][:, kind.disks] ** 2
+    height = run.position[frames][:, kind.disks, 1] - (run.lower[1] + kind.radius)
+    return Samples(kind.mass, kind.radius, squares.sum(axis=2), squares[..., 0], height)
 
 
 def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -> float:
@@ -86,7 +71,7 @@ def sharing(energy: np.ndarray, temperature: float, count: int) -> np.ndarray:
 def crowded_heights(
     height: np.ndarray, species: list[Samples], pull: float, temperature: float, width: float
 ) -> list[np.ndarray]:
-    """Densities of the heights, with the area that disks take from each other.
+    """Densities at the heights (H,), with the area that disks take from each other.
 
     `width` is that of the box for centres.  A disk does not crowd itself.
     """
@@ -121,16 +106,17 @@ def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], c
     return log_slope(np.interp(ranks, integral, x), limits)
 
 
-def height_grid(run: Run, s: Samples) -> np.ndarray:
-    """All heights that a disk can have."""
-    return np.linspace(0, run.edges[1] - 2 * s.radius, 4001)
+def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """All heights that a disk can have, and the densities of `crowded_heights` there."""
+    free = run.edges - 2 * species[0].radius
+    grid = np.linspace(0, free[1], 4001)
+    return grid, crowded_heights(grid, species, abs(run.gravity[1]), kt, free[0])
 
 
-def table(run: Run, species: list[Samples], temperature: float) -> dict[str, list]:
-    """Fitted slopes over those of the exponential laws, and what the dashed laws make of them."""
+def table(run: Run, species: list[Samples], temperature: float) -> list[dict]:
+    """Fitted slopes over those of the exponential laws, and the same for the dashed laws."""
     g = float(np.abs(run.gravity[1]))
-    grid = height_grid(run, species[0])
-    crowded = crowded_heights(grid, species, g, temperature, run.edges[0] - 2 * species[0].radius)
+    grid, crowded = heights(run, species, temperature)
     rows = []
     for name, s, density in zip(run.names, species, crowded, strict=True):
         v_law, h_law = s.mass / (2 * temperature), s.mass * g / temperature
@@ -146,19 +132,17 @@ def table(run: Run, species: list[Samples], temperature: float) -> dict[str, lis
                 "kT": temperature,
                 "K": float(0.5 * s.mass * s.square.mean()),
                 "K_x": float(0.5 * s.mass * s.square_x.mean()),
-                "speed_slope": speed.mean / v_law,
-                "speed_error": float(speed.error) / v_law,
+                **measured("speed_slope", Estimate(speed.mean / v_law, speed.error / v_law)),
                 "speed_shared": law_slope(squares, shared, v_limits, s.square.size) / v_law,
-                "height_slope": height.mean / h_law,
-                "height_error": float(height.error) / h_law,
+                **measured("height_slope", Estimate(height.mean / h_law, height.error / h_law)),
                 "height_crowded": law_slope(grid, density, h_limits, s.height.size) / h_law,
             }
         )
-    return {key: [row[key] for row in rows] for key in rows[0]}
+    return rows
 
 
 def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """The same histogram in a linear and a logarithmic panel; the whole sample is one."""
+    """The same histogram, normalised, in a linear and a logarithmic panel."""
     bins = np.linspace(0, top, 51)
     density = np.histogram(values, bins)[0] / (values.size * np.diff(bins))
     for axes in panels:
@@ -172,22 +156,21 @@ def draw_laws(panels, x: np.ndarray, solid: np.ndarray, dashed: np.ndarray, colo
         axes.plot(x, dashed, color="black", lw=1.0, ls="--")
 
 
-def slopes(run: Run, result: dict[str, list], kind: str, other: str) -> list[str]:
+def slopes(run: Run, result: list[dict], kind: str, other: str) -> list[str]:
     """Labels: fitted over exponential slope."""
     return [
-        f"{species_label(run, name)}: {result[f'{kind}_slope'][k]:.3f}"
-        f" ± {result[f'{kind}_error'][k]:.3f} (dashed: {result[f'{kind}_{other}'][k]:.3f})"
-        for k, name in enumerate(run.names)
+        f"{species.label}: {row[f'{kind}_slope']:.3f} ± {row[f'{kind}_slope_error']:.3f}"
+        f" (dashed: {row[f'{kind}_{other}']:.3f})"
+        for species, row in zip(run.by_species, result, strict=True)
     ]
 
 
-def draw(run: Run, species: list[Samples], result: dict[str, list], after: float) -> plt.Figure:
+def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> plt.Figure:
     """Squared speeds above, heights below; linear left, logarithmic right."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
-    kt, g = result["kT"][0], float(np.abs(run.gravity[1]))
-    light = min(s.mass for s in species)
-    squares, grid = np.linspace(0, 18 * kt / light, 1000), height_grid(run, species[0])
-    crowded = crowded_heights(grid, species, g, kt, run.edges[0] - 2 * species[0].radius)
+    kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
+    squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
+    grid, crowded = heights(run, species, kt)
     v_labels = slopes(run, result, "speed", "shared")
     h_labels = slopes(run, result, "height", "crowded")
     for k, s in enumerate(species):
@@ -201,11 +184,11 @@ def draw(run: Run, species: list[Samples], result: dict[str, list], after: float
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
         "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
     )
-    for row, title, lowest in zip(panels, titles, (1e-4, 1e-4), strict=True):
+    for row, title in zip(panels, titles, strict=True):
         row[0].set(ylabel="probability density", xlim=(0, None))
         row[0].legend(loc="upper right", title=title)
         top = row[0].get_ylim()[1]
-        row[1].set(yscale="log", ylim=(lowest * top, 1.5 * top))
+        row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
         row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
         row[1].plot([], [], color="black", lw=1, ls="--", label="finite number and size of disks")
         row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
@@ -214,26 +197,25 @@ def draw(run: Run, species: list[Samples], result: dict[str, list], after: float
     for axes in panels[1]:
         axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
     figure.suptitle(
-        f"{caption([run])},  t = {after:g} to {run.time[-1]:g},  kT = ⟨K⟩ = {kt:.4f}", fontsize=10
+        f"{caption([run])},  t = {start:.4g} to {run.time[-1]:g},  kT = ⟨K⟩ = {kt:.4f}", fontsize=10
     )
     return figure
 
 
 def main() -> None:
-    parser = command_line(__doc__, "gravity.png", one=True, table=True)
-    parser.add_argument("--after", type=float, default=20, help="time of equilibrium [20]")
-    args = parser.parse_args()
+    args = command_line(__doc__, "gravity.png", one=True, skip=40.0).parse_args()
     run = read_run(args.run)
-    if not run.gravity[1] or run.time[-1] <= args.after:
-        raise RunError(f"{run.path}: needs gravity along y and frames after t = {args.after:g}")
-    species = [samples(run, name, args.after) for name in run.names]
+    frames = equilibrium_frames(run, args.skip)
+    if not run.gravity[1] or not frames:
+        raise RunError(
+            f"{run.path}: needs gravity along y and frames after {args.skip:g} collisions per disk"
+        )
+    species = [samples(run, kind, frames) for kind in run.by_species]
     energy = [0.5 * s.mass * s.square for s in species]
     temperature = float(np.sum([e.sum() for e in energy]) / np.sum([e.size for e in energy]))
     result = table(run, species, temperature)
-    print_table(result)
-    save(draw(run, species, result, args.after), args.output, [run], "Gas under gravity")
-    if args.csv:
-        write_csv(args.csv, result)
+    figure = draw(run, species, result, run.time[frames[0]])
+    report(args, [run], "Gas under gravity", figure, result)
 
 
 if __name__ == "__main__":

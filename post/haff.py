@@ -2,7 +2,7 @@
 
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
-Runs are put together by restitution xi.  Left: K against time in units of the first mean free time,
+Runs are combined by restitution xi.  Left: K against time in units of the first mean free time,
 K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  Right: K against collisions per disk, an exponential
 (van Noije and Ernst 1998).  Both hold while the gas stays homogeneous; later, streams carry the
 energy and it falls more slowly.  Periodic boxes at rest as a whole.
@@ -10,22 +10,11 @@ energy and it falls more slowly.  Periodic boxes at rest as a whole.
 
 import numpy as np
 
-import hard_disks
-from drawing import (
-    COLOURS,
-    band,
-    caption,
-    command_line,
-    grouped,
-    launch,
-    plt,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-from theory import Estimate, estimate
-from thermodynamics import packing
+from ricochet import Run, RunError, hard_disks
+from ricochet.drawing import COLOURS, band, caption, plt
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate
+from ricochet.thermodynamics import free_disks, packing, temperature
 
 POINTS = 200
 
@@ -34,10 +23,9 @@ def first_rate(run: Run) -> float:
     """w0: collisions per disk and time at the start, by the equation of state."""
     if not run.periodic.all() or np.ptp(run.radius) > 0 or np.ptp(run.mass) > 0:
         raise RunError(f"{run.path}: Haff's law is for equal disks in a periodic box")
-    free = run.count - 1
-    kt = float(np.sum(run.kinetic_energy(0))) / free
     z = float(hard_disks.simulated(packing(run)))
-    return hard_disks.collision_rate(z, 2 * run.radius[0], free, kt, run.mass[0])
+    kt = temperature(run)
+    return hard_disks.collision_rate(z, 2 * run.radius[0], free_disks(run), kt, run.mass[0])
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -46,7 +34,7 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time * first_rate(run), run.collisions_per_disk.value, energy / energy[0]
 
 
-def curves(runs: list[Run]) -> dict[str, np.ndarray | Estimate]:
+def means(runs: list[Run]) -> dict[str, np.ndarray | Estimate]:
     """Means over runs on common grids; time in logarithmic steps."""
     tracks = [energy_left(run) for run in runs]
     late = min(t[-1] for t, _, _ in tracks)
@@ -86,39 +74,48 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figu
     return figure
 
 
-def columns(groups: list[tuple[float, list[Run]]], results: list[dict]) -> dict[str, np.ndarray]:
-    """All curves and laws."""
-    table = {}
-    for (xi, _), found in zip(groups, results, strict=True):
-        time, tau = found["time"], found["tau"]
-        table[f"w0_t_xi{xi:g}"] = time
-        table[f"K_by_time_xi{xi:g}"], table[f"K_by_time_error_xi{xi:g}"] = found["by_time"]
-        table[f"haff_xi{xi:g}"] = hard_disks.haff_by_time(time, xi)
-        table[f"collisions_per_disk_xi{xi:g}"] = tau
-        table[f"K_xi{xi:g}"], table[f"K_error_xi{xi:g}"] = found["by_collisions"]
-        table[f"law_xi{xi:g}"] = hard_disks.haff_by_collisions(tau, xi)
-    return table
-
-
-def main() -> None:
-    args = command_line(__doc__, "haff.png", table=True).parse_args()
-    runs = read_all(args.runs)
-    groups = grouped(runs, lambda run: run.restitution)
-    results = [curves(members) for _, members in groups]
+def table(groups: list[tuple[float, list[Run]]], results: list[dict]) -> list[dict]:
+    """Energies after 5, 10 and 20 collisions per disk, as far as the runs go."""
+    rows = []
     for (xi, members), found in zip(groups, results, strict=True):
         for tau in (5, 10, 20):
             if tau > found["tau"][-1]:
                 break
-            left = Estimate(
-                *(float(np.interp(tau, found["tau"], y)) for y in found["by_collisions"])
+            left = Estimate(*(np.interp(tau, found["tau"], y) for y in found["by_collisions"]))
+            rows.append(
+                {
+                    "restitution": xi,
+                    "runs": len(members),
+                    "collisions_per_disk": tau,
+                    **measured("energy_left", left),
+                    "expected": float(hard_disks.haff_by_collisions(tau, xi)),
+                }
             )
-            print(
-                f"restitution = {xi:g}  runs = {len(members)}  collisions_per_disk = {tau}  "
-                f"energy_left = {left}  expected = {hard_disks.haff_by_collisions(tau, xi):.5g}"
-            )
-    save(draw(groups, results), args.output, runs, "Cooling of a gas of inelastic disks")
-    if args.csv:
-        write_csv(args.csv, columns(groups, results))
+    return rows
+
+
+def curves(groups: list[tuple[float, list[Run]]], results: list[dict]) -> dict[str, np.ndarray]:
+    """All curves and laws."""
+    columns = {}
+    for (xi, _), found in zip(groups, results, strict=True):
+        time, tau = found["time"], found["tau"]
+        columns[f"w0_t_xi{xi:g}"] = time
+        columns[f"K_by_time_xi{xi:g}"], columns[f"K_by_time_error_xi{xi:g}"] = found["by_time"]
+        columns[f"haff_xi{xi:g}"] = hard_disks.haff_by_time(time, xi)
+        columns[f"collisions_per_disk_xi{xi:g}"] = tau
+        columns[f"K_xi{xi:g}"], columns[f"K_error_xi{xi:g}"] = found["by_collisions"]
+        columns[f"law_xi{xi:g}"] = hard_disks.haff_by_collisions(tau, xi)
+    return columns
+
+
+def main() -> None:
+    args = command_line(__doc__, "haff.png").parse_args()
+    runs = read_all(args.runs)
+    groups = grouped(runs, lambda run: run.restitution)
+    results = [means(members) for _, members in groups]
+    figure, rows = draw(groups, results), table(groups, results)
+    title = "Cooling of a gas of inelastic disks"
+    report(args, runs, title, figure, rows, data=curves(groups, results))
 
 
 if __name__ == "__main__":

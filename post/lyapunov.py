@@ -2,21 +2,23 @@
 
     python post/lyapunov.py runs/pairs/*.h5 -o lyapunov.png --csv lyapunov.csv
 
-Takes the runs two by two in the order given: the same experiment started twice, a hair's breadth
-apart, with frames at the same times.  The distance of a pair is that of all positions, through
+Takes the runs two by two in the order given: the same experiment started twice, almost at the same
+point, with frames at the same times.  The distance of a pair is that of all positions, through
 periodic sides too.  It grows as exp(lambda t) until it is as large as the billiard; a straight line
-is fitted to its logarithm for each pair, over a time that is the same for all: from --skip of it
-on (the separation has to turn into the direction that grows) until the first pair is --largest
-apart.  lambda is the mean of the slopes, its error their standard error.
+is fitted to its logarithm for each pair, over a time that is the same for all: it ends when the
+first pair is --largest apart, and begins at the share --fit-from of that time (before, the
+separation turns into the direction that grows).  lambda is the mean of the slopes, its error their
+standard error.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from drawing import COLOURS, command_line, launch, plt, print_table, read_all, save, write_csv
-from read_run import Run, RunError
-from theory import Estimate, estimate
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, plt
+from ricochet.script import command_line, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate
 
 
 class Divergence(NamedTuple):
@@ -43,15 +45,15 @@ def distance(one: Run, other: Run) -> np.ndarray:
     return np.sqrt(np.sum(apart**2, axis=(1, 2)))
 
 
-def divergence(time: np.ndarray, apart: np.ndarray, largest: float, skip: float) -> Divergence:
-    """Fit the distances (P, T) of P pairs."""
+def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float) -> Divergence:
+    """Fit the distances (P, T) of P pairs; `begin` is a share of the time up to `largest`."""
     with np.errstate(divide="ignore"):
         logarithm = np.log(apart)
     far = np.any(apart > largest, axis=0)
     last = int(np.argmax(far)) if far.any() else len(time)
-    first = int(np.ceil(skip * last))
+    first = int(np.ceil(begin * last))
     if last - first < 3 or not np.all(np.isfinite(logarithm[:, first:last])):
-        raise RunError("nothing to fit: starts are equal or too far apart, or frames too rare")
+        raise RunError("nothing to fit: starts equal or too far apart, or too few frames")
     fitted = time[first:last]
     slope = np.polyfit(fitted, logarithm[:, first:last].T, 1)[0]
     return Divergence(time, logarithm, slope, float(fitted[0]), float(fitted[-1]))
@@ -76,9 +78,11 @@ def draw(found: Divergence) -> plt.Figure:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "lyapunov.png", table=True)
+    parser = command_line(__doc__, "lyapunov.png")
     parser.add_argument("--largest", type=float, default=0.01, help="distance at the end [0.01]")
-    parser.add_argument("--skip", type=float, default=0.2, help="share of the time left out [0.2]")
+    parser.add_argument(
+        "--fit-from", type=float, default=0.2, metavar="SHARE", help="of the time [0.2]"
+    )
     args = parser.parse_args()
     runs = read_all(args.runs)
     if len(runs) % 2:
@@ -86,19 +90,12 @@ def main() -> None:
     apart = [distance(*pair) for pair in zip(runs[::2], runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])
-    found = divergence(runs[0].time[:frames], apart, args.largest, args.skip)
-    figures = {
-        "pairs": [len(found.slope)],
-        "from": [found.begin],
-        "to": [found.end],
-        "lyapunov_exponent": [float(found.exponent.mean)],
-        "error": [float(found.exponent.error)],
-    }
-    print_table(figures)
-    save(draw(found), args.output, runs, "Divergence of neighbouring trajectories")
-    if args.csv:
-        columns = {f"pair_{k + 1}": track for k, track in enumerate(apart)}
-        write_csv(args.csv, {"time": found.time, **columns})
+    found = divergence(runs[0].time[:frames], apart, args.largest, args.fit_from)
+    row = {"pairs": len(found.slope), "from": found.begin, "to": found.end}
+    row |= measured("lyapunov_exponent", found.exponent)
+    tracks = {f"pair_{k + 1}": track for k, track in enumerate(apart)}
+    title = "Divergence of neighbouring trajectories"
+    report(args, runs, title, draw(found), [row], data={"time": found.time, **tracks})
 
 
 if __name__ == "__main__":

@@ -2,15 +2,15 @@
 
     python post/missed.py runs/gravity/rates/*.h5 -o missed.png --csv missed.csv
 
-Give event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
-pair collisions that is missing against the event-driven run of the same seed, after the time
---after, averaged over the seeds; beside it what the rule of the steps makes one expect.
+Needs event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
+pair collisions that is missing against the event-driven run of the same seed, after the first
+--skip collisions per disk, averaged over the seeds; and the share expected from the rule.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
 l = sqrt(s^2 - b^2), s their diameter.  They approach on its first half only, for the time l / g:
-noticed later they recede already, and fly on.  Steps come at any phase, so a collision is missed
-with the probability 1 - l / (g dt) if that is positive.  With b uniform in -s..s and q = g dt / s
-the mean is
+noticed later they recede already and do not collide.  Steps come at any phase, so a collision is
+missed with the probability 1 - l / (g dt) if that is positive.  With b uniform in -s..s and
+q = g dt / s the mean is
 
     P(q) = 1 - sqrt(1 - q^2) - (asin q - q sqrt(1 - q^2)) / (2 q)    for q < 1,
     P(q) = 1 - pi / (4 q)                                            beyond; q^2 / 6 for small q.
@@ -20,24 +20,16 @@ pairs of species i and j collide at a rate ~ N_i N_j / (h_i + h_j) / sqrt(mu), w
 are their scale heights.
 """
 
+from itertools import combinations_with_replacement
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
 
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    grouped,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-from theory import Estimate, estimate
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate
 
 SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 
@@ -71,71 +63,61 @@ def missed_by_pair(step: float, temperature: float, reduced: float, diameter: fl
     return float(np.average(missed_share(q), weights=weight))
 
 
-def pair_weights(run: Run, temperature: float) -> np.ndarray:
-    """(S, S) collision rates of pairs of species, i <= j, up to a factor."""
-    masks = [run.of_species(name) for name in run.names]
-    count = np.array([mask.sum() for mask in masks], dtype=float)
-    mass, radius = (np.array([a[mask][0] for mask in masks]) for a in (run.mass, run.radius))
-    reduced = mass[:, None] * mass / (mass[:, None] + mass)
-    pairs = np.triu(np.outer(count, count), 1) + np.diag(count * (count - 1) / 2)
-    weight = pairs * (radius[:, None] + radius) / np.sqrt(reduced)
-    pull = float(np.linalg.norm(run.gravity))
-    if pull > 0:
-        height = temperature / (mass * pull)
-        weight /= height[:, None] + height
-    return weight
-
-
 def expected_share(run: Run, step: float, temperature: float) -> float:
-    """P averaged over all kinds of pairs of a dilute gas in equilibrium."""
-    first = [np.flatnonzero(run.of_species(name))[0] for name in run.names]
-    weight = pair_weights(run, temperature)
-    share = np.zeros_like(weight)
-    for i, j in zip(*np.nonzero(weight), strict=True):
-        a, b = first[i], first[j]
-        reduced = run.mass[a] * run.mass[b] / (run.mass[a] + run.mass[b])
-        share[i, j] = missed_by_pair(step, temperature, reduced, run.radius[a] + run.radius[b])
-    return float(np.sum(weight * share) / np.sum(weight))
+    """P averaged over all kinds of pairs of a dilute gas in equilibrium, by their rates."""
+    shares, rates = [], []
+    pull = float(np.linalg.norm(run.gravity))
+    for a, b in combinations_with_replacement(run.by_species, 2):
+        reduced, diameter = a.mass * b.mass / (a.mass + b.mass), a.radius + b.radius
+        pairs = comb(a.disks.sum(), 2) if a is b else a.disks.sum() * b.disks.sum()
+        height = temperature / pull * (1 / a.mass + 1 / b.mass) if pull else 1.0
+        rates.append(pairs * diameter / np.sqrt(reduced) / height)
+        shares.append(missed_by_pair(step, temperature, reduced, diameter))
+    return float(np.average(shares, weights=rates))
 
 
-def step_of(run: Run) -> float:
-    """dt; zero for an event-driven run."""
-    steps = run.parameter("run", "dynamics", "events") == "steps"
-    return float(run.parameter("run", "dt")) if steps else 0.0
-
-
-def rate_after(run: Run, after: float) -> float:
-    """Pair collisions per disk and time, both disks counted, from `after` to the end."""
-    time, collisions = run.collisions_per_disk
-    first = int(np.searchsorted(time, after))
+def rate_and_temperature(run: Run, skip: float) -> tuple[float, float]:
+    """Pair collisions per disk and time, both disks counted, and kT; after `skip`."""
+    time, tau = run.collisions_per_disk
+    first = int(np.searchsorted(tau, skip))
     if first >= len(time) - 1:
-        raise RunError(f"{run.path}: ends before two samples after t = {after:g}")
-    return float((collisions[-1] - collisions[first]) / (time[-1] - time[first]))
+        raise RunError(f"{run.path}: ends before two samples after {skip:g} collisions per disk")
+    energy = run.observable("all/kinetic_energy").value[first:]
+    return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(energy.mean())
 
 
-def temperature_after(run: Run, after: float) -> float:
-    """kT, the mean kinetic energy per disk."""
-    time, energy = run.observable("all/kinetic_energy")
-    return float(energy[time >= after].mean())
-
-
-def compare(runs: list[Run], after: float) -> list[Missed]:
+def compare(runs: list[Run], skip: float) -> list[Missed]:
     """A row per step; the event-driven runs come first, with dt = 0."""
-    groups = grouped(runs, step_of)
+    groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
         raise RunError("event-driven runs and runs by time steps are needed")
-    exact = {run.seed: rate_after(run, after) for run in groups[0][1]}
+    exact = {run.seed: rate_and_temperature(run, skip)[0] for run in groups[0][1]}
     rows = []
     for step, members in groups:
         pairs = [run for run in members if run.seed in exact]
         if not pairs:
             raise RunError(f"no seed of dt = {step:g} has an event-driven run")
-        rates = np.array([rate_after(run, after) for run in pairs])
+        rates, temperatures = np.array([rate_and_temperature(run, skip) for run in pairs]).T
         share = 1 - rates / [exact[run.seed] for run in pairs]
-        kt = float(np.mean([temperature_after(run, after) for run in pairs]))
+        kt = float(np.mean(temperatures))
         expected = expected_share(pairs[0], step, kt)
         rows.append(Missed(step, len(pairs), kt, estimate(rates), estimate(share), expected))
     return rows
+
+
+def table(rows: list[Missed]) -> list[dict]:
+    """A row per step, shares in percent."""
+    return [
+        {
+            "dt": row.dt,
+            "runs": row.runs,
+            "kT": row.temperature,
+            "rate": float(row.rate.mean),
+            **measured("missed_percent", Estimate(100 * row.share.mean, 100 * row.share.error)),
+            "expected_percent": 100 * row.expected,
+        }
+        for row in rows
+    ]
 
 
 def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
@@ -176,24 +158,10 @@ def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "missed.png", table=True)
-    parser.add_argument("--after", type=float, default=20, help="time of equilibrium [20]")
-    args = parser.parse_args()
+    args = command_line(__doc__, "missed.png", skip=40.0).parse_args()
     runs = read_all(args.runs)
-    rows = compare(runs, args.after)
-    table = {
-        "dt": [row.dt for row in rows],
-        "runs": [row.runs for row in rows],
-        "kT": [row.temperature for row in rows],
-        "rate": [float(row.rate.mean) for row in rows],
-        "missed_percent": [100 * float(row.share.mean) for row in rows],
-        "missed_error": [100 * float(row.share.error) for row in rows],
-        "expected_percent": [100 * row.expected for row in rows],
-    }
-    print_table(table)
-    save(draw(runs, rows), args.output, runs, "Missed collisions")
-    if args.csv:
-        write_csv(args.csv, table)
+    rows = compare(runs, args.skip)
+    report(args, runs, "Missed collisions", draw(runs, rows), table(rows))
 
 
 if __name__ == "__main__":

@@ -2,28 +2,19 @@
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-Equilibrium takes the frames after --skip collisions per disk, --apart collisions per disk from
-each other.  Errors are standard errors over the runs (over the frames if there is one run).
+Equilibrium takes the frames after --skip collisions per disk that are at least --apart collisions
+per disk from each other, of --frames.  Errors are standard errors over the runs (over the frames if
+there is one run).
 Theory: each species has <K> = kT = E / N and <v> = sqrt(pi kT / 2 m).
 """
 
 import numpy as np
 
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    species_label,
-    write_csv,
-)
-from read_run import Run
-from speeds import equilibrium_frames
-from theory import Estimate, estimate, hold_against, maxwell_cdf, maxwell_pdf
+from ricochet import Run
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import command_line, late_frames, launch, measured, read_all, report
+from ricochet.statistics import Estimate, estimate, hold_against
+from ricochet.theory import maxwell_cdf, maxwell_pdf
 
 
 def means(run: Run, frames: list[int], name: str) -> np.ndarray:
@@ -39,12 +30,11 @@ def over_members(members: list[np.ndarray]) -> Estimate:
     return estimate(members[0]) if len(members) == 1 else estimate([m.mean(0) for m in members])
 
 
-def table(runs: list[Run], frames: list[list[int]]) -> dict[str, list]:
+def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
     """Per species: mean speed and energy at the start and in equilibrium, and the theory."""
     temperature = float(np.mean([run.kinetic_energy(0).mean() for run in runs]))
     rows = []
-    for name in runs[0].names:
-        mass = float(runs[0].mass[runs[0].of_species(name)][0])
+    for name, mass, *_ in runs[0].by_species:
         start = np.mean([means(run, [0], name)[0] for run in runs], axis=0)
         late = over_members([means(r, f, name) for r, f in zip(runs, frames, strict=True)])
         u = pooled_speeds(runs, frames, name) * np.sqrt(mass / (2 * temperature))
@@ -55,18 +45,16 @@ def table(runs: list[Run], frames: list[list[int]]) -> dict[str, list]:
                 "mass": mass,
                 "v_start": float(start[0]),
                 "K_start": float(start[1]),
-                "v": float(late.mean[0]),
-                "v_error": float(late.error[0]),
+                **measured("v", Estimate(late.mean[0], late.error[0])),
                 "v_theory": float(np.sqrt(np.pi * temperature / (2 * mass))),
-                "K": float(late.mean[1]),
-                "K_error": float(late.error[1]),
+                **measured("K", Estimate(late.mean[1], late.error[1])),
                 "K_theory": temperature,
                 "speeds": test.n,
                 "KS_D": test.ks,
                 "KS_p": test.ks_p,
             }
         )
-    return {key: [row[key] for row in rows] for key in rows[0]}
+    return rows
 
 
 def pooled_speeds(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
@@ -80,7 +68,7 @@ def pooled_speeds(runs: list[Run], frames: list[list[int]], name: str) -> np.nda
     )
 
 
-def draw(runs: list[Run], frames: list[list[int]], result: dict[str, list]) -> plt.Figure:
+def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
     """One row per species: start and equilibrium."""
     names = runs[0].names
     figure, panels = plt.subplots(
@@ -89,10 +77,10 @@ def draw(runs: list[Run], frames: list[list[int]], result: dict[str, list]) -> p
     start = [[0]] * len(runs)
     top = max(np.quantile(pooled_speeds(runs, frames, name), 0.9995) for name in names)
     bins = (np.arange(61) - 0.5) * top / 60
-    for k, (name, row) in enumerate(zip(names, panels, strict=True)):
-        colour, label = COLOURS[k % len(COLOURS)], species_label(runs[0], name)
+    for k, (kind, found, row) in enumerate(zip(runs[0].by_species, result, panels, strict=True)):
+        colour = COLOURS[k % len(COLOURS)]
         for axes, chosen in zip(row, (start, frames), strict=True):
-            v = pooled_speeds(runs, chosen, name)
+            v = pooled_speeds(runs, chosen, kind.name)
             density = np.histogram(v, bins)[0] / (len(v) * np.diff(bins))
             axes.stairs(
                 density,
@@ -100,21 +88,20 @@ def draw(runs: list[Run], frames: list[list[int]], result: dict[str, list]) -> p
                 fill=True,
                 alpha=0.45,
                 color=colour,
-                label=f"{label}: {len(v)} speeds",
+                label=f"{kind.label}: {len(v)} speeds",
             )
             axes.set_ylabel("probability density $P(v)$")
-        thermal = np.sqrt(2 * result["K_theory"][k] / result["mass"][k])
+        thermal = np.sqrt(2 * found["K_theory"] / kind.mass)
         v = np.linspace(0, top, 301)
         row[1].plot(
             v,
             maxwell_pdf(v / thermal) / thermal,
             color="black",
             lw=1.2,
-            label=f"Maxwell at $kT = E/N$: KS D = {result['KS_D'][k]:.4f}, "
-            f"p = {result['KS_p'][k]:.2g}",
+            label=f"Maxwell at $kT = E/N$: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}",
         )
         for when, axes in zip(("_start", ""), row, strict=True):
-            axes.plot([], [], ls="", label=moments(result, k, when))
+            axes.plot([], [], ls="", label=moments(found, when))
             axes.set_ylim(0, 1.4 * axes.get_ylim()[1])
             axes.legend(loc="upper right")
     panels[0, 0].set_title("Start")
@@ -125,29 +112,23 @@ def draw(runs: list[Run], frames: list[list[int]], result: dict[str, list]) -> p
     return figure
 
 
-def moments(result: dict[str, list], k: int, when: str) -> str:
+def moments(row: dict, when: str) -> str:
     """Mean speed and energy for the legend."""
-    v, energy = result[f"v{when}"][k], result[f"K{when}"][k]
+    v, energy = row[f"v{when}"], row[f"K{when}"]
     if when:
         return f"⟨v⟩ = {v:.4g},  ⟨K⟩ = {energy:.4g}"
     return (
-        f"⟨v⟩ = {v:.4f} ± {result['v_error'][k]:.4f} (theory {result['v_theory'][k]:.4f})\n"
-        f"⟨K⟩ = {energy:.4f} ± {result['K_error'][k]:.4f} (theory {result['K_theory'][k]:.4f})"
+        f"⟨v⟩ = {v:.4f} ± {row['v_error']:.4f} (theory {row['v_theory']:.4f})\n"
+        f"⟨K⟩ = {energy:.4f} ± {row['K_error']:.4f} (theory {row['K_theory']:.4f})"
     )
 
 
 def main() -> None:
-    parser = command_line(__doc__, "mixture.png", table=True)
-    parser.add_argument("--skip", type=float, default=15, help="collisions per disk [15]")
-    parser.add_argument("--apart", type=float, default=5, help="collisions per disk [5]")
-    args = parser.parse_args()
+    args = command_line(__doc__, "mixture.png", frames=None, skip=15.0, apart=5.0).parse_args()
     runs = read_all(args.runs)
-    frames = [equilibrium_frames(r, args.skip, args.apart) or [r.frames - 1] for r in runs]
+    frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames)
-    print_table(result)
-    save(draw(runs, frames, result), args.output, runs, "Speeds of a mixture")
-    if args.csv:
-        write_csv(args.csv, result)
+    report(args, runs, "Speeds of a mixture", draw(runs, frames, result), result)
 
 
 if __name__ == "__main__":

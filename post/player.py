@@ -2,11 +2,12 @@
 
     python post/player.py runs/gas.h5 -o gas.html
     python post/player.py runs/crater.h5 --colour displacement
-    python post/player.py runs/brownian.h5 --disk 2001        with the trace of one disk
+    python post/player.py runs/brownian.h5 --disks 2001       with the trace of a disk
 
 Disks of true size with walls and obstacles; play, step, speed; colour by species, speed,
 displacement or collisions; a click on a disk shows its trace; the speeds of the frame with the
-Maxwell curve of the same energy; energies per species.  A film has all frames that fit into 30 MB.
+Maxwell curve of the same energy; energies per species.  Without --count a film has as many frames,
+evenly spread, as fit into 30 MB.
 """
 
 import base64
@@ -19,14 +20,14 @@ import numpy as np
 from matplotlib.colors import to_hex
 from tqdm import tqdm
 
-from drawing import COLOURS, caption, command_line, launch, plt, positive
-from read_run import Run, RunError, read_run
-from snapshot import LABELS, default_colour, spread_frames, values_of
+from ricochet import Run, RunError, read_run
+from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
+from ricochet.script import chosen_disks, command_line, film_frames, launch, text_of
 
 PAGE = Path(__file__).with_suffix(".html")
 ROOM = 29e6  # bytes of base64 for the disks
 MOST_FRAMES = 20000
-MOST_AT_ONCE = 200000  # disks, of all frames that are worked on together
+MOST_AT_ONCE = 200000  # disks of the frames that are handled together
 FEW_DISKS = 1000  # up to here traces through periodic sides are exact
 BINS = 40  # of the speed histogram
 FEWEST = 10  # disks of a species that has a histogram
@@ -45,7 +46,7 @@ def frames_that_fit(run: Run) -> int:
 
 
 def quantities(run: Run) -> list[str]:
-    """What disks can be coloured by, beside their species."""
+    """What disks can be coloured by, apart from their species."""
     return [name for name in LABELS if name != "collisions" or run.collisions is not None]
 
 
@@ -69,30 +70,25 @@ def coded_shifts(run: Run, frames: list[int], before: int) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: list[int], name: str) -> float:
-    """The upper end of a colour scale, from some frames; a few fast disks do not count."""
+    """The upper end of a colour scale, from some frames, without the few largest values."""
     some = frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), name)
     moved = values[values > 0]
     return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
 
 
-def masks(run: Run) -> list[np.ndarray]:
-    """The disks of each species."""
-    return [run.of_species(name) for name in run.names]
-
-
 def species(run: Run) -> list[dict]:
-    """What is the same for all disks of a species."""
+    """What the disks of each species have in common."""
     colours = [c if c != "#000000" else "#8a8a8a" for c in map(to_hex, COLOURS)]
     return [
         {
-            "name": name,
-            "count": int(own.sum()),
-            "mass": float(run.mass[own][0]),
-            "radius": float(run.radius[own][0]),
+            "name": kind.name,
+            "count": int(kind.disks.sum()),
+            "mass": kind.mass,
+            "radius": kind.radius,
             "colour": colours[k % len(colours)],
         }
-        for k, (name, own) in enumerate(zip(run.names, masks(run), strict=True))
+        for k, kind in enumerate(run.by_species)
     ]
 
 
@@ -100,7 +96,9 @@ def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[
     """Kinetic and potential energy per disk of each species, frame by frame."""
     kinetic = run.kinetic_energy(frames)
     potential = -run.mass * (run.unwrapped(frames) @ run.gravity)
-    means = ([e[:, own].mean(axis=1) for own in masks(run)] for e in (kinetic, potential))
+    means = (
+        [e[:, kind.disks].mean(axis=1) for kind in run.by_species] for e in (kinetic, potential)
+    )
     return tuple([list(map(significant, row)) for row in np.transpose(m)] for m in means)
 
 
@@ -114,7 +112,7 @@ def speed_counts(run: Run, frames: list[int], top: float) -> list[list[list[int]
         np.bincount(bins[:, own].ravel(), minlength=size).reshape(-1, BINS + 1)[:, :BINS].tolist()
         if own.sum() >= FEWEST
         else [[]] * len(frames)
-        for own in masks(run)
+        for own in (kind.disks for kind in run.by_species)
     ]
     return list(map(list, zip(*counts, strict=True)))
 
@@ -124,7 +122,7 @@ def significant(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def film(run: Run, frames: list[int], colour: str, disk: int | None) -> tuple[dict, dict]:
+def film(run: Run, frames: list[int], colour: str, traced: list[int]) -> tuple[dict, dict]:
     """What the page needs to know, and the arrays that move as name -> bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     fastest = 1.3 * tops["speed"]
@@ -157,13 +155,14 @@ def film(run: Run, frames: list[int], colour: str, disk: int | None) -> tuple[di
         "edges": run.edges.tolist(),
         "periodic": run.periodic.tolist(),
         "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
+        "walls": run.walls.tolist(),
         "species": species(run),
         "kinetic": kinetic,
         "potential": potential if run.gravity.any() else None,
         "speeds": {"top": significant(fastest), "bins": BINS, "counts": counts},
         "scales": {name: [LABELS[name], significant(top)] for name, top in tops.items()},
         "colour": colour,
-        "disk": disk - 1 if disk else 0 if run.count == 1 else None,
+        "traced": traced or ([0] if run.count == 1 else []),
     }
     return facts, blocks
 
@@ -188,28 +187,21 @@ def page(run: Run, facts: dict, blocks: dict) -> str:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "RUN.html", one=True)
-    parser.set_defaults(output=None)
-    parser.add_argument("--frames", type=positive, help="so many frames, evenly spread")
-    parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
-    parser.add_argument("--disk", type=int, metavar="ID", help="show the trace of this disk")
+    parser = command_line(
+        __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
+    )
     args = parser.parse_args()
     run = read_run(args.run)
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
         raise RunError(f"{path}: a player ends in .html")
-    if args.disk is not None and not 1 <= args.disk <= run.count:
-        raise RunError(f"{run.path}: no disk {args.disk}, there are {run.count}")
-    colour = args.colour or default_colour(run)
-    if colour == "collisions" and colour not in quantities(run):
-        raise RunError(f"{run.path}: has no collisions per disk")
-    frames = spread_frames(run, max(1, min(run.frames, args.frames or frames_that_fit(run))))
-    text = page(run, *film(run, frames, colour, args.disk))
+    args.count = args.count or frames_that_fit(run)
+    frames, traced = film_frames(run, args), chosen_disks(run, args.disks or [])
+    text = page(run, *film(run, frames, chosen_colour(run, args.colour), traced))
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
-    print(f"player = {path}")
-    print(f"frames = {len(frames)} of {run.frames}")
-    print(f"size = {len(text) / 1e6:.1f} MB")
+    size = len(text) / 1e6
+    print(text_of([{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]))
 
 
 if __name__ == "__main__":

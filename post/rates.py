@@ -2,39 +2,30 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-Runs are put together; all must be of one system, elastic, without gravity.  Means and errors come
-from 20 blocks of each run, after its first 20 collisions per disk.  Pressure: by the virial of the
-pair collisions, and by the impulses on each side (a little larger: centres keep a radius away from
-sides).  With an event log also w_ij, the collisions of a disk of species i with disks of species j
-per time, and the free paths: in a frame each disk is on one, as long as its speed times the time
-between its collisions before and after.  Long paths are met more often in that way; each counts 1
-over its time.  The line is for disks that meet without memory (Boltzmann, Enskog).
+Runs are combined; all must be of one system, elastic, without gravity.  Means and errors come from
+20 blocks of each run, after its first --skip collisions per disk (of the whole run, if it is not
+twice as long).  Pressure: by the virial of the pair collisions, and by the impulses on each side (a
+little larger: centres keep a radius away from sides).  With an event log also w_ij, the collisions
+of a disk of species i with disks of species j per time, and the free paths: in a frame each disk is
+on one, as long as its speed times the time between its collisions before and after.  Frames meet
+long paths more often; therefore each counts 1 over its time.  The line is for disks that meet
+without memory (Boltzmann, Enskog).
 """
 
 import numpy as np
 from scipy.special import ive
 
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    launch,
-    plt,
-    print_table,
-    read_all,
-    save,
-    write_csv,
-)
-from read_run import Run, RunError
-from theory import Estimate
-from thermodynamics import (
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.script import command_line, launch, read_all, report
+from ricochet.statistics import Estimate, combined, ratio
+from ricochet.thermodynamics import (
     BLOCKS,
-    SETTLING,
+    SKIP,
     blocks,
     collision_rate,
-    combined,
     packing,
-    ratio,
+    settled,
     temperature,
     z_virial,
 )
@@ -44,50 +35,50 @@ BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 
 
 def check(runs: list[Run]) -> None:
-    """Refuse what has no equilibrium, or not one."""
+    """Refuse runs without equilibrium, and runs of different systems."""
     first = runs[0]
     for run in runs:
-        if run.restitution != 1 or np.any(run.gravity != 0) or run.obstacles:
-            raise RunError(f"{run.path}: needs an elastic gas without gravity and obstacles")
+        if run.restitution != 1 or run.gravity.any() or run.obstacles or len(run.walls):
+            raise RunError(f"{run.path}: needs an elastic gas without gravity, obstacles, walls")
         if run.names != first.names or run.count != first.count:
             raise RunError(f"{run.path}: not the same system as {first.path}")
 
 
-def pressures(run: Run) -> dict[str, Estimate]:
+def pressures(run: Run, skip: float) -> dict[str, Estimate]:
     """By the virial, and by the sides that are walls; a side feels force per length."""
-    area, z, kt = np.prod(run.edges), z_virial(run), run.count * temperature(run)
+    area, z, kt = np.prod(run.edges), z_virial(run, skip), run.count * temperature(run)
     found = {"pressure_virial": Estimate(z.mean * kt / area, z.error * kt / area)}
-    b = blocks(run)
+    b = blocks(run, skip)
     for k, side in enumerate(SIDES):
         if not run.periodic[k // 2]:
             found[f"pressure_{side}"] = ratio(b.impulse[:, k], b.time, 1 / run.edges[1 - k // 2])
     return found
 
 
-def pair_rates(run: Run) -> dict[str, Estimate]:
+def pair_rates(run: Run, skip: float) -> dict[str, Estimate]:
     """w_ij from the event log."""
     log, species = run.events, run.species - 1
-    start = run.time[-1] * SETTLING / max(run.collisions_per_disk.value[-1], 2 * SETTLING)
-    cuts = np.linspace(start, run.time[-1], BLOCKS + 1)
+    time, tau = run.collisions_per_disk
+    cuts = np.linspace(time[settled(tau, skip)], run.time[-1], BLOCKS + 1)
     pairs = log.j > 0
     one, other = species[log.i[pairs] - 1], species[log.j[pairs] - 1]
     found = {}
-    for a, first in enumerate(run.names):
+    for a, first in enumerate(run.by_species):
         for b, second in enumerate(run.names):
             weight = ((one == a) & (other == b)) * 1.0 + ((one == b) & (other == a))
             counts, _ = np.histogram(log.time[pairs], cuts, weights=weight)
-            each = 1 / np.sum(species == a)
-            found[f"w_{first}_{second}"] = ratio(counts, np.diff(cuts), each)
+            rate = ratio(counts, np.diff(cuts), 1 / first.disks.sum())
+            found[f"w_{first.name}_{second}"] = rate
     return found
 
 
-def quantities(run: Run) -> dict[str, Estimate]:
+def quantities(run: Run, skip: float = SKIP) -> dict[str, Estimate]:
     """Everything that has an error, by name."""
-    found = pressures(run) | {"collisions_per_disk_and_time": collision_rate(run)}
-    b = blocks(run)
+    found = pressures(run, skip) | {"collisions_per_disk_and_time": collision_rate(run, skip)}
     if not run.periodic.all():
+        b = blocks(run, skip)
         found["side_hits_per_time"] = ratio(b.hits, b.time)
-    return found | (pair_rates(run) if has_log(run) else {})
+    return found | (pair_rates(run, skip) if has_log(run) else {})
 
 
 def has_log(run: Run) -> bool:
@@ -97,7 +88,7 @@ def has_log(run: Run) -> bool:
 # --- free paths ---
 
 
-def free_paths(run: Run) -> tuple[np.ndarray, np.ndarray]:
+def free_paths(run: Run, skip: float = SKIP) -> tuple[np.ndarray, np.ndarray]:
     """Lengths of the paths that the disks of all frames are on, and the weight of each."""
     log = run.events
     disk = np.concatenate([log.i, log.j[log.j > 0]])
@@ -110,8 +101,7 @@ def free_paths(run: Run) -> tuple[np.ndarray, np.ndarray]:
         after = np.searchsorted(own, run.time, side="right")
         inside = (after > 0) & (after < len(own))
         duration[inside, k] = own[after[inside]] - own[after[inside] - 1]
-    tau = run.collisions_per_disk_at(run.time)
-    duration[tau < (SETTLING if tau[-1] > 2 * SETTLING else 0)] = np.nan
+    duration[: settled(run.collisions_per_disk_at(run.time), skip)] = np.nan
     known = duration > 0
     return (run.speed(slice(None)) * duration)[known], 1 / duration[known]
 
@@ -130,9 +120,9 @@ def path_density(x: np.ndarray) -> np.ndarray:
     return np.array([np.sum(weight * rate * np.exp(-rate * value)) for value in x])
 
 
-def histogram(runs: list[Run]) -> tuple[float, np.ndarray] | None:
+def histogram(runs: list[Run], skip: float = SKIP) -> tuple[float, np.ndarray] | None:
     """The mean free path, and the density of the paths in units of it."""
-    parts = [free_paths(run) for run in runs if has_log(run)]
+    parts = [free_paths(run, skip) for run in runs if has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
         return None
     path, weight = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -144,10 +134,10 @@ def histogram(runs: list[Run]) -> tuple[float, np.ndarray] | None:
 # --- figure ---
 
 
-def draw_blocks(axes: plt.Axes, runs: list[Run]) -> None:
+def draw_blocks(axes: plt.Axes, runs: list[Run], skip: float) -> None:
     """The pressure block by block."""
     for run, style in zip(runs, ("-", "--", ":", "-."), strict=False):
-        b = blocks(run)
+        b = blocks(run, skip)
         kt, middle = temperature(run), np.cumsum(b.time) - b.time / 2
         virial = (run.count * kt + b.virial / b.time / 2) / np.prod(run.edges)
         axes.plot(middle, virial, color=COLOURS[0], marker=".", ls=style, lw=0.8, label="virial")
@@ -161,10 +151,10 @@ def draw_blocks(axes: plt.Axes, runs: list[Run]) -> None:
     axes.set(xlabel="time t (reduced units)", ylabel="pressure of a block")
 
 
-def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None) -> plt.Figure:
-    """Blocks; beside them the free paths, if there is an event log."""
+def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None, skip: float) -> plt.Figure:
+    """The pressure by blocks; with an event log also the free paths."""
     figure, panels = plt.subplots(1, 2 if paths else 1, figsize=(10 if paths else 6, 4.5))
-    draw_blocks(np.atleast_1d(panels)[0], runs)
+    draw_blocks(np.atleast_1d(panels)[0], runs, skip)
     if paths:
         mean, density = paths
         axes = panels[1]
@@ -179,11 +169,9 @@ def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None) -> plt.Figure:
     return figure
 
 
-def main() -> None:
-    args = command_line(__doc__, "rates.png", table=True).parse_args()
-    runs = read_all(args.runs)
-    check(runs)
-    found = [quantities(run) for run in runs]
+def table(runs: list[Run], skip: float, path: float | None) -> dict[str, list]:
+    """A row per quantity: exact ones first, then those with an error."""
+    found = [quantities(run, skip) for run in runs]
     means = {key: combined([one[key] for one in found]) for key in found[0]}
     momentum = np.mean([run.observable("momentum").value for run in runs], axis=(0, 1))
     exact = {
@@ -192,18 +180,23 @@ def main() -> None:
         "momentum_x": float(momentum[0]),
         "momentum_y": float(momentum[1]),
     }
-    paths = histogram(runs)
-    if paths:
-        exact["mean_free_path"] = paths[0]
-    table = {
+    if path is not None:
+        exact["mean_free_path"] = path
+    return {
         "quantity": [*exact, *means],
         "mean": [*exact.values(), *(float(one.mean) for one in means.values())],
         "error": [*[float("nan")] * len(exact), *(float(one.error) for one in means.values())],
     }
-    print_table(table)
-    save(draw(runs, paths), args.output, runs, "Pressure, rates and free paths of hard disks")
-    if args.csv:
-        write_csv(args.csv, table)
+
+
+def main() -> None:
+    args = command_line(__doc__, "rates.png", skip=SKIP).parse_args()
+    runs = read_all(args.runs)
+    check(runs)
+    paths = histogram(runs, args.skip)
+    rows = table(runs, args.skip, paths[0] if paths else None)
+    title = "Pressure, rates and free paths of hard disks"
+    report(args, runs, title, draw(runs, paths, args.skip), rows)
 
 
 if __name__ == "__main__":

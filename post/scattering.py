@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drawing import COLOURS, command_line, launch, plt, read_all, save, write_csv
-from read_run import Run, RunError
-from theory import scattering_angle
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, plt
+from ricochet.script import command_line, launch, read_all, report
+from ricochet.theory import scattering_angle
 
 
 class Scattering(NamedTuple):
@@ -89,25 +90,18 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "scattering.png", table=True).parse_args()
+    args = command_line(__doc__, "scattering.png").parse_args()
     runs = read_all(args.runs)
     points = sorted(scattering(run) for run in runs)
     restitution = runs[0].restitution
-    exact = [float(scattering_angle(p.impact, p.mass_ratio, restitution)) for p in points]
-    error = np.degrees(np.abs(np.array([p.angle for p in points]) - exact))
-    print(f"runs = {len(runs)}")
-    print(f"largest_error_degrees = {error.max():.3g}")
-    save(draw(points, restitution), args.output, runs, "Scattering angle")
-    if args.csv:
-        write_csv(
-            args.csv,
-            {
-                "b_over_R12": [p.impact for p in points],
-                "angle_degrees": [float(np.degrees(p.angle)) for p in points],
-                "exact_degrees": [float(np.degrees(angle)) for angle in exact],
-                "speed_change": [p.speed_change for p in points],
-            },
-        )
+    table = []
+    for p in points:
+        exact = scattering_angle(p.impact, p.mass_ratio, restitution)
+        row = {"b_over_R12": p.impact, "angle_degrees": float(np.degrees(p.angle))}
+        row |= {"exact_degrees": float(np.degrees(exact))}
+        row |= {"error_degrees": float(np.degrees(abs(p.angle - exact)))}
+        table.append(row | {"speed_change": p.speed_change})
+    report(args, runs, "Scattering angle", draw(points, restitution), table)
 
 
 if __name__ == "__main__":

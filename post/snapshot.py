@@ -10,50 +10,20 @@ Colour: species, speed, displacement from the first frame, or collisions so far.
 import numpy as np
 from matplotlib.colors import to_rgba_array
 
-from drawing import (
+from ricochet import Run, read_run
+from ricochet.drawing import (
+    LABELS,
     caption,
-    command_line,
+    chosen_colour,
     disk_collection,
     draw_box,
-    launch,
+    panel_grid,
     plt,
-    positive,
-    save,
     species_colours,
     species_legend,
-    whole_numbers,
+    values_of,
 )
-from read_run import Run, read_run
-
-LABELS = {
-    "speed": "speed (reduced units)",
-    "displacement": "displacement (reduced units)",
-    "collisions": "collisions so far",
-}
-
-
-def spread_frames(run: Run, count: int) -> list[int]:
-    """Numbers of `count` frames, evenly spread."""
-    return np.unique(np.linspace(0, run.frames - 1, count).round().astype(int)).tolist()
-
-
-def values_of(run: Run, frame: int, colour: str) -> np.ndarray:
-    """(N,) the number that colours each disk."""
-    if colour == "collisions" and run.collisions is not None:
-        return run.collisions[frame].astype(float)
-    return run.displacement(frame) if colour == "displacement" else run.speed(frame)
-
-
-def default_colour(run: Run) -> str:
-    """Species tell more than speeds where there are several."""
-    return "species" if len(run.names) > 1 else "speed"
-
-
-def panel_grid(count: int, aspect: float) -> tuple[int, int]:
-    """Rows and columns for `count` panels of this height over width, wider than high."""
-    columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
-    rows = int(np.ceil(count / columns))
-    return rows, int(np.ceil(count / rows))
+from ricochet.script import chosen_frames, command_line, frame_list, launch, report
 
 
 def darker(colours: list[str]) -> np.ndarray:
@@ -104,22 +74,28 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
     return figure
 
 
+def table(run: Run, frames: list[int]) -> list[dict]:
+    """A row per frame: when it is, and how fast the disks are."""
+    return [
+        {
+            "frame": frame,
+            "time": float(run.time[frame]),
+            "mean_speed": float(run.speed(frame).mean()),
+            "kinetic_energy": float(run.kinetic_energy(frame).mean()),
+        }
+        for frame in frames
+    ]
+
+
 def main() -> None:
-    parser = command_line(__doc__, "snapshot.png", one=True)
-    parser.add_argument(
-        "--frames",
-        type=whole_numbers,
-        default=[-1],
-        help="frame numbers, e.g. 0,10,-1 (negative: from the end) [-1]",
-    )
-    parser.add_argument("--count", type=positive, help="this many frames, evenly spread")
-    parser.add_argument("--colour", choices=["species", *LABELS], help="[species, or speed]")
+    parser = command_line(__doc__, "snapshot.png", one=True, frames=None, count=None, colour=None)
     parser.add_argument("--quiver", action="store_true", help="velocities as arrows")
     args = parser.parse_args()
     run = read_run(args.run)
-    frames = spread_frames(run, args.count) if args.count else args.frames
-    figure = draw(run, frames, args.colour or default_colour(run), args.quiver)
-    save(figure, args.output, [run], f"Frames of {run.path.name}")
+    which = args.frames or (None if args.count else frame_list("-1"))
+    frames = chosen_frames(run, which, args.count)
+    figure = draw(run, frames, chosen_colour(run, args.colour), args.quiver)
+    report(args, [run], f"Frames of {run.path.name}", figure, table(run, frames))
 
 
 if __name__ == "__main__":

@@ -1,41 +1,30 @@
 """Draw the paths of disks through the frames of a run.
 
-    python post/trajectory.py runs/sinai.h5 -o sinai.png                 all disks (at most 12)
-    python post/trajectory.py runs/sinai.h5 --disks 1,5 --first 200      two of them, first frames
+    python post/trajectory.py runs/sinai.h5 -o sinai.png               all disks (at most 12)
+    python post/trajectory.py runs/sinai.h5 --disks 1,5 --frames :200  two of them, 200 frames
 
 With a frame at every event (output.frames_every_events = 1) the straight lines between frames
 are the exact path of flight without gravity.  Several runs are drawn side by side.
 """
 
 import numpy as np
-
-from drawing import (
-    COLOURS,
-    caption,
-    command_line,
-    disk_collection,
-    draw_box,
-    launch,
-    plt,
-    positive,
-    read_all,
-    save,
-    whole_numbers,
-)
 from matplotlib.patches import Circle
-from read_run import Run, RunError
+
+from ricochet import Run
+from ricochet.drawing import COLOURS, caption, disk_collection, draw_box, plt
+from ricochet.script import chosen_disks, chosen_frames, command_line, launch, read_all, report
 
 
-def paths_of(run: Run, disks: list[int], count: int | None = None) -> list[np.ndarray]:
-    """(T', 2) positions of each disk in the first `count` frames.
+def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
+    """(T', 2) positions of each disk in these frames.
 
     A path that crosses periodic sides goes on beyond them, and comes in from beyond: a row of NaN
     breaks the line between the two pieces.
     """
-    paths = list(np.moveaxis(run.position[:count][:, disks], 1, 0))
+    paths = list(np.moveaxis(run.position[frames][:, disks], 1, 0))
     if run.image is None:
         return paths
-    images = np.moveaxis(run.image[:count][:, disks], 1, 0)
+    images = np.moveaxis(run.image[frames][:, disks], 1, 0)
     return [wrapped(*track, run.edges) for track in zip(paths, images, strict=True)]
 
 
@@ -52,21 +41,13 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
     return np.concatenate(rows)
 
 
-def chosen_disks(run: Run, numbers: list[int] | None) -> list[int]:
-    """Indices from numbers that count from 1; the first twelve without a choice."""
-    for number in numbers or []:
-        if not 1 <= number <= run.count:
-            raise RunError(f"{run.path}: no disk {number}, there are {run.count}")
-    return [number - 1 for number in numbers] if numbers else list(range(min(12, run.count)))
-
-
-def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
+def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
     """Paths, with the disk where it is at the end; the others grey."""
     draw_box(axes, run)
     others = np.full(run.count, "0.85")
     others[disks] = "none"
-    disk_collection(axes, run, run.position[count - 1], facecolors=others, zorder=0.8)
-    for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, count), strict=True)):
+    disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)
+    for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, frames), strict=True)):
         colour = COLOURS[order % len(COLOURS)]
         alpha = float(np.clip(60 / len(path), 0.25, 1)) ** 0.5
         axes.plot(*path.T, color=colour, lw=0.8, alpha=alpha, zorder=1)
@@ -74,21 +55,33 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], count: int) -> None:
         axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=0.9))
     axes.set_title(
         f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])},  "
-        f"t = {run.time[0]:.4g} (crosses) to {run.time[count - 1]:.4g} (disks)"
+        f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
     )
 
 
+def table(run: Run, disks: list[int], frames: list[int]) -> list[dict]:
+    """A row per path: its disk, its ends, through periodic sides too."""
+    (x0, y0), (x1, y1) = (run.unwrapped(frames[end])[disks].T.tolist() for end in (0, -1))
+    return [
+        {
+            "run": run.path.name, "disk": disk + 1, "frames": len(frames),
+            "x_first": x0[k], "y_first": y0[k], "x_last": x1[k], "y_last": y1[k],
+        }
+        for k, disk in enumerate(disks)
+    ]  # fmt: skip
+
+
 def main() -> None:
-    parser = command_line(__doc__, "trajectory.png")
-    parser.add_argument("--disks", type=whole_numbers, help="their numbers from 1, e.g. 1,5,9")
-    parser.add_argument("--first", type=positive, metavar="K", help="only the first K frames")
+    parser = command_line(__doc__, "trajectory.png", frames=None, count=None, disks=None)
     args = parser.parse_args()
-    runs = read_all(args.runs)
+    runs, rows = read_all(args.runs), []
     figure, panels = plt.subplots(1, len(runs), squeeze=False, figsize=(5.2 * len(runs), 5.7))
     for axes, run in zip(panels.flat, runs, strict=True):
-        count = min(run.frames, args.first or run.frames)
-        draw_paths(axes, run, chosen_disks(run, args.disks), count)
-    save(figure, args.output, runs, "Paths of disks")
+        frames = chosen_frames(run, args.frames, args.count)
+        disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.count))))
+        draw_paths(axes, run, disks, frames)
+        rows += table(run, disks, frames)
+    report(args, runs, "Paths of disks", figure, rows)
 
 
 if __name__ == "__main__":

@@ -205,7 +205,7 @@ conditions() {
   flags=$(dirname "$program")/flags
   echo "machine   $(nproc) x $(awk -F ': ' '/model name/ { print $2; exit }' /proc/cpuinfo)"
   echo "load      $(cut -d ' ' -f 1-3 /proc/loadavg) at $(date -u +%FT%RZ)"
-  echo "program   $("$program" --version), commit $(git describe --always --dirty 2>/dev/null || echo unknown)"
+  echo "program   $("$program" --version | sed 1q), commit $(git describe --always --dirty 2>/dev/null || echo unknown)"
   [ ! -e "$flags" ] || echo "built by  $(cat "$flags")"
   awk '$1 > 0.5 { print "Other programs are running: these figures say little." }' /proc/loadavg
 }

@@ -27,7 +27,7 @@ done >"$data/sinai_pairs/members.txt"
 runs/ensemble.sh input/sinai.nml -d "$data/sinai_pairs" \
   --manifest "$data/sinai_pairs/members.txt" "$@"
 runs/ensemble.sh input/brownian.nml -d "$data/brownian" --seeds 1 --set stop.time=10 "$@"
-"$python" post/trajectory.py "$data"/{sinai,lorentz}/seed_1.h5 --first 200 \
+"$python" post/trajectory.py "$data"/{sinai,lorentz}/seed_1.h5 --frames :200 \
   -o "$figures/billiards.png"
 "$python" post/lyapunov.py "$data"/sinai_pairs/pair_*.h5 -o "$figures/lyapunov.png" \
   --csv "$figures/lyapunov.csv"

@@ -29,7 +29,7 @@ runs/ensemble.sh input/gravity.nml -d "$data/equipartition" --manifest "$data/me
 
 # G3: 500 time units of equilibrium.
 runs/ensemble.sh input/gravity.nml -d "$data/long" --seeds 1 --set stop.time=520 "$@"
-"$python" post/gravity.py "$data/long/seed_1.h5" --after 20 -o "$figures/gravity_laws.png" \
+"$python" post/gravity.py "$data/long/seed_1.h5" -o "$figures/gravity_laws.png" \
   --csv "$figures/gravity_laws.csv"
 
 # G4: start, end and ten times between, closer together at first, when most happens; a film of the
@@ -37,5 +37,5 @@ runs/ensemble.sh input/gravity.nml -d "$data/long" --seeds 1 --set stop.time=520
 "$python" post/snapshot.py "$data/events/seed_1.h5" --quiver \
   --frames 0,10,20,30,50,75,125,250,500,1000,1750,2500 -o "$figures/gravity_frames.png"
 runs/ensemble.sh input/gravity.nml -d "$data/film" --seeds 1 --set stop.time=20 "$@"
-"$python" post/animate.py "$data/film/seed_1.h5" --frames 501 -o "$figures/gravity_film"
+"$python" post/animate.py "$data/film/seed_1.h5" --count 501 -o "$figures/gravity_film"
 "$python" post/player.py "$data/film/seed_1.h5" -o "$figures/gravity_film.html"

@@ -8,12 +8,11 @@ module run
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
   use memory, only: check_memory
-  use namelist_input, only: read_settings
   use observables, only: total_energy
   use output, only: output_t
   use parameter_values, only: parameter_group_t
   use progress_line, only: progress_line_t
-  use run_setup, only: choose_evolution, new_simulation
+  use run_setup, only: choose_evolution, new_simulation, read_input
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
@@ -47,7 +46,7 @@ contains
     started = seconds()
     input_text = ""
     call watch_signals()
-    call read_settings(command%input, command%overrides, settings, groups, input_text, error)
+    call read_input(command%input, command%overrides, settings, groups, input_text, error)
     if (.not. allocated(error)) call check_memory(settings%species, error)
     if (allocated(error)) return
     if (command%resume) then

@@ -1,20 +1,55 @@
-!> Where names in the input become types: the only place that knows all ways to search and to move on.
+!> From the command line's file to a run: reads and checks the input, builds the state, and turns names in the
+!> input into types. The only place that knows every search and every dynamics.
 module run_setup
   use all_pairs, only: all_pairs_t
   use cell_grid, only: cell_grid_t
-  use errors, only: error_t
+  use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
+  use input_fit, only: check_fit
+  use input_problems, only: problem_list_t
+  use input_text, only: read_text
+  use namelist_input, only: read_settings
+  use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
   use settings, only: run_settings_t, settings_t
   use simulation_state, only: simulation_t
+  use texts, only: text_t
   use time_stepped, only: time_stepped_t
   implicit none
   private
-  public :: new_simulation, choose_evolution
+  public :: read_input, settings_from_text, new_simulation, choose_evolution
 
 contains
+
+  !> Reads the file `path`, applies the overrides and checks everything.
+  subroutine read_input(path, overrides, settings, groups, input_text, error)
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
+    type(settings_t), intent(out) :: settings
+    type(parameter_group_t), allocatable, intent(out) :: groups(:)  !! every value as used
+    character(len=:), allocatable, intent(out) :: input_text        !! the file as it is
+    type(error_t), allocatable, intent(out) :: error
+
+    call read_text(path, input_text, error)
+    if (.not. allocated(error)) call settings_from_text(input_text, path, overrides, settings, groups, error)
+  end subroutine read_input
+
+  !> The same for a text; `path` only names it in messages. All problems become one error.
+  subroutine settings_from_text(text, path, overrides, settings, groups, error)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)
+    type(settings_t), intent(out) :: settings
+    type(parameter_group_t), allocatable, intent(out) :: groups(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t) :: problems
+
+    call read_settings(text, overrides, settings, groups, problems)
+    call check_fit(settings, groups, problems)
+    if (problems%count > 0) call fail(error, exit_usage, problems%report(path, overrides))
+  end subroutine settings_from_text
 
   !> The state at the start of a run, disks in an order that suits the memory.
   subroutine new_simulation(settings, sim, error)

@@ -8,13 +8,10 @@ from unittest import mock
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "post"))
+from ricochet.script import launch
 
-#: What is called by its user; the other files in post/ are their parts.
-SCRIPTS = sorted(
-    path.stem for path in (ROOT / "post").glob("*.py") if "launch(main)" in path.read_text()
-)
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = sorted(path.stem for path in (ROOT / "post").glob("*.py"))
 
 
 def text(value: str) -> np.bytes_:
@@ -41,6 +38,7 @@ def write_run(
     observable_time=None,
     parameters=None,
     obstacles=(),
+    walls=(),
     provenance=None,
     committed=None,
 ):
@@ -71,7 +69,7 @@ def write_run(
         if committed is not None:
             disks["committed"] = np.int64(committed)
         write_observables(file, time if observable_time is None else observable_time, observables)
-        write_parameters(file, parameters, names, species, obstacles)
+        write_parameters(file, parameters, names, species, obstacles, walls)
         file.create_group("provenance").attrs.update(provenance or {"git_commit": text("abc1234")})
     return Path(path)
 
@@ -91,7 +89,7 @@ def write_observables(file, time, observables):
     group["committed"] = np.int64(len(time))
 
 
-def write_parameters(file, parameters, names, species, obstacles):
+def write_parameters(file, parameters, names, species, obstacles, walls):
     """`parameters` as group -> variable -> value; a species is the group species/NAME."""
     root = file.create_group("parameters")
     root["input"] = text("&run\n/\n")
@@ -105,6 +103,10 @@ def write_parameters(file, parameters, names, species, obstacles):
         where = root.create_group("obstacle")
         where["centre"], where["radius"] = np.array(centre), np.array(radius)
         where["inside"] = np.array(inside, dtype=np.int32)
+    if walls:
+        where = root.create_group("wall")
+        where["name"] = [text(f"wall {k + 1}") for k in range(len(walls))]
+        where["from"], where["to"] = np.moveaxis(np.array(walls, float), 1, 0)
 
 
 def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
@@ -114,12 +116,10 @@ def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
 
 def run_script(name, *arguments):
     """Run post/NAME.py as from the command line, in this process; returns the exit code."""
-    import drawing
-
     module = importlib.import_module(name)
     with mock.patch.object(sys, "argv", [f"{name}.py", *map(str, arguments)]):
         try:
-            drawing.launch(module.main)
+            launch(module.main)
         except SystemExit as end:
             return end.code or 0
     return 0

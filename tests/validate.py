@@ -16,6 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "post"))
+
 from validation import report
 from validation.running import validate
 from validation.tables import CASES

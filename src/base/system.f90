@@ -1,8 +1,8 @@
 !> What the language does not offer, by the C library (Linux with glibc, 64 bits): signals, the monotonic
 !> clock, terminals, file locks, atomic renames, room on a disk, and an exit that prints nothing.
 module system
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, &
-    c_int64_t, c_intptr_t, c_long, c_null_char, c_ptr, c_short, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, &
+    c_int64_t, c_intptr_t, c_long, c_null_char, c_ptr, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64, real64
@@ -11,7 +11,7 @@ module system
   public :: watch_signals, stop_requested, checkpoint_requested
   public :: seconds, talks_to_terminal, leave, host_name, process_id
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, folder_of, list_folder, obstacle_to_opening, free_bytes, last_problem, lock_t
+  public :: is_folder, folder_of, obstacle_to_opening, free_bytes, last_problem, lock_t
   public :: fill_standard_streams, print_text
 
   integer(c_int), parameter :: sig_hup = 1, sig_int = 2, sig_usr1 = 10, sig_term = 15, sig_xcpu = 24, sig_xfsz = 25
@@ -37,14 +37,6 @@ module system
     procedure :: acquire
     procedure :: release
   end type lock_t
-
-  !> A file in a folder, as readdir gives it.
-  type, bind(C) :: entry_t
-    integer(c_int64_t) :: number, offset
-    integer(c_short) :: length
-    character(kind=c_char) :: kind
-    character(kind=c_char) :: name(256)
-  end type entry_t
 
   interface
     function c_signal(number, handler) bind(C, name="signal") result(previous)
@@ -115,21 +107,6 @@ module system
       integer(c_int), value :: descriptor
       integer(c_int) :: status
     end function c_close
-    function c_opendir(path) bind(C, name="opendir") result(folder)
-      import :: c_char, c_ptr
-      character(kind=c_char), intent(in) :: path(*)
-      type(c_ptr) :: folder
-    end function c_opendir
-    function c_readdir(folder) bind(C, name="readdir") result(entry)
-      import :: c_ptr
-      type(c_ptr), value :: folder
-      type(c_ptr) :: entry
-    end function c_readdir
-    function c_closedir(folder) bind(C, name="closedir") result(status)
-      import :: c_int, c_ptr
-      type(c_ptr), value :: folder
-      integer(c_int) :: status
-    end function c_closedir
     function c_fsync(descriptor) bind(C, name="fsync") result(status)
       import :: c_int
       integer(c_int), value :: descriptor
@@ -370,40 +347,6 @@ contains
     folder = path(:index(path, "/", back=.true.))
     if (folder == "") folder = "."
   end function folder_of
-
-  !> The names in a folder, up to 2000; none if it cannot be read.
-  subroutine list_folder(folder, names)
-    character(len=*), intent(in) :: folder
-    character(len=256), allocatable, intent(out) :: names(:)
-    integer, parameter :: most = 2000
-    type(c_ptr) :: handle, address
-    type(entry_t), pointer :: entry
-    integer(c_int) :: status
-
-    allocate (names(0))
-    handle = c_opendir(folder//c_null_char)
-    if (.not. c_associated(handle)) return
-    do while (size(names) < most)
-      address = c_readdir(handle)
-      if (.not. c_associated(address)) exit
-      call c_f_pointer(address, entry)
-      names = [names, text_of(entry%name)]
-    end do
-    status = c_closedir(handle)
-  end subroutine list_folder
-
-  !> The letters up to the zero byte.
-  pure function text_of(letters) result(text)
-    character(kind=c_char), intent(in) :: letters(256)
-    character(len=256) :: text
-    integer :: k
-
-    text = ""
-    do k = 1, len(text)
-      if (letters(k) == c_null_char) exit
-      text(k:k) = letters(k)
-    end do
-  end function text_of
 
   !> Room that is left on the disk where the file is or will be; huge if nobody knows. [bytes]
   function free_bytes(path) result(bytes)

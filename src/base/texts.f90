@@ -4,7 +4,7 @@ module texts
   use kinds, only: int64, real64
   implicit none
   private
-  public :: text_t, written, written_exactly, lower_case, shown, joined, nearest_word, suggestion
+  public :: text_t, written, written_exactly, lower_case, shown, joined, place_of, nearest_word, suggestion
 
   !> A text of its own length, as an element of a list.
   type :: text_t
@@ -117,6 +117,18 @@ contains
       line = line//trim(words(i))
     end do
   end function joined
+
+  !> Place of the first of the words that is this one; 0 if none is.
+  pure function place_of(word, words) result(place)
+    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: words(:)
+    integer :: place
+
+    do place = 1, size(words)
+      if (words(place) == word) return
+    end do
+    place = 0
+  end function place_of
 
   !> What to say after an unknown word: the known one that was probably meant, or all of them.
   pure function suggestion(word, known) result(advice)

@@ -1,6 +1,9 @@
-!> The command line: options, names of any length, and the answers to --help and its like.
+!> The command line: options, names of any length, and the answers to --help and other questions.
 module command_line
+  use, intrinsic :: iso_fortran_env, only: compiler_version
+  use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
+  use hdf5_objects, only: hdf5_version
   use parameters, only: defaults_text, explain
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t
@@ -10,8 +13,7 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    character(len=:), allocatable :: question      !! '' to run; else help, version, print-defaults
-                                                   !! or explain: see `answer`
+    character(len=:), allocatable :: question      !! "" to run; else help, version, print-defaults or explain
     character(len=:), allocatable :: topic         !! the variable of --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
@@ -22,9 +24,10 @@ module command_line
     logical :: force = .false.                     !! overwrite a finished output file
   end type command_t
 
-  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", &
-    "--resume", "--check", "--quiet", "--force", "--help", "--version", "--print-defaults", &
-    "--explain"]
+  character(len=16), parameter :: switches(*) = [character(len=16) :: "--resume", "--check", "--quiet", "--force", &
+    "--help", "--version", "--print-defaults"]
+  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", "--explain", switches]
+  character(len=1), parameter :: eol = new_line("a")
 
 contains
 
@@ -43,6 +46,7 @@ contains
     call parse_arguments(arguments, command, error)
   end subroutine read_command_line
 
+  !> Makes a command of the arguments, or an error of the first that is wrong. A question ends the reading.
   pure subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
@@ -65,16 +69,16 @@ contains
         else if (command%input == "" .and. argument /= "") then
           command%input = argument
         else if (argument == "") then
-          call fail(error, exit_usage, "an empty argument is no input file")
+          call fail(error, exit_usage, "the name of the input file is empty")
         else
-          call fail(error, exit_usage, "one input file only, not also "//shown(argument))
+          call fail(error, exit_usage, "only one input file is allowed; there is also "//shown(argument))
         end if
       end associate
       if (allocated(error) .or. command%question /= "") return
       k = k + 1
     end do
     if (command%input == "") then
-      call fail(error, exit_usage, "which input file? as in: ricochet input/gas.nml; see --help")
+      call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
     end if
     if (command%output == "") command%output = default_output(command%input)
   end subroutine parse_arguments
@@ -86,31 +90,26 @@ contains
     type(command_t), intent(inout) :: command
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: name, value
-    integer :: equals
 
     name = arguments(k)%text
-    value = ""
-    equals = index(name, "=")
-    if (index(name, "--") == 1 .and. equals > 0) name = name(:equals - 1)
-    select case (name)
-    case ("-o", "--output", "--set", "--explain")
-      call take_value(arguments, k, name, value, error)
-    case default
-      if (name /= arguments(k)%text .and. any(options == name)) &
-        call fail(error, exit_usage, "option "//name//" takes no value")
-    end select
-    if (allocated(error)) return
+    if (index(name, "--") == 1) name = name(:index(name//"=", "=") - 1)
+    if (name /= arguments(k)%text .and. any(switches == name)) then
+      call fail(error, exit_usage, "option "//name//" takes no value")
+      return
+    end if
     select case (name)
     case ("-o", "--output")
-      command%output = value
+      call take_value(arguments, k, name, command%output, error)
     case ("--set")
+      call take_value(arguments, k, name, value, error)
       call append(command%overrides, value)
     case ("--explain")
       command%question = "explain"
-      command%topic = value
-    case ("-h", "--help", "--version", "--print-defaults")
+      call take_value(arguments, k, name, command%topic, error)
+    case ("-h", "--help")
+      command%question = "help"
+    case ("--version", "--print-defaults")
       command%question = name(3:)
-      if (name == "-h") command%question = "help"
     case ("--resume")
       command%resume = .true.
     case ("--check")
@@ -154,6 +153,7 @@ contains
     if (value == "") call fail(error, exit_usage, "option "//name//" needs a value")
   end subroutine take_value
 
+  !> The option may be misspelt, or a file name.
   pure subroutine report_unknown(name, error)
     character(len=*), intent(in) :: name
     type(error_t), allocatable, intent(inout) :: error
@@ -164,7 +164,7 @@ contains
     if (meant /= "") then
       meant = "did you mean "//meant//"?"
     else
-      meant = "see --help; a file whose name begins with - comes after --"
+      meant = "see --help; put -- before a file name that begins with -"
     end if
     call fail(error, exit_usage, "unknown option "//shown(name)//"; "//meant)
   end subroutine report_unknown
@@ -181,7 +181,7 @@ contains
     output = "runs/"//output//".h5"
   end function default_output
 
-  !> Prints what `command%question` asks for.
+  !> Prints the answer to `command%question`.
   subroutine answer(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -191,7 +191,7 @@ contains
     case ("help")
       text = help_text()
     case ("version")
-      text = "ricochet "//program_version
+      text = version_text()
     case ("print-defaults")
       text = defaults_text()
       text = text(:len(text) - 1)
@@ -202,10 +202,17 @@ contains
     call print_text(text, error)
   end subroutine answer
 
+  !> What a bug report should name.
+  function version_text() result(text)
+    character(len=:), allocatable :: text
+
+    text = "ricochet "//program_version//eol//"commit:   "//git_commit//eol// &
+      "compiler: "//compiler_version()//eol//"flags:    "//build_flags//eol//"HDF5:     "//hdf5_version()
+  end function version_text
+
   !> One screen.
   pure function help_text() result(text)
     character(len=:), allocatable :: text
-    character(len=1), parameter :: eol = new_line("a")
 
     text = "ricochet: event-driven simulation of hard disks"//eol//eol// &
       "usage:  ricochet INPUT.nml [option]..."//eol// &
@@ -214,17 +221,18 @@ contains
       "  --set NAME=VALUE    override a variable of the input, any number of times:"//eol// &
       "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
       "                      the last one for a variable counts, an empty VALUE"//eol// &
-      "                      brings the default back"//eol// &
-      "  --resume            go on from the checkpoint of a stopped run"//eol// &
+      "                      restores the default"//eol// &
+      "  --resume            continue from the checkpoint of a stopped run"//eol// &
       "  --check             read and check everything, run nothing"//eol// &
       "  --force             overwrite a finished output file"//eol// &
       "  --quiet             no progress on stderr"//eol// &
       "  --print-defaults    an input file with every variable and its default"//eol// &
       "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &
-      "  --                  what follows is a file name, even if it begins with -"//eol//eol// &
+      "  --version           version, commit, compiler, flags and HDF5 version"//eol// &
+      "  --                  the next argument is a file name, even with a leading -"//eol//eol// &
       "exit:   0 finished; 2 wrong usage or bad input; 3 cannot read or write a file;"//eol// &
       "        4 the simulation broke off; 75 stopped after writing a checkpoint,"//eol// &
-      "        the same command with --resume goes on"//eol//eol// &
+      "        the same command with --resume continues it"//eol//eol// &
       "examples:"//eol// &
       "  ricochet input/gas.nml"//eol// &
       "  ricochet input/crater.nml -o runs/heavy.h5 --set species.projectile.mass=50"//eol// &

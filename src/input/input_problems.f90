@@ -1,22 +1,23 @@
-!> All that is wrong with an input, collected so that it can be reported at once.
+!> Everything that is wrong with an input, collected to be reported at once.
 module input_problems
   use texts, only: text_t, written
   implicit none
   private
   public :: problem_list_t
 
-  integer, parameter :: most = 100   !! problems worth reading
-  integer, parameter :: after_all_lines = 1000000000
+  integer, parameter :: capacity = 100          !! problems worth reading
+  integer, parameter :: whole_file = 1000000000 !! sorts after every line
 
   type :: problem_t
-    integer :: line                    !! > 0 of the file, 0 the file as a whole, -k override k
+    integer :: line                             !! > 0: in the file; 0: the file as a whole; -k: override k
     character(len=:), allocatable :: text
   end type problem_t
 
+  !> The problems in the order of the report: by line, then those of the whole file, then the overrides.
   type :: problem_list_t
     integer :: count = 0
-    logical :: cut_short = .false.              !! there were more than the list takes
-    type(problem_t) :: items(most)
+    logical :: cut_short = .false.              !! there were more than the list holds
+    type(problem_t) :: items(capacity)
   contains
     procedure :: add
     procedure :: is_full
@@ -25,7 +26,7 @@ module input_problems
 
 contains
 
-  !> Adds `where: what`; what the list already says at this place is not said again.
+  !> Adds `where: what`, unless the list has it already.
   pure subroutine add(self, line, where, what)
     class(problem_list_t), intent(inout) :: self
     integer, intent(in) :: line                 !! as in `problem_t`
@@ -42,38 +43,42 @@ contains
       self%cut_short = .true.
       return
     end if
+    do k = self%count, 1, -1
+      if (rank(self%items(k)%line) <= rank(line)) exit
+      self%items(k + 1) = self%items(k)
+    end do
+    self%items(k + 1)%line = line
+    self%items(k + 1)%text = text
     self%count = self%count + 1
-    self%items(self%count)%line = line
-    self%items(self%count)%text = text
   end subroutine add
 
+  !> Whether reading on is of no use.
   pure function is_full(self)
     class(problem_list_t), intent(in) :: self
     logical :: is_full
 
-    is_full = self%count == most
+    is_full = self%count == capacity
   end function is_full
 
-  !> One line per problem: those of the file by line number, then those of the overrides.
+  !> Place of a line in the report.
+  pure function rank(line)
+    integer, intent(in) :: line
+    integer :: rank
+
+    rank = merge(line, whole_file - line, line > 0)
+  end function rank
+
+  !> One line per problem: `path:line: group.variable: what is wrong, what is allowed`.
   pure function report(self, path, overrides) result(text)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)
     character(len=:), allocatable :: text
-    integer :: order(self%count), k, j, moving
+    integer :: k
 
-    order = [(k, k=1, self%count)]
-    do k = 2, self%count
-      moving = order(k)
-      do j = k - 1, 1, -1
-        if (rank_of(self%items(order(j))%line) <= rank_of(self%items(moving)%line)) exit
-        order(j + 1) = order(j)
-      end do
-      order(j + 1) = moving
-    end do
     text = ""
     do k = 1, self%count
-      associate (problem => self%items(order(k)))
+      associate (problem => self%items(k))
         if (k > 1) text = text//new_line("a")
         if (problem%line > 0) then
           text = text//path//":"//written(problem%line)//": "//problem%text
@@ -84,18 +89,7 @@ contains
         end if
       end associate
     end do
-    if (self%cut_short) then
-      text = text//new_line("a")//path//": more problems than these "//written(most)
-    end if
+    if (self%cut_short) text = text//new_line("a")//path//": more problems than these "//written(capacity)
   end function report
-
-  !> Sorts lines as they are reported: 1, 2, 3, ..., the whole file (0), overrides (-1, -2, ...).
-  pure function rank_of(line) result(rank)
-    integer, intent(in) :: line
-    integer :: rank
-
-    rank = line
-    if (line <= 0) rank = after_all_lines - line
-  end function rank_of
 
 end module input_problems

@@ -1,47 +1,52 @@
-!> The species of the input: names, placements, velocities, and the relations between them.
+!> The species of the input: names, placements, velocities, and how they depend on each other.
 module input_species
   use kinds, only: int64, pi, real64
+  use box_geometry, only: box_t
   use input_problems, only: problem_list_t
+  use input_values, only: counted
   use parameter_values, only: parameter_group_t
-  use parameters, only: largest, row_of, smallest
-  use settings, only: box_settings_t, species_settings_t
-  use texts, only: shown, suggestion, written
+  use parameters, only: either, largest, row_of, smallest, table, words_of
+  use settings, only: species_settings_t
+  use texts, only: place_of, shown, suggestion, written
   implicit none
   private
   public :: take_species, check_name
 
-  !> Names that the output file uses for its own groups and datasets.
+  !> Names that the output file uses for groups and datasets of its own.
   character(len=*), parameter :: reserved(*) = [character(len=20) :: "all", "total_energy", &
     "momentum", "collisions", "wall_collisions", "wall_impulse", "obstacle_collisions", "virial", &
     "pressure", "dissipated_energy", "names", "counts"]
   character(len=*), parameter :: letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
   integer, parameter :: longest_name = 40
   integer, parameter :: most_disks = 100000000
-  real(real64), parameter :: none(0) = [real(real64) ::]
 
 contains
 
   !> Fills the settings of all species; derived values go back into the groups.
   subroutine take_species(groups, box, species, problems)
     type(parameter_group_t), intent(inout) :: groups(:)   !! the species
-    type(box_settings_t), intent(in) :: box
+    type(box_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
+    integer(int64) :: total
     integer :: k
 
     allocate (species(size(groups)))
     if (size(groups) == 0) call problems%add(0, "species", "there is none; give at least one")
     do k = 1, size(groups)
       call check_name(groups, k, problems)
-      call take_placement(groups(k), species(k), box, problems)
+      call infer_choices(groups(k))
+      call check_choices(groups(k), problems)
+      call take_placement(groups(k), box, species(k), problems)
       call take_velocities(groups(k), species(k), problems)
     end do
     call resolve_sizes(groups, species, problems)
-    if (sum(int(species%count, int64)) > most_disks) call problems%add(0, "species.count", &
-      written(sum(int(species%count, int64)))//" disks; allowed: up to "//written(most_disks))
+    total = sum(int(species%count, int64))
+    if (total > most_disks) call problems%add(0, "species.count", counted(total, "disk")//"; allowed: up to "// &
+      written(most_disks))
     do k = 1, size(groups)
       associate (group => groups(k), s => species(k))
-        call group%put_integer("count", int(s%count, int64))
+        call group%put_text("count", written(s%count))
         call group%put_reals("mass", [s%mass])
         call group%put_reals("radius", [s%radius])
         if (s%radius < sqrt(area(s%region))) call group%put_reals("packing_fraction", &
@@ -51,118 +56,105 @@ contains
     end do
   end subroutine take_species
 
-  !> A name must fit into file paths, override paths and messages, and be the only one of its kind.
+  !> A name must fit into file paths, override paths and messages, and be unique among its kind.
   subroutine check_name(groups, k, problems)
     type(parameter_group_t), intent(in) :: groups(:)   !! all obstacles, or all species
     integer, intent(in) :: k
     type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: name, where
+    character(len=:), allocatable :: name
     integer :: j
 
-    where = trim(groups(k)%name)//".name"
     name = trim(groups(k)%instance)
-    associate (line => groups(k)%line_of("name"))
-      if (verify(name, letters//"0123456789_-") > 0 .or. verify(name(1:1), letters) > 0 &
-        .or. len(name) > longest_name) then
-        call problems%add(line, where, shown(name)//" is no name; allowed: up to "// &
-          written(longest_name)//" letters, digits, _ and -, beginning with a letter")
-      else if (any(reserved == name)) then
-        call problems%add(line, where, shown(name)//" is a name that the output file uses itself")
-      end if
-      do j = 1, k - 1
-        if (groups(j)%instance /= name) cycle
-        call problems%add(line, where, shown(name)//" names the one in line "//written(groups(j)%line)//" already")
-        exit
-      end do
-    end associate
+    if (verify(name, letters//"0123456789_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
+      call groups(k)%complain("name", shown(name)//" is not a valid name; allowed: up to "//written(longest_name)// &
+        " letters, digits, _ and -, beginning with a letter", problems)
+    else if (any(reserved == name)) then
+      call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
+    end if
+    j = place_of(name, groups%instance)
+    if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
+      written(groups(j)%line), problems)
   end subroutine check_name
 
-  subroutine take_placement(group, s, box, problems)
+  !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
+  subroutine infer_choices(group)
     type(parameter_group_t), intent(inout) :: group
-    type(species_settings_t), intent(inout) :: s
-    type(box_settings_t), intent(in) :: box
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    integer :: k
+
+    if (group%given("file") .and. .not. group%given("velocities")) call group%put_text("velocities", "file")
+    do k = 1, size(group%values)
+      words = words_of(table(group%values(k)%row)%goes_with)
+      if (size(words) == 0 .or. .not. group%values(k)%given) cycle
+      if (.not. group%given(words(1))) call group%put_text(words(1), words(2))
+    end do
+  end subroutine infer_choices
+
+  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given,
+  !> that is a mistake: nothing is ignored silently.
+  subroutine check_choices(group, problems)
+    type(parameter_group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    character(len=len(table%goes_with)) :: word
+    integer :: k
+
+    if (group%text_of("velocities") == "file" .and. .not. group%given("file")) &
+      call group%complain("velocities", "'file' needs species.file", problems)
+    do k = 1, size(group%values)
+      words = words_of(table(group%values(k)%row)%goes_with)
+      if (size(words) == 0) cycle
+      word = group%text_of(words(1))
+      associate (slot => group%values(k))
+        if (any(words(2:) == word)) then
+          if (table(slot%row)%status == "optional" .and. .not. slot%given) &
+            call group%complain(trim(words(1)), "'"//trim(word)//"' needs species."//slot%name, problems)
+        else
+          call slot%clear()
+          if (slot%given .and. .not. group%faulty(words(1))) call group%complain(trim(slot%name), "has no effect with "// &
+            trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
+        end if
+      end associate
+    end do
+  end subroutine check_choices
+
+  !> Where the disks start, and how many there are.
+  subroutine take_placement(group, box, s, problems)
+    type(parameter_group_t), intent(in) :: group
+    type(box_t), intent(in) :: box
+    type(species_settings_t), intent(inout) :: s
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), allocatable :: region(:)
+    integer(int64), allocatable :: grid(:)
 
     s%name = trim(group%instance)
-    call infer(group, "placement", [character(len=8) :: "position", "grid", "file"], &
-      [character(len=8) :: "explicit", "grid", "file"])
     s%placement = group%text_of("placement")
-    call pair_up(group, "placement", "explicit", "position", problems)
-    call pair_up(group, "placement", "grid", "grid", problems)
-    call pair_up(group, "placement", "file", "file", problems)
     s%file = group%text_of("file")
-    s%region = group%reals_of("region", [box%lower(1), box%upper(1), box%lower(2), box%upper(2)])
+    s%region = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
+    allocate (region, source=group%reals_of("region"))
+    if (size(region) > 0) s%region = region
     s%grid = 0
-    associate (grid => group%values(row_of("species", "grid")))
-      if (allocated(grid%integers)) s%grid = int(grid%integers)
-    end associate
+    allocate (grid, source=group%values(row_of("species", "grid"))%integers())
+    if (size(grid) > 0) s%grid = int(grid)
     call take_pairs(group, "position", s%position, problems)
     call take_count(group, s, problems)
   end subroutine take_placement
 
+  !> How the disks move at the start.
   subroutine take_velocities(group, s, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
     type(problem_list_t), intent(inout) :: problems
 
-    call infer(group, "velocities", [character(len=11) :: "velocity", "temperature", "speed", "file"], &
-      [character(len=11) :: "explicit", "maxwell", "equal_speed", "file"])
     s%velocities = group%text_of("velocities")
-    call pair_up(group, "velocities", "explicit", "velocity", problems)
-    if (s%velocities == "file") call pair_up(group, "velocities", "file", "file", problems)
-    if (s%velocities /= "maxwell") call leave_out(group, "velocities", "'maxwell'", "temperature", problems)
-    if (s%velocities /= "equal_speed" .and. s%velocities /= "uniform") &
-      call leave_out(group, "velocities", "'equal_speed' or 'uniform'", "speed", problems)
     s%speed = group%real_of("speed", 0.0_real64)
     s%temperature = group%real_of("temperature", 0.0_real64)
     call take_pairs(group, "velocity", s%velocity, problems)
-    if (size(s%velocity, 2) == 1 .and. s%count > 1) then
-      s%velocity = spread(s%velocity(:, 1), 2, s%count)
-    else if (size(s%velocity, 2) > 0 .and. size(s%velocity, 2) /= s%count .and. s%count > 0) then
-      call problems%add(group%line_of("velocity"), "species.velocity", &
-        written(size(s%velocity, 2))//" pairs for "//written(s%count)//" disks")
-    end if
+    associate (n => size(s%velocity, 2))
+      if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
+        counted(int(s%count, int64), "disk"), problems)
+    end associate
   end subroutine take_velocities
-
-  !> A choice that is not given follows from the first given variable that only makes sense with it.
-  subroutine infer(group, choice, variables, consequences)
-    type(parameter_group_t), intent(inout) :: group
-    character(len=*), intent(in) :: choice
-    character(len=*), intent(in) :: variables(:), consequences(:)
-    integer :: k
-
-    if (group%given(choice)) return
-    do k = size(variables), 1, -1
-      if (group%given(trim(variables(k)))) call group%put_text(choice, consequences(k))
-    end do
-  end subroutine infer
-
-  !> The variable and the word of the choice need each other.
-  subroutine pair_up(group, choice, word, variable, problems)
-    type(parameter_group_t), intent(inout) :: group
-    character(len=*), intent(in) :: choice, word, variable
-    type(problem_list_t), intent(inout) :: problems
-
-    if (group%text_of(choice) /= word) then
-      call leave_out(group, choice, "'"//word//"'", variable, problems)
-    else if (.not. group%given(variable)) then
-      call problems%add(group%line_of(choice), "species."//variable, &
-        "is missing; "//choice//" = '"//word//"' needs it")
-    end if
-  end subroutine pair_up
-
-  !> A variable without effect has no value; if it is given, that is a mistake, for nothing is ignored
-  !> silently.
-  subroutine leave_out(group, choice, words, variable, problems)
-    type(parameter_group_t), intent(inout) :: group
-    character(len=*), intent(in) :: choice, words, variable
-    type(problem_list_t), intent(inout) :: problems
-
-    call group%unset(variable)
-    if (.not. group%given(variable) .or. group%faulty(choice)) return
-    call problems%add(group%line_of(variable), "species."//variable, "has no effect with "// &
-      choice//" = '"//group%text_of(choice)//"'; it goes with "//words)
-  end subroutine leave_out
 
   !> x1, y1, x2, y2, ... as (2,n).
   subroutine take_pairs(group, name, pairs, problems)
@@ -172,9 +164,9 @@ contains
     type(problem_list_t), intent(inout) :: problems
     real(real64), allocatable :: values(:)
 
-    allocate (values, source=group%reals_of(name, none))
-    if (modulo(size(values), 2) == 1) call problems%add(group%line_of(name), "species."//name, &
-      written(size(values))//" values; two belong to a disk, x and y")
+    allocate (values, source=group%reals_of(name))
+    if (modulo(size(values), 2) == 1) call group%complain(name, counted(size(values, kind=int64), "value")// &
+      "; each disk has two, x and y", problems)
     pairs = reshape(values, [2, size(values)/2])
   end subroutine take_pairs
 
@@ -184,30 +176,23 @@ contains
     type(species_settings_t), intent(inout) :: s
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: source
-    integer(int64) :: given, counted
+    integer(int64) :: n
 
-    given = group%integer_of("count", 0_int64)
-    s%count = int(given)
-    counted = given
+    s%count = int(group%integer_of("count", 0_int64))
     source = "position"
-    if (size(s%position, 2) > 0) counted = size(s%position, 2)
-    if (s%grid(1) > 0) then
-      source = "grid"
-      counted = product(int(s%grid, int64))
-    end if
+    if (s%grid(1) > 0) source = "grid"
+    n = size(s%position, 2, kind=int64)
+    if (s%grid(1) > 0) n = product(int(s%grid, int64))
     if (group%faulty("count")) return
-    if (.not. group%given("count")) then
-      if (counted == 0 .and. .not. (group%faulty("position") .or. group%faulty("grid"))) then
-        call problems%add(group%line, "species.count", "is missing; an integer >= 1")
-      else if (counted > most_disks) then
-        call problems%add(group%line_of(source), "species."//source, written(counted)// &
-          " disks; allowed: up to "//written(most_disks))
-      else
-        s%count = int(counted)
-      end if
-    else if (counted /= given) then
-      call problems%add(group%line_of(source), "species."//source, "holds "//written(counted)// &
-        " disks, but species.count is "//written(given))
+    if (n == 0) then
+      if (.not. (group%faulty("position") .or. group%faulty("grid"))) call group%demand("count", problems)
+    else if (group%given("count")) then
+      if (n /= s%count) call group%complain(source, "holds "//counted(n, "disk")//", but species.count is "// &
+        written(s%count), problems)
+    else if (n > most_disks) then
+      call group%complain(source, counted(n, "disk")//"; allowed: up to "//written(most_disks), problems)
+    else
+      s%count = int(n)
     end if
   end subroutine take_count
 
@@ -238,13 +223,12 @@ contains
         if (j == 0 .or. .not. fits) exit
       end do
       if (j == 0 .and. fits) cycle
-      call problems%add(groups(k)%line_of("relative_to"), "species.relative_to", &
-        "leads back to the species itself, or to sizes out of range")
+      call groups(k)%complain("relative_to", "leads back to the species itself, or to sizes out of range", problems)
       species(k)%radius = 0
     end do
   end subroutine resolve_sizes
 
-  !> The species that `relative_to` names; 0 if there is none.
+  !> Finds the species that `relative_to` names; 0 if there is none.
   subroutine find_base(groups, k, base, problems)
     type(parameter_group_t), intent(in) :: groups(:)
     integer, intent(in) :: k
@@ -252,17 +236,14 @@ contains
     type(problem_list_t), intent(inout) :: problems
     character(len=longest_name) :: names(size(groups))
     character(len=:), allocatable :: wanted
-    integer :: j
 
     base = 0
     wanted = groups(k)%text_of("relative_to")
     if (wanted == "") return
-    do j = 1, size(groups)
-      names(j) = groups(j)%instance(:longest_name)
-      if (groups(j)%instance == wanted) base = j
-    end do
-    if (base == 0) call problems%add(groups(k)%line_of("relative_to"), "species.relative_to", &
-      shown(wanted)//" is no species; "//suggestion(wanted, names))
+    names = groups%instance(:longest_name)
+    base = place_of(wanted, groups%instance)
+    if (base == 0) call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
+      suggestion(wanted, names), problems)
   end subroutine find_base
 
   !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
@@ -275,24 +256,22 @@ contains
     radius = group%real_of("radius", 0.0_real64)
     if (group%given("packing_fraction")) then
       if (group%given("radius") .or. group%given("relative_to")) then
-        call problems%add(group%line_of("packing_fraction"), "species.packing_fraction", &
-          "fixes the radius, which "//trim(merge("radius     ", "relative_to", &
-          group%given("radius")))//" does already; give one of them")
+        call group%complain("packing_fraction", "fixes the radius, as does "//trim(merge("radius     ", &
+          "relative_to", group%given("radius")))//"; give only one of them", problems)
         radius = 0
       else if (s%count > 0 .and. area(s%region) > 0) then
         radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
       end if
+    else if (group%given("relative_to") .and. .not. group%given("radius")) then
+      radius = 1
     else if (.not. group%given("radius")) then
-      if (group%given("relative_to")) then
-        radius = 1
-      else
-        call problems%add(group%line, "species.radius", "is missing; give radius, packing_fraction or relative_to")
-      end if
+      call group%complain("radius", "is missing; give radius, packing_fraction or relative_to", problems)
     end if
   end subroutine own_radius
 
+  !> Area of a region; 0 if its ends are the wrong way round.
   pure function area(region)
-    real(real64), intent(in) :: region(4)
+    real(real64), intent(in) :: region(4)              !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area
 
     area = max(region(2) - region(1), 0.0_real64)*max(region(4) - region(3), 0.0_real64)

@@ -1,117 +1,133 @@
 !> The values of the input variables as a run uses them, by group and name.
-!> The output file lists them all from here; `settings` holds them as typed data.
+!> The output file lists them all from here; `settings` has them as typed data.
 module parameter_values
   use kinds, only: int64, real64
-  use parameters, only: name_length, row_of
-  use texts, only: written, written_exactly
+  use input_problems, only: problem_list_t
+  use parameters, only: allowed, name_length, row_of, table
+  use texts, only: place_of, written, written_exactly
   implicit none
   private
-  public :: parameter_value_t, parameter_group_t, text_length, values_text
+  public :: parameter_value_t, parameter_group_t, text_length, range_of, values_text
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
 
-  !> One variable. The array of its kind is allocated; none is if it has no value.
+  !> One variable. Numbers with a fraction are reals; everything else is kept as texts: integers as
+  !> digits, so that 64 bits fit, logicals as `.true.` or `.false.`. Neither is allocated without a value.
   type :: parameter_value_t
     integer :: row = 0                         !! of the table
     character(len=name_length) :: name = ""
-    character(len=8) :: kind = ""              !! 'integer', 'real', 'logical' or 'text'
+    character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
     logical :: given = .false.                 !! by the user
-    logical :: faulty = .false.                !! given, but nonsense that has been reported
+    logical :: faulty = .false.                !! given, but wrong, and reported
     integer :: line = 0                        !! where: line of the file, or -k: override k
     integer :: elements = 0                    !! bit i: element i is given (name(i) = value)
-    integer(int64), allocatable :: integers(:)
     real(real64), allocatable :: reals(:)
-    logical, allocatable :: logicals(:)
     character(len=text_length), allocatable :: texts(:)
   contains
     procedure :: is_set
+    procedure :: integers
+    procedure :: clear
   end type parameter_value_t
 
-  !> One group of the input, of the repeated ones one instance. The functions give the value of a
-  !> variable, or what `otherwise` says if it has none.
+  !> One group of the input; of a repeated group, one instance. The functions give the value of a
+  !> variable, or `otherwise` if it has none.
   type :: parameter_group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; else blank
-    integer :: line = 0                        !! of its first line in the file; 0 not there
+    integer :: line = 0                        !! of its first line in the file; 0: not in the file
     type(parameter_value_t), allocatable :: values(:)
   contains
-    procedure :: integer_of, real_of, reals_of, text_of, logical_of
+    procedure :: integer_of, real_of, reals_of, text_of
     procedure :: given, faulty, line_of
-    procedure :: put_integer, put_reals, put_text, unset
+    procedure :: put_text, put_reals
+    procedure :: complain, demand
   end type parameter_group_t
 
 contains
 
+  !> Whether the variable has a value.
   pure function is_set(self)
     class(parameter_value_t), intent(in) :: self
     logical :: is_set
 
-    is_set = allocated(self%integers) .or. allocated(self%reals) .or. allocated(self%logicals) &
-      .or. allocated(self%texts)
+    is_set = allocated(self%reals) .or. allocated(self%texts)
   end function is_set
 
-  pure function integer_of(self, name, otherwise) result(value)
+  !> The values of a variable of kind "integer".
+  pure function integers(self) result(numbers)
+    class(parameter_value_t), intent(in) :: self
+    integer(int64), allocatable :: numbers(:)
+
+    if (.not. allocated(self%texts)) then
+      allocate (numbers(0))
+    else
+      allocate (numbers(size(self%texts)))
+      read (self%texts, *) numbers
+    end if
+  end function integers
+
+  !> Takes the value away.
+  pure subroutine clear(self)
+    class(parameter_value_t), intent(inout) :: self
+
+    if (allocated(self%reals)) deallocate (self%reals)
+    if (allocated(self%texts)) deallocate (self%texts)
+  end subroutine clear
+
+  !> The first value of a variable of kind "integer".
+  pure function integer_of(self, name, otherwise) result(number)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     integer(int64), intent(in) :: otherwise
-    integer(int64) :: value
+    integer(int64) :: number
 
-    value = otherwise
+    number = otherwise
     associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%integers)) value = slot%integers(1)
+      if (slot%is_set()) read (slot%texts(1), *) number
     end associate
   end function integer_of
 
-  pure function real_of(self, name, otherwise) result(value)
+  !> All values of a variable of kind "real"; none if it has no value.
+  pure function reals_of(self, name) result(numbers)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
-    real(real64), intent(in) :: otherwise
-    real(real64) :: value
-
-    value = otherwise
-    associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%reals)) value = slot%reals(1)
-    end associate
-  end function real_of
-
-  pure function reals_of(self, name, otherwise) result(values)
-    class(parameter_group_t), intent(in) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(in) :: otherwise(:)
-    real(real64), allocatable :: values(:)
+    real(real64), allocatable :: numbers(:)
 
     associate (slot => self%values(row_of(self%name, name)))
       if (allocated(slot%reals)) then
-        values = slot%reals
+        numbers = slot%reals
       else
-        values = otherwise
+        allocate (numbers(0))
       end if
     end associate
   end function reals_of
 
-  !> Empty if it has no value.
-  pure function text_of(self, name) result(value)
+  !> The first value of a variable of kind "real".
+  pure function real_of(self, name, otherwise) result(number)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
-    character(len=:), allocatable :: value
+    real(real64), intent(in) :: otherwise
+    real(real64) :: number
 
-    value = ""
+    number = otherwise
     associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%texts)) value = trim(slot%texts(1))
+      if (allocated(slot%reals)) number = slot%reals(1)
+    end associate
+  end function real_of
+
+  !> The first value of a variable of any kind but "real"; empty if it has none.
+  pure function text_of(self, name) result(text)
+    class(parameter_group_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: text
+
+    text = ""
+    associate (slot => self%values(row_of(self%name, name)))
+      if (allocated(slot%texts)) text = trim(slot%texts(1))
     end associate
   end function text_of
 
-  pure function logical_of(self, name) result(value)
-    class(parameter_group_t), intent(in) :: self
-    character(len=*), intent(in) :: name
-    logical :: value
-
-    value = .false.
-    associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%logicals)) value = slot%logicals(1)
-    end associate
-  end function logical_of
-
+  !> Whether the user has set a variable.
   pure function given(self, name)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -120,6 +136,7 @@ contains
     given = self%values(row_of(self%name, name))%given
   end function given
 
+  !> Whether a variable is set to something that has been reported as wrong.
   pure function faulty(self, name)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -128,7 +145,7 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Where a variable is given; if it is not, where its group begins.
+  !> Where a variable is set; if it is not, where its group begins.
   pure function line_of(self, name) result(line)
     class(parameter_group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -138,48 +155,64 @@ contains
     if (line == 0) line = self%line
   end function line_of
 
-  pure subroutine put_integer(self, name, value)
+  !> Gives a variable a single value that follows from others.
+  pure subroutine put_text(self, name, text)
     class(parameter_group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(int64), intent(in) :: value
-
-    self%values(row_of(self%name, name))%integers = [value]
-  end subroutine put_integer
-
-  pure subroutine put_reals(self, name, values)
-    class(parameter_group_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(in) :: values(:)
-
-    self%values(row_of(self%name, name))%reals = values
-  end subroutine put_reals
-
-  pure subroutine put_text(self, name, value)
-    class(parameter_group_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    character(len=*), intent(in) :: value
-    character(len=text_length) :: padded
-
-    padded = value
-    self%values(row_of(self%name, name))%texts = [padded]
-  end subroutine put_text
-
-  pure subroutine unset(self, name)
-    class(parameter_group_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
+    character(len=*), intent(in) :: text
 
     associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%integers)) deallocate (slot%integers)
-      if (allocated(slot%reals)) deallocate (slot%reals)
-      if (allocated(slot%texts)) deallocate (slot%texts)
+      call slot%clear()
+      allocate (slot%texts(1))
+      slot%texts(1) = text
     end associate
-  end subroutine unset
+  end subroutine put_text
 
-  !> Every value as it is used, one variable to a line: `species.bed.radius = 0.005`.
+  !> Gives a variable values that follow from others.
+  pure subroutine put_reals(self, name, numbers)
+    class(parameter_group_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(real64), intent(in) :: numbers(:)
+
+    self%values(row_of(self%name, name))%reals = numbers
+  end subroutine put_reals
+
+  !> Reports what is wrong with a variable, where it is set.
+  pure subroutine complain(self, name, what, problems)
+    class(parameter_group_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    character(len=*), intent(in) :: what       !! what is wrong, what is allowed
+    type(problem_list_t), intent(inout) :: problems
+
+    call problems%add(self%line_of(name), trim(self%name)//"."//name, what)
+  end subroutine complain
+
+  !> Reports a variable that has to be given and is not.
+  pure subroutine demand(self, name, problems)
+    class(parameter_group_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    type(problem_list_t), intent(inout) :: problems
+
+    associate (slot => self%values(row_of(self%name, name)))
+      if (.not. slot%given) call self%complain(name, "is missing; give "//allowed(table(slot%row)), problems)
+    end associate
+  end subroutine demand
+
+  !> First and last of the groups of one name; if there are none, the last comes before the first.
+  pure function range_of(groups, name) result(range)
+    type(parameter_group_t), intent(in) :: groups(:)   !! those of one name side by side
+    character(len=*), intent(in) :: name
+    integer :: range(2)
+
+    range(1) = max(place_of(name, groups%name), 1)
+    range(2) = range(1) + count(groups%name == name) - 1
+  end function range_of
+
+  !> Every value as it is used, one variable per line: `species.bed.radius = 0.005`.
   pure function values_text(groups) result(text)
     type(parameter_group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: prefix, values
+    character(len=:), allocatable :: prefix
     integer :: g, v
 
     text = ""
@@ -187,13 +220,14 @@ contains
       prefix = trim(groups(g)%name)//"."
       if (groups(g)%instance /= "") prefix = prefix//trim(groups(g)%instance)//"."
       do v = 1, size(groups(g)%values)
-        values = value_text(groups(g)%values(v))
-        if (values /= "") text = text//prefix//trim(groups(g)%values(v)%name)//" = "//values//new_line("a")
+        associate (value => groups(g)%values(v))
+          if (value%is_set()) text = text//prefix//trim(value%name)//" = "//value_text(value)//new_line("a")
+        end associate
       end do
     end do
   end function values_text
 
-  !> The values of a variable as one would write them in a file; empty if it has none.
+  !> The values of a variable as they would be written in a file.
   pure function value_text(value) result(text)
     type(parameter_value_t), intent(in) :: value
     character(len=:), allocatable :: text
@@ -201,17 +235,18 @@ contains
     integer :: k, n
 
     n = 0
-    text = ""
-    if (allocated(value%integers)) n = size(value%integers)
     if (allocated(value%reals)) n = size(value%reals)
-    if (allocated(value%logicals)) n = size(value%logicals)
     if (allocated(value%texts)) n = size(value%texts)
+    text = ""
     do k = 1, min(n, most)
       if (k > 1) text = text//", "
-      if (allocated(value%integers)) text = text//written(value%integers(k))
-      if (allocated(value%reals)) text = text//written_exactly(value%reals(k))
-      if (allocated(value%logicals)) text = text//trim(merge(".true. ", ".false.", value%logicals(k)))
-      if (allocated(value%texts)) text = text//quoted(trim(value%texts(k)))
+      if (value%kind == "real") then
+        text = text//written_exactly(value%reals(k))
+      else if (value%kind == "text") then
+        text = text//quoted(trim(value%texts(k)))
+      else
+        text = text//trim(value%texts(k))
+      end if
     end do
     if (n > most) text = text//", ... ! "//written(n)//" values"
   end function value_text

@@ -131,23 +131,24 @@ contains
 
     name = group//"@"//trim(value%name)
     extents = [integer ::]
-    if (allocated(value%reals)) then
+    if (.not. value%is_set()) return
+    select case (value%kind)
+    case ("real")
       if (size(value%reals) > longest_attribute) name = group//"/"//trim(value%name)
       if (size(value%reals) > 1) extents = [size(value%reals)]
       call file%put(name, extents, value%reals)
-    else if (allocated(value%integers)) then
-      if (size(value%integers) > 1) extents = [size(value%integers)]
-      call file%put(name, extents, value%integers)
-    else if (allocated(value%logicals)) then
-      if (size(value%logicals) > 1) extents = [size(value%logicals)]
-      call file%put(name, extents, merge(1_int32, 0_int32, value%logicals))
-    else if (allocated(value%texts)) then
+    case ("integer")
+      if (size(value%texts) > 1) extents = [size(value%texts)]
+      call file%put(name, extents, value%integers())
+    case ("logical")
+      call file%put(name, extents, [merge(1_int32, 0_int32, value%texts(1) == ".true.")])
+    case default
       if (size(value%texts) > 1) then
         call file%put(name, value%texts)
       else
         call file%put(name, trim(value%texts(1)))
       end if
-    end if
+    end select
   end subroutine describe_value
 
   subroutine describe_species(file, sim)

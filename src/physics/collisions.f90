@@ -3,12 +3,16 @@ module collisions
   use kinds, only: real64
   implicit none
   private
-  public :: contact_law_t, pair_impulse, wall_rebound
+  public :: contact_law_t, pair_impulse, wall_rebound, wall_rules
+
+  !> The rules for walls by their names in the input; a rule is its number in this list.
+  character(len=*), parameter :: wall_rules = "velocity normal"
+  integer, parameter :: normal_rule = 2              !! a smooth wall
 
   type :: contact_law_t
     real(real64), allocatable :: restitution(:, :)   !! (s,s) by pair of species, symmetric
     real(real64) :: wall_restitution = 1.0_real64
-    logical :: smooth_walls = .false.                !! walls leave the tangential velocity alone
+    integer :: wall_rule = 1                         !! in `wall_rules`
     !> TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a contact is elastic if a partner
     !> had its last one less than this time ago. [time]
     real(real64) :: contact_time = 0.0_real64
@@ -30,15 +34,15 @@ contains
 
   !> Velocity after contact with a fixed wall. The normal velocity points towards the disk's side whatever
   !> its sign was, so that a double hit by rounding cannot send a disk out.
-  pure function wall_rebound(v, normal, restitution, smooth) result(after)
+  pure function wall_rebound(v, normal, restitution, rule) result(after)
     real(real64), intent(in) :: v(2)                 !! [length/time]
     real(real64), intent(in) :: normal(2)            !! unit vector from the wall to the disk
     real(real64), intent(in) :: restitution
-    logical, intent(in) :: smooth                    !! tangential velocity unchanged
+    integer, intent(in) :: rule                      !! in `wall_rules`
     real(real64) :: after(2), approach
 
     approach = v(1)*normal(1) + v(2)*normal(2)
-    if (smooth) then
+    if (rule == normal_rule) then
       after = v + (restitution*abs(approach) - approach)*normal
     else
       after = restitution*(v + (abs(approach) - approach)*normal)

@@ -144,7 +144,7 @@ contains
     call land(sim%disk(i), sim%box%gravity, t)
     normal = wall_normal(sim%box, code, sim%disk(i)%x)
     v = sim%disk(i)%v
-    sim%disk(i)%v = wall_rebound(v, normal, restitution, sim%law%smooth_walls)
+    sim%disk(i)%v = wall_rebound(v, normal, restitution, sim%law%wall_rule)
     mass = sim%species(sim%tag(i)%species)%mass
     sim%dissipated = sim%dissipated + 0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v))
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1

@@ -1,9 +1,8 @@
-!> The state at the start: what the input describes, with every disk at its place and its velocity
-!> drawn. Positions and velocities of each species have random streams of their own, so that a
-!> change of one leaves what the others draw as it is.
+!> The state at the start: the system of the input, with every disk placed and its velocity drawn.
+!> Positions and velocities of each species have random streams of their own, so that a change of one
+!> does not change what the others draw.
 module initial_state
-  use kinds, only: int32, real64
-  use circles, only: new_circle
+  use kinds, only: int32
   use errors, only: error_t
   use placement, only: place_disks
   use random_stream, only: random_stream_t
@@ -32,33 +31,18 @@ contains
     sim%start_energy = sim%kinetic_energy()
   end subroutine create_simulation
 
-  !> Box, obstacles, contact laws and species.
+  !> Box, contact law and species.
   pure subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
-    integer :: k
+    integer :: s
 
-    associate (box => settings%box, contact => settings%contact, o => settings%obstacles, s => settings%species)
-      sim%box%lower = box%lower
-      sim%box%upper = box%upper
-      sim%box%periodic = box%periodic
-      sim%box%gravity = box%gravity
-      sim%law%restitution = contact%restitution
-      sim%law%wall_restitution = contact%wall_restitution
-      sim%law%smooth_walls = contact%smooth_walls
-      sim%law%contact_time = contact%contact_time
-      allocate (sim%box%obstacle(size(o)), sim%species(size(s)))
-      do k = 1, size(o)
-        sim%box%obstacle(k)%name = o(k)%name
-        allocate (sim%box%obstacle(k)%shape, source=new_circle(o(k)%centre, o(k)%radius, o(k)%inside))
-      end do
-      do k = 1, size(s)
-        sim%species(k)%name = s(k)%name
-        sim%species(k)%count = s(k)%count
-        sim%species(k)%mass = s(k)%mass
-        sim%species(k)%radius = s(k)%radius
-      end do
-    end associate
+    sim%box = settings%box
+    sim%law = settings%law
+    allocate (sim%species(size(settings%species)))
+    do s = 1, size(sim%species)
+      sim%species(s) = settings%species(s)%species_t
+    end do
   end subroutine describe_system
 
   !> The disks with all that follows from their species, in the order of the input.

@@ -1,4 +1,5 @@
-!> How much memory a run may take, so that one that cannot fit is refused before it starts (Linux).
+!> How much memory a run may use: a run that cannot fit is refused before it starts. On Linux; elsewhere no
+!> limit is known.
 module memory
   use kinds, only: int64, real64
   use errors, only: error_t, exit_usage, fail
@@ -8,13 +9,13 @@ module memory
   private
   public :: check_memory, available_memory, number_after
 
-  ! Measured with 200 000 and a million disks; a test compares them with what runs take. [bytes]
+  ! Measured with 200 000 and a million disks; a test compares them with real runs. [bytes]
   integer(int64), parameter :: per_disk = 240, per_growing_disk = 340, besides = 20000000
   integer(int64), parameter :: unlimited = huge(1_int64)
 
 contains
 
-  !> Refuses more disks than there is memory for.
+  !> Refuses more disks than fit in memory.
   subroutine check_memory(species, error)
     type(species_settings_t), intent(in) :: species(:)
     type(error_t), allocatable, intent(out) :: error
@@ -29,9 +30,9 @@ contains
       //megabytes(needed)//" of memory; "//limit//" leaves "//megabytes(available)//"; use fewer disks")
   end subroutine check_memory
 
-  !> The tightest of all limits: what the machine has free, what ulimit leaves, the control groups.
+  !> The tightest of all limits: free memory of the machine, ulimit, control groups.
   subroutine available_memory(root, bytes, limit)
-    character(len=*), intent(in) :: root                  !! empty, but in tests
+    character(len=*), intent(in) :: root                  !! empty except in tests
     integer(int64), intent(out) :: bytes
     character(len=:), allocatable, intent(out) :: limit   !! its name
     integer(int64) :: candidate
@@ -45,6 +46,7 @@ contains
       call consider(candidate - 1024*number_after("VmSize:", root//"/proc/self/status"), "ulimit -v")
     call consider(group_limit(root), "the control group")
   contains
+    !> Keeps the tighter limit.
     subroutine consider(value, name)
       integer(int64), intent(in) :: value
       character(len=*), intent(in) :: name
@@ -55,7 +57,7 @@ contains
     end subroutine consider
   end subroutine available_memory
 
-  !> The tightest limit of the control groups around this process, of the older or the newer kind.
+  !> The tightest limit of the control groups around this process, version 1 or 2.
   function group_limit(root) result(bytes)
     character(len=*), intent(in) :: root
     integer(int64) :: bytes
@@ -109,6 +111,7 @@ contains
     close (unit)
   end function number_after
 
+  !> A size for messages.
   pure function megabytes(bytes) result(text)
     integer(int64), intent(in) :: bytes
     character(len=:), allocatable :: text

@@ -10,6 +10,7 @@ module placement
   use dense_growth, only: grow_disks
   use disks, only: disk_t, species_t
   use errors, only: error_t, exit_usage, fail
+  use known_places, only: add_known, misfit_t, misfit_text, offset
   use last_frame, only: read_last_frame
   use packing, only: packing_t
   use position_file, only: read_positions
@@ -23,7 +24,6 @@ module placement
   public :: place_disks
 
   integer, parameter :: purpose = 1                         !! of this module's random streams
-  real(real64), parameter :: rounding = 1.0e-12_real64      !! relative, of disks that touch
   integer(int32), parameter :: many_trials = 500000         !! disks placed in all trials of 'random'
   integer(int32), parameter :: few = 5                      !! disks, the same where there are few of them
   real(real64), parameter :: nearly = 1.25_real64           !! so many times more may fit at another trial
@@ -67,15 +67,6 @@ contains
       disk(k)%x = packing%disk(k)%x
     end do
   end subroutine place_disks
-
-  !> Number of the disk before the first one of species s.
-  pure function offset(species, s) result(n)
-    type(species_settings_t), intent(in) :: species(:)
-    integer, intent(in) :: s
-    integer :: n
-
-    n = sum(species(:s - 1)%count)
-  end function offset
 
   !> Places a species whose positions are given, directly or by a rule.
   subroutine place_fixed(packing, species, s, disk, error)
@@ -124,55 +115,19 @@ contains
     integer, intent(in) :: s
     real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
     type(error_t), allocatable, intent(out) :: error
-    real(real64) :: lower(2), upper(2), slack
-    integer(int32) :: k, blocker
-
-    slack = rounding*(species(s)%radius + maxval(species%radius))
-    call centre_range(species(s)%region, packing%box, species(s)%radius, lower, upper)
-    call packing%open_species(int(s, int32), species(s)%radius, species(s)%count, &
-      minval(x(1:2, :), dim=2), maxval(x(1:2, :), dim=2))
-    do k = 1, species(s)%count
-      if (any(x(1:2, k) < lower - slack .or. x(1:2, k) > upper + slack)) then
-        call fail(error, exit_usage, disk_text(species, s, k)//" is not wholly in its region")
-        return
-      end if
-      call packing%find_blocker(x(1:2, k), [0.0_real64, 0.0_real64], species(s)%radius - slack, blocker)
-      if (blocker /= 0) then
-        call fail_overlap(packing, species, s, k, blocker, error)
-        return
-      end if
-      call packing%add(offset(species, s) + k, int(s, int32), x(1:2, k))
-    end do
-  end subroutine add_checked
-
-  !> A disk by its species and its number there, for messages.
-  pure function disk_text(species, s, k) result(text)
-    type(species_settings_t), intent(in) :: species(:)
-    integer, intent(in) :: s
-    integer(int32), intent(in) :: k
+    type(misfit_t), allocatable :: misfits(:)
     character(len=:), allocatable :: text
+    integer :: k
 
-    text = "species."//species(s)%name//".placement: disk "//written(k)
-  end function disk_text
-
-  !> Reports what disk k of species s overlaps.
-  subroutine fail_overlap(packing, species, s, k, blocker, error)
-    type(packing_t), intent(in) :: packing
-    type(species_settings_t), intent(in) :: species(:)
-    integer, intent(in) :: s
-    integer(int32), intent(in) :: k, blocker
-    type(error_t), allocatable, intent(out) :: error
-    integer :: other
-
-    if (blocker < 0) then
-      call fail(error, exit_usage, disk_text(species, s, k)//" is on the wrong side of obstacle """// &
-        packing%box%obstacle(-blocker)%name//'"')
-    else
-      other = packing%disk(blocker)%species
-      call fail(error, exit_usage, disk_text(species, s, k)//" overlaps disk "// &
-        written(blocker - offset(species, other))//" of """//species(other)%name//'"')
-    end if
-  end subroutine fail_overlap
+    call add_known(packing, species, s, x, misfits)
+    if (size(misfits) == 0) return
+    text = ""
+    do k = 1, size(misfits)
+      if (k > 1) text = text//new_line("a")
+      text = text//"species."//species(s)%name//".placement: "//misfit_text(packing, species, x, misfits(k))
+    end do
+    call fail(error, exit_usage, text)
+  end subroutine add_checked
 
   !> Places a species by random sequential insertion.
   subroutine place_at_random(packing, species, s, seed, error)

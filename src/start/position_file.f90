@@ -1,8 +1,9 @@
-!> Disks from a text file: a line `x y` or `x y vx vy` for each; empty lines and what follows a #
-!> are comments.
+!> Disks from a text file: a line `x y` or `x y vx vy` for each. Empty lines, and text from a # to the end
+!> of its line, are comments.
 module position_file
   use kinds, only: real64
   use errors, only: error_t, exit_files, exit_usage, fail
+  use input_text, only: byte_order_mark
   use input_values, only: read_real
   use texts, only: shown, written
   implicit none
@@ -13,7 +14,7 @@ module position_file
 
 contains
 
-  !> Reads `count` disks, no more and no less.
+  !> Reads exactly `count` disks.
   subroutine read_positions(path, count, n_columns, table, error)
     character(len=*), intent(in) :: path
     integer, intent(in) :: count
@@ -37,6 +38,7 @@ contains
       read (unit, "(a)", iostat=status, iomsg=reason) line
       if (status /= 0) exit
       number = number + 1
+      if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
       if (len_trim(line) == longest_line) then
         problem = "the line is too long"
       else
@@ -55,11 +57,11 @@ contains
     end if
   end subroutine read_positions
 
-  !> Appends the disk in a line, if there is one, to the table. Columns that are not needed are
-  !> checked, too.
+  !> Appends the disk of a line, if there is one, to the table. Columns that are not needed are also
+  !> checked.
   subroutine read_line(line, n, table, problem)
     character(len=*), intent(in) :: line
-    integer, intent(inout) :: n                             !! disks so far, whether they fit or not
+    integer, intent(inout) :: n                             !! disks so far, also those beyond the table
     real(real64), intent(inout) :: table(:, :)
     character(len=:), allocatable, intent(out) :: problem
     character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic_run import ROOT, run_script
 
-from read_run import Run, mdanalysis_universe, read_run
+from ricochet import Run, mdanalysis_universe, read_run
 
 
 def reader(module: str):
@@ -101,7 +101,7 @@ def test_analyses_of_mdanalysis_work_on_a_run(run):
 
 def test_csv_is_read_by_numpy(run):
     table = np.genfromtxt(
-        exported(run, "run.csv", "--every", 2), delimiter=",", names=True, dtype=None
+        exported(run, "run.csv", "--frames", "::2"), delimiter=",", names=True, dtype=None
     )
     frames = range(0, run.frames, 2)
     assert len(table) == len(frames) * run.count

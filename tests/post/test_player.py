@@ -15,7 +15,7 @@ import pytest
 from synthetic_run import maxwell_velocities, run_script, write_run
 
 import player
-from read_run import read_run
+from ricochet import read_run
 
 FLAGS = [
     "--headless",
@@ -66,7 +66,7 @@ def still_run(path, position, **more):
 
 def test_positions_keep_sixteen_bits(tmp_path, rng):
     run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, lower=(-1.0, 0.0), edges=(3.0, 2.0)))
-    facts, blocks = player.film(run, [0, 7], "speed", None)
+    facts, blocks = player.film(run, [0, 7], "speed", [])
     codes = np.frombuffer(blocks["positions"], "<u2").reshape(2, run.count, 2)
     back = np.array(facts["lower"]) + codes[1] / 65535 * np.array(facts["edges"])
     np.testing.assert_allclose(back, run.position[7], atol=3.0 / 65535)
@@ -80,7 +80,7 @@ def test_colours_span_their_scale():
 
 def test_speeds_and_energies_are_those_of_the_frame(tmp_path, rng):
     run = read_run(bouncing_gas(tmp_path / "gas.h5", rng))
-    facts, _ = player.film(run, [0, 20], "speed", None)
+    facts, _ = player.film(run, [0, 20], "speed", [])
     assert facts["kinetic"][1][1] == pytest.approx(run.kinetic_energy(20)[30:].mean(), rel=1e-6)
     assert facts["potential"] is None
     edges = np.linspace(0, facts["speeds"]["top"], player.BINS + 1)
@@ -103,7 +103,7 @@ def test_a_film_of_few_disks_and_many_frames_keeps_to_its_room(tmp_path, rng, mo
     run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, frames=1000, count=40))
     frames = list(range(player.frames_that_fit(run)))
     assert len(frames) < run.frames
-    page = player.page(run, *player.film(run, frames, "speed", None))
+    page = player.page(run, *player.film(run, frames, "speed", []))
     assert len(page) - len(player.PAGE.read_text()) < 1.05 * room
 
 
@@ -111,9 +111,16 @@ def test_frames_worked_on_together_give_what_one_by_one_gives(tmp_path, rng, mon
     image = rng.integers(-3, 3, (40, 60, 2))
     path = bouncing_gas(tmp_path / "gas.h5", rng, image=image, periodic=(True, True))
     run, frames = read_run(path), [0, 3, 4, 9, 39]
-    together = player.film(run, frames, "speed", None)
+    together = player.film(run, frames, "speed", [])
     monkeypatch.setattr(player, "MOST_AT_ONCE", 1)
-    assert player.film(run, frames, "speed", None) == together
+    assert player.film(run, frames, "speed", []) == together
+
+
+def test_walls_and_traced_disks_are_in_the_page(tmp_path):
+    walls = [((0.0, 0.25), (0.5, 0.0))]
+    run = read_run(still_run(tmp_path / "a.h5", np.full((2, 3, 2), 0.5), walls=walls))
+    facts, _ = player.film(run, [0, 1], "speed", [2, 0])
+    assert facts["walls"] == [[[0.0, 0.25], [0.5, 0.0]]] and facts["traced"] == [2, 0]
 
 
 def test_crossings_of_periodic_sides_are_counted(tmp_path):
@@ -121,7 +128,7 @@ def test_crossings_of_periodic_sides_are_counted(tmp_path):
     run = read_run(
         still_run(tmp_path / "a.h5", np.full((3, 1, 2), 0.5), image=image, periodic=(True, True))
     )
-    _, blocks = player.film(run, [0, 1, 2], "speed", None)
+    _, blocks = player.film(run, [0, 1, 2], "speed", [])
     assert [(code // 16 - 8, code % 16 - 8) for code in blocks["shifts"]] == [
         (0, 0),
         (1, -2),
@@ -133,7 +140,7 @@ def test_wrong_requests_are_answered_in_one_line(tmp_path, rng, capsys):
     path = bouncing_gas(tmp_path / "gas.h5", rng, collisions=None)
     for arguments, words in (
         (["-o", tmp_path / "a.mp4"], "a player ends in .html"),
-        (["--disk", 61], "no disk 61, there are 60"),
+        (["--disks", "1,61"], "no disk 61, there are 60"),
         (["--colour", "collisions"], "has no collisions per disk"),
     ):
         assert run_script("player", path, *arguments) == 2
@@ -335,9 +342,9 @@ def test_a_click_on_a_disk_shows_its_trace(opened):
         const clientY = box.top + yOf(12, 41) / view.dots;
         stage.dispatchEvent(new MouseEvent('click', {clientX, clientY}));"""
     )
-    chosen = opened.run("return state.disk")
+    chosen = opened.run("return state.traced")
     traced = stage(opened)
-    assert chosen == 41 and traced != plain
+    assert chosen == [41] and traced != plain
     assert "disk 42 (heavy)" in opened.run("return $('disk').textContent")
     opened.click("clear")
     assert stage(opened) == plain
@@ -389,6 +396,35 @@ def test_obstacles_are_drawn(browser, tmp_path):
     browser.open(tmp_path / "a.html")
     corner, inner, free = colours_at(browser, (0.03, 0.03), (0.5, 0.3), (0.25, 0.5))
     assert corner == inner != free
+
+
+def test_straight_walls_and_their_images_are_drawn(browser, tmp_path):
+    path = still_run(
+        tmp_path / "a.h5",
+        np.array([[[0.5, 0.8]]]),
+        walls=[((0.2, 0.3), (0.6, 0.3)), ((0.9, 0.6), (1.1, 0.6))],
+        periodic=(True, False),
+    )
+    assert run_script("player", path, "-o", tmp_path / "a.html") == 0
+    browser.open(tmp_path / "a.html")
+    free, first, second, image = colours_at(
+        browser, (0.4, 0.5), (0.4, 0.3), (0.95, 0.6), (0.05, 0.6)
+    )
+    assert first == second == image != free
+    assert browser.complaints() == []
+
+
+def test_several_disks_are_traced(browser, tmp_path, rng):
+    path = bouncing_gas(tmp_path / "gas.h5", rng)
+    assert run_script("player", path, "--disks", "3,42", "-o", tmp_path / "a.html") == 0
+    browser.open(tmp_path / "a.html")
+    browser.run("step(20)")
+    assert browser.run("return state.traced") == [2, 41]
+    lines = browser.run("return $('disk').innerText").splitlines()
+    assert [line.split(" at ")[0] for line in lines] == ["disk 3 (light)", "disk 42 (heavy)"]
+    both = stage(browser)
+    browser.run("trace([2])")
+    assert stage(browser) != both
 
 
 def test_light_and_dark_differ(opened):

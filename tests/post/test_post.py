@@ -9,7 +9,6 @@ from synthetic_run import maxwell_velocities, run_script, text, write_run
 
 import cooling
 import cost
-import crater
 import crater_scan
 import energy
 import equipartition
@@ -19,11 +18,10 @@ import lyapunov
 import missed
 import mixture
 import scattering
-import snapshot
 import speeds
-import theory
 import trajectory
-from read_run import RunError, read_run
+from ricochet import RunError, crater, read_run, statistics, theory, thermodynamics
+from ricochet.script import chosen_frames, frame_list
 
 
 @pytest.fixture
@@ -36,8 +34,8 @@ def rng():
 
 def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
     u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (20000, 2)), axis=1)
-    right = theory.hold_against(u, theory.maxwell_cdf)
-    wrong = theory.hold_against(1.02 * u, theory.maxwell_cdf)
+    right = statistics.hold_against(u, theory.maxwell_cdf)
+    wrong = statistics.hold_against(1.02 * u, theory.maxwell_cdf)
     assert right.ks_p > 0.01 and right.chi2_p > 0.01 and right.ks < 1.63 / np.sqrt(right.n)
     assert wrong.ks_p < 0.01 and wrong.chi2_p < 0.01
 
@@ -52,10 +50,10 @@ def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng):
     energies = rng.exponential(size=(40000, 5))  # two quadratic terms each: uniform on the simplex
     energies *= 5 / energies.sum(axis=1, keepdims=True)
     u = np.sqrt(energies[:, 0])
-    assert theory.hold_against(u, theory.finite_n_cdf(5)).ks_p > 0.01
-    again = theory.hold_against(np.repeat(u, 4), theory.finite_n_cdf(5), independent=len(u))
-    assert again == pytest.approx(theory.hold_against(u, theory.finite_n_cdf(5)), rel=0.02)
-    assert theory.hold_against(u, theory.maxwell_cdf).ks_p < 0.01
+    assert statistics.hold_against(u, theory.finite_n_cdf(5)).ks_p > 0.01
+    again = statistics.hold_against(np.repeat(u, 4), theory.finite_n_cdf(5), independent=len(u))
+    assert again == pytest.approx(statistics.hold_against(u, theory.finite_n_cdf(5)), rel=0.02)
+    assert statistics.hold_against(u, theory.maxwell_cdf).ks_p < 0.01
     largest = np.max(np.abs(theory.finite_n_cdf(100)(u) - theory.maxwell_cdf(u)))
     assert largest == pytest.approx(0.232 / 100, rel=0.02)
 
@@ -65,8 +63,8 @@ def test_finite_n_law_in_a_periodic_box(rng):
     v -= v.mean(axis=1, keepdims=True)
     k = np.sum(v**2, axis=2)
     u = np.sqrt(k[:, 0] / k.mean(axis=1))
-    assert theory.hold_against(u, theory.finite_n_cdf(4, periodic=True)).ks_p > 0.01
-    assert theory.hold_against(u, theory.finite_n_cdf(4)).ks_p < 0.01
+    assert statistics.hold_against(u, theory.finite_n_cdf(4, periodic=True)).ks_p > 0.01
+    assert statistics.hold_against(u, theory.finite_n_cdf(4)).ks_p < 0.01
 
 
 @pytest.mark.parametrize(
@@ -87,15 +85,15 @@ def test_scattering_angle(b, infinite, million):
 
 
 def test_excess_kurtosis(rng):
-    assert theory.excess_kurtosis(np.ones(10)) == -0.5
+    assert statistics.excess_kurtosis(np.ones(10)) == -0.5
     speed = np.linalg.norm(rng.normal(size=(200000, 2)), axis=1)
-    assert theory.excess_kurtosis(speed) == pytest.approx(0, abs=0.02)
+    assert statistics.excess_kurtosis(speed) == pytest.approx(0, abs=0.02)
 
 
 def test_estimate_has_the_error_of_the_mean():
-    mean, error = theory.estimate([1.0, 2.0, 3.0, 4.0])
+    mean, error = statistics.estimate([1.0, 2.0, 3.0, 4.0])
     assert (mean, error) == (2.5, pytest.approx(np.sqrt(5 / 3 / 4)))
-    assert np.isnan(theory.estimate([1.0]).error)
+    assert np.isnan(statistics.estimate([1.0]).error)
 
 
 def test_power_law_is_found_with_its_error(rng):
@@ -103,11 +101,11 @@ def test_power_law_is_found_with_its_error(rng):
     pulls = []
     for _ in range(200):
         error = 0.02 * 3 * x**0.7
-        fit = theory.fit_power_law(x, 3 * x**0.7 + error * rng.normal(size=10), error)
+        fit = statistics.fit_power_law(x, 3 * x**0.7 + error * rng.normal(size=10), error)
         pulls.append((fit.exponent - 0.7) / fit.exponent_error)
     assert abs(np.mean(pulls)) < 0.3 and 0.7 < np.std(pulls) < 1.3
     assert fit.factor == pytest.approx(3, abs=4 * fit.factor_error)
-    assert theory.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
+    assert statistics.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
 
 
 # --- gas and mixture ---
@@ -130,9 +128,9 @@ def gas(path, rng, count=200, frames=41, **more):
 
 def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
     run = read_run(gas(tmp_path / "gas.h5", rng))
-    assert speeds.equilibrium_frames(run, skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
-    assert speeds.equilibrium_frames(run, skip=39, apart=0) == [39, 40]
-    assert speeds.equilibrium_frames(run, skip=50, apart=5) == []
+    assert thermodynamics.equilibrium_frames(run, skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
+    assert thermodynamics.equilibrium_frames(run, skip=39, apart=0) == [39, 40]
+    assert thermodynamics.equilibrium_frames(run, skip=50, apart=5) == []
 
 
 def test_reduced_speeds_do_not_know_units(tmp_path, rng):
@@ -174,10 +172,10 @@ def test_mixture_table(tmp_path, rng):
         for k in (0, 1)
     ]
     result = mixture.table(runs, [list(range(1, 31))] * 2)
-    assert result["K_start"] == [0.5, 2.0] and result["v_start"] == [1, 1]
-    np.testing.assert_allclose(result["v_theory"], [1.401248, 0.700624], atol=1e-6)
-    np.testing.assert_allclose(result["K"], 1.25, rtol=0.02)
-    assert min(result["KS_p"]) > 1e-3
+    for row, kinetic, speed in zip(result, (0.5, 2.0), (1.401248, 0.700624), strict=True):
+        assert row["K_start"] == kinetic and row["v_start"] == 1
+        assert row["v_theory"] == pytest.approx(speed, abs=1e-6)
+        assert row["K"] == pytest.approx(1.25, rel=0.02) and row["KS_p"] > 1e-3
 
 
 def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
@@ -348,7 +346,7 @@ def test_scan_finds_its_base_and_its_points(tmp_path):
 
 def test_windows_are_means():
     time = np.arange(0, 10.01, 0.1)
-    middle, mean = equipartition.windows(time, time, 2.0)
+    middle, mean = statistics.windows(time, time, 2.0)
     np.testing.assert_allclose(middle, [1, 3, 5, 7, 9])
     np.testing.assert_allclose(mean, [0.95, 2.95, 4.95, 6.95, 8.95])
 
@@ -360,7 +358,7 @@ def test_thermalisation_time_ignores_a_passing_agreement():
     assert np.isnan(equipartition.thermalisation_time(time, np.ones(8), ratio + 1))
 
 
-def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=1.0):
+def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=15):
     """An ideal gas in equilibrium in the gravity box; `hits` pair collisions per frame."""
     mass, r = np.repeat([0.025, 0.05], 30), 0.04
     x = np.stack(
@@ -406,13 +404,15 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
 
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng))
-    species = [gravity.samples(run, name, 20.0) for name in run.names]
+    frames = thermodynamics.equilibrium_frames(run, 40)
+    assert frames == list(range(80, 400))
+    species = [gravity.samples(run, kind, frames) for kind in run.by_species]
     assert species[0].height.shape == (320, 30) and 0 <= species[0].height.min() < 0.01
-    result = gravity.table(run, species, 0.7)
-    for kind in ("speed", "height"):
-        np.testing.assert_allclose(result[f"{kind}_slope"], 1, atol=0.06)
-    np.testing.assert_allclose(result["K"], 0.7, rtol=0.03)
-    np.testing.assert_allclose(result["K_x"], 0.35, rtol=0.04)
+    for row in gravity.table(run, species, 0.7):
+        for kind in ("speed", "height"):
+            assert row[f"{kind}_slope"] == pytest.approx(1, abs=0.06)
+        assert row["K"] == pytest.approx(0.7, rel=0.03)
+        assert row["K_x"] == pytest.approx(0.35, rel=0.04)
 
 
 def test_slopes_are_fitted_in_the_range_that_is_asked_for(rng):
@@ -434,7 +434,7 @@ def test_crowded_disks_spread_upwards(tmp_path, rng):
     """To first order a small radius lowers the density by the area that is taken, times n."""
     run = read_run(falling(tmp_path / "run.h5", rng))
     h = np.linspace(0, 15.9, 4001)
-    species = [gravity.samples(run, name, 20.0) for name in run.names]
+    species = [gravity.samples(run, kind, list(range(80, 400))) for kind in run.by_species]
     points = [s._replace(radius=0.0) for s in species]
     ideal = gravity.crowded_heights(h, points, 9.81, 0.7, 8.0)
     dense = gravity.crowded_heights(h, species, 9.81, 0.7, 8.0)
@@ -490,36 +490,47 @@ def test_runs_with_equal_seeds_are_compared(tmp_path, rng):
 
     events = [made(1, 10, "events"), made(2, 20, "events"), made(3, 40, "events")]
     steps = [made(1, 9, "steps"), made(2, 16, "steps")]
-    rows = missed.compare(steps + events, 20.0)
+    rows = missed.compare(steps + events, 2.0)
     assert [row.dt for row in rows] == [0, 0.004] and [row.runs for row in rows] == [3, 2]
     assert rows[0].share.mean == 0 and rows[1].share.mean == pytest.approx(0.15)
     assert rows[1].share.error == pytest.approx(0.05)
     assert rows[1].rate.mean == pytest.approx(12.5 * 2 / 60 * 49 / 100)
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):
-            missed.compare(runs, 20.0)
+            missed.compare(runs, 2.0)
     with pytest.raises(RunError, match="ends before"):
-        missed.compare(steps + events, 100.0)
+        missed.compare(steps + events, 20.0)
 
 
 def test_equilibrium_values_are_means_over_the_second_half(tmp_path, rng):
     runs = [read_run(falling(tmp_path / f"{k}.h5", rng, temperature=k, seed=k)) for k in (1, 3)]
-    result = equipartition.tabulated([(0.5, runs)], [equipartition.approach(runs, 10, 0.1)])
-    assert result["runs"] == [2] and result["energy"][0] == pytest.approx(80 / 60)
+    (result,) = equipartition.table([(0.5, runs)], [equipartition.approach(runs, 10, 0.1)])
+    assert result["runs"] == 2 and result["energy"] == pytest.approx(80 / 60)
     for name, column in (("A", "K_light"), ("B", "K_heavy")):
         one, other = (run.observable(f"{name}/kinetic_energy").value[200:].mean() for run in runs)
-        assert result[column] == [pytest.approx((one + other) / 2)]
-        assert result[f"{column}_error"] == [pytest.approx((other - one) / 2)]
+        assert result[column] == pytest.approx((one + other) / 2)
+        assert result[f"{column}_error"] == pytest.approx((other - one) / 2)
 
 
 # --- frames, paths, export, cost ---
 
 
-def test_chosen_frames(tmp_path, rng):
+def test_frames_are_chosen_by_number_range_and_count(tmp_path, rng):
     run = read_run(gas(tmp_path / "gas.h5", rng, count=2))
-    assert snapshot.spread_frames(run, 1) == [0]
-    assert snapshot.spread_frames(run, 5) == [0, 10, 20, 30, 40]
-    assert snapshot.spread_frames(run, 1000) == list(range(41))
+    for which, count, chosen in (
+        (None, 1, [0]),
+        (None, 5, [0, 10, 20, 30, 40]),
+        (None, 1000, list(range(41))),
+        ("0,10,-1", None, [0, 10, 40]),
+        ("38:", None, [38, 39, 40]),
+        ("::20", None, [0, 20, 40]),
+        ("-2:,0", None, [39, 40, 0]),
+        ("10:21", 2, [10, 20]),
+    ):
+        assert chosen_frames(run, which and frame_list(which), count) == chosen
+    for which, problem in (("41", "no frame 41, there are 41"), ("50:", "no such frames")):
+        with pytest.raises(RunError, match=problem):
+            chosen_frames(run, frame_list(which), None)
 
 
 def test_paths_break_where_a_period_is_crossed(tmp_path):
@@ -533,7 +544,7 @@ def test_paths_break_where_a_period_is_crossed(tmp_path):
             image=np.array([[[0, 0]], [[1, 0]], [[1, 0]]]),
         )
     )
-    (path,) = trajectory.paths_of(run, [0])
+    (path,) = trajectory.paths_of(run, [0], [0, 1, 2])
     cut = [np.nan, np.nan]
     np.testing.assert_allclose(
         path, [[0.8, 0.5], [1.1, 0.5], cut, [-0.2, 0.5], [0.1, 0.5], [0.4, 0.5]]
@@ -559,7 +570,7 @@ def test_exports_keep_every_digit(tmp_path, rng):
     rows = np.array([line.split()[1:] for line in lines[2:]], dtype=float)
     np.testing.assert_array_equal(rows[:, :2], run.position[1])
     np.testing.assert_array_equal(rows[:, 2:4], run.velocity[1])
-    table = list(csv.DictReader("".join(export.exported(run, ".csv", 1)).splitlines()))
+    table = list(csv.DictReader("".join(export.exported(run, ".csv", [0, 1])).splitlines()))
     assert len(table) == 6 and table[3]["species"] == "a disk"
     assert float(table[5]["vy"]) == run.velocity[1][2, 1]
 
@@ -617,13 +628,13 @@ def neighbours(folder, rng, pairs=3, growth=2.0, frames=81):
 def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng):
     runs = [read_run(path) for path in neighbours(tmp_path, rng)]
     apart = np.array([lyapunov.distance(*runs[k : k + 2]) for k in (0, 2, 4)])
-    found = lyapunov.divergence(runs[0].time, apart, largest=0.01, skip=0.2)
+    found = lyapunov.divergence(runs[0].time, apart, largest=0.01, begin=0.2)
     np.testing.assert_allclose(found.slope, [1.9, 2.0, 2.1], atol=1e-3)
     assert found.exponent.mean == pytest.approx(2, abs=1e-3)
     assert found.exponent.error == pytest.approx(0.1 / 3**0.5, rel=0.02)
     assert found.end == pytest.approx(10.8), "the last frame before the first pair is 0.01 apart"
     with pytest.raises(RunError, match="nothing to fit"):
-        lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, skip=0.2)
+        lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, begin=0.2)
 
 
 def test_lyapunov_follows_disks_through_periodic_sides(tmp_path):
@@ -732,16 +743,17 @@ def runs_for(script, folder, rng):
         "lyapunov",
     ],
 )
-def test_script_draws_and_tabulates(tmp_path, rng, script):
+def test_script_draws_and_tabulates(tmp_path, rng, script, capsys):
     arguments = runs_for(script, tmp_path, rng)
-    table = [] if script in ("snapshot", "trajectory") else ["--csv", tmp_path / "new" / "a.csv"]
-    draw(script, *arguments, "-o", tmp_path / "deep" / "figure.png", *table)
-    data = (tmp_path / "deep" / "figure.png").read_bytes()
+    figure, table = tmp_path / "deep" / "figure.png", tmp_path / "new" / "a.csv"
+    draw(script, *arguments, "-o", figure, "--csv", table)
+    data = figure.read_bytes()
     assert data.startswith(b"\x89PNG") and len(data) > 10000
     assert b"ricochet" in data[:3000], "the source stands in the metadata"
-    if table:
-        rows = list(csv.reader(table[1].open()))
-        assert len(rows) > 1 and len({len(row) for row in rows}) == 1
+    rows = list(csv.reader(table.open()))
+    assert len(rows) > 1 and len({len(row) for row in rows}) == 1
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) > 1 and len(printed[0]) == len(printed[1]) > 10, "a table"
 
 
 def test_vector_figures_are_written_too(tmp_path, rng):
@@ -755,5 +767,5 @@ def test_animation_and_export_write_their_files(tmp_path, rng):
     path = gas(tmp_path / "gas.h5", rng, frames=4)
     draw("animate", path, "-o", tmp_path / "film.gif", "--fps", 10)
     assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF")
-    draw("export", path, "-o", tmp_path / "gas.xyz", "--every", 2)
+    draw("export", path, "-o", tmp_path / "gas.xyz", "--frames", "::2")
     assert (tmp_path / "gas.xyz").read_text().count("Lattice") == 2

@@ -10,10 +10,11 @@ from synthetic_run import run_script, write_run
 import correlations
 import equation_of_state
 import haff
-import hard_disks as hd
 import rates
-import thermodynamics
-from read_run import Events, RunError, read_run
+from ricochet import Events, RunError, read_run, statistics, thermodynamics
+from ricochet import hard_disks as hd
+from validation.estimators import force, hit_rate
+from validation.laws import cooling_ratio, luding, mixture_rates, mixture_z
 
 BULK = Path(__file__).resolve().parents[2] / "input" / "bulk.nml"
 PERIODIC = (True, True)
@@ -34,7 +35,7 @@ def written(path, position, velocity, **options):
 
 def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
     eta = 1e-4
-    for law in (hd.henderson, hd.luding):
+    for law in (hd.henderson, luding):
         assert (law(eta) - 1) / eta == pytest.approx(2, rel=1e-3)
     reduced = [1, 1, 0.78200444, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930, 0.0362193]
     virial = [b * 2**k for k, b in enumerate(reduced)]
@@ -42,7 +43,7 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
         series = np.polyval(virial[::-1], eta)
         assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
     np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
-    np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.luding(hd.FLUID[:, 0]), rtol=2e-3)
+    np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), luding(hd.FLUID[:, 0]), rtol=2e-3)
     assert hd.crystal(0.8) - hd.crystal(0.8, 100) == pytest.approx((hd.crystal(0.8) - 1) / 100)
     assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
 
@@ -50,21 +51,21 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
 def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
     diameter, count = 0.02, 1000
     eta = count * np.pi * diameter**2 / 4
-    rates = hd.mixture_rates([diameter, diameter], [300, 700], [1.0, 1.0])
+    w = mixture_rates([diameter, diameter], [300, 700], [1.0, 1.0])
     one = hd.collision_rate(hd.simulated(eta), diameter, 10**8)
-    np.testing.assert_allclose(rates.sum(axis=1), one, rtol=1e-6)
-    np.testing.assert_allclose(rates[:, 1] / rates[:, 0], 7 / 3)
-    unequal = hd.mixture_rates([0.02, 0.04], [300, 200], [1.0, 4.0])
+    np.testing.assert_allclose(w.sum(axis=1), one, rtol=1e-6)
+    np.testing.assert_allclose(w[:, 1] / w[:, 0], 7 / 3)
+    unequal = mixture_rates([0.02, 0.04], [300, 200], [1.0, 4.0])
     assert 300 * unequal[0, 1] == pytest.approx(200 * unequal[1, 0])
-    assert hd.mixture_z([diameter, diameter], [300, 700]) == pytest.approx(hd.simulated(eta))
+    assert mixture_z([diameter, diameter], [300, 700]) == pytest.approx(hd.simulated(eta))
 
 
 def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():
     assert hd.haff_by_time(0.01, 0.9) == pytest.approx(hd.haff_by_collisions(0.01, 0.9), rel=1e-4)
     assert hd.haff_by_time(5.0, 1.0) == hd.haff_by_collisions(5.0, 1.0) == 1
-    assert hd.cooling_ratio(1, 0.7) == pytest.approx(1) == hd.cooling_ratio(4, 1.0)
-    assert hd.cooling_ratio(4, 0.8) > hd.cooling_ratio(4, 0.9) > 1
-    assert hd.cooling_ratio(0.25, 0.8) == pytest.approx(1 / hd.cooling_ratio(4, 0.8))
+    assert cooling_ratio(1, 0.7) == pytest.approx(1) == cooling_ratio(4, 1.0)
+    assert cooling_ratio(4, 0.8) > cooling_ratio(4, 0.9) > 1
+    assert cooling_ratio(0.25, 0.8) == pytest.approx(1 / cooling_ratio(4, 0.8))
 
 
 # --- pressure ---
@@ -100,8 +101,8 @@ def test_three_pressures_of_a_steady_run(tmp_path):
     assert z.mean == pytest.approx(1 + 300 / 400) and z.error == pytest.approx(0, abs=1e-12)
     assert thermodynamics.z_wall(walled).mean == pytest.approx(900 * 0.98 / 400)
     assert thermodynamics.collision_rate(walled).mean == pytest.approx(10)
-    assert thermodynamics.hit_rate(walled).mean == pytest.approx(14)
-    assert thermodynamics.force(walled).mean == pytest.approx(450)
+    assert hit_rate(walled).mean == pytest.approx(14)
+    assert force(walled).mean == pytest.approx(450)
     unit = hd.collision_rate(2.0, 0.02, 100, 2.0)
     assert thermodynamics.z_rate(walled).mean == pytest.approx(1 + 10 / unit)
     bulk = steady(tmp_path / "bulk.h5", PERIODIC)
@@ -112,7 +113,7 @@ def test_three_pressures_of_a_steady_run(tmp_path):
 
 def test_errors_come_from_the_scatter_of_blocks(rng):
     amount = rng.poisson(1000, 2000).astype(float)
-    found = thermodynamics.ratio(amount, np.full(2000, 2.0))
+    found = statistics.ratio(amount, np.full(2000, 2.0))
     assert found.mean == pytest.approx(500, rel=0.01)
     assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(2000), rel=0.1)
 
@@ -263,7 +264,7 @@ def test_rates_of_a_gas_agree_with_each_other(bulk):
 
 
 def test_a_gas_cools_by_haff(bulk):
-    found = haff.curves([read_run(bulk[2])])
+    found = haff.means([read_run(bulk[2])])
     for x, y, law in (
         (found["time"], found["by_time"].mean, hd.haff_by_time),
         (found["tau"], found["by_collisions"].mean, hd.haff_by_collisions),

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
-from read_run import RunError, read_run
+from ricochet import RunError, read_run
 from whole_runs import FINISHED, MIXTURE, STOPPED, frames_in, wait_for, write_input
 
 
@@ -23,7 +23,7 @@ TINY = re.sub(r"count = \d+", "count = 2", MIXTURE).replace("time = 4", "time = 
 
 
 def bad_files(folder) -> dict[str, str]:
-    """Files that are no runs, each with the words that tell why."""
+    """Files that cannot be used, each with words of the message that says why."""
     good = write_run(folder / "good.h5", np.zeros((4, 50, 2)), np.zeros((4, 50, 2)))
     (folder / "empty.h5").touch()
     (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
@@ -174,7 +174,7 @@ RUNNING = {
         [MIXTURE.split("&contact")[0] + OUTPUT],
         {**dict.fromkeys(GENERIC, ()), "mixture": SOON},
     ),
-    "falling": ([FALLING + OUTPUT], {"gravity": ("--after", "1"), "equipartition": ()}),
+    "falling": ([FALLING + OUTPUT], {"gravity": ("--skip", "1"), "equipartition": ()}),
     "crater": ([CRATER + OUTPUT], {"crater": (), "crater_scan": ()}),
     "scattering": (
         [PAIR + "&species name = 'other' radius = 0.05 position = 0.8, 0.5 /\n" + OUTPUT],
@@ -188,7 +188,7 @@ RUNNING = {
     ),
     "steps": (
         [FALLING + OUTPUT, FALLING + "&run dynamics = 'steps' dt = 4e-3 /\n" + OUTPUT],
-        {"missed": ("--after", "1")},
+        {"missed": ("--skip", "1")},
     ),
 }
 ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
@@ -206,7 +206,7 @@ def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
         process.send_signal(signal.SIGSTOP)
     for script, options in scripts.items():
         figure = tmp_path / f"{script}.{ENDINGS.get(script, 'png')}"
-        few = ("--frames", "3") if script == "animate" else ()
+        few = ("--count", "3") if script == "animate" else ()
         assert run_script(script, *parts, "-o", figure, *options, *few) == 0, (
             capsys.readouterr().err
         )
@@ -223,7 +223,7 @@ def test_every_script_draws_a_running_simulation():
 def test_a_full_disk_is_one_line(unfinished, small_disk, capsys, ending):
     folder = small_disk(4)
     script = {"png": "snapshot", "csv": "export"} | {end: name for name, end in ENDINGS.items()}
-    few = ("--frames", "1") if ending == "gif" else ()
+    few = ("--count", "1") if ending == "gif" else ()
     assert run_script(script[ending], unfinished, "-o", folder / f"a.{ending}", *few) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == f"{script[ending]}.py: cannot write the output: No space left on device"

@@ -1,14 +1,17 @@
-"""post/read_run.py: what it reads, and what it says about files that it cannot read."""
+"""The reader of output files, and what all scripts answer to a wrong command line."""
 
+import shutil
 import subprocess
 import sys
+import venv
 
 import h5py
 import numpy as np
 import pytest
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
-from read_run import Obstacle, RunError, read_run
+from ricochet import Obstacle, RunError, read_run
+from ricochet.drawing import draw_box, plt
 
 
 @pytest.fixture
@@ -74,7 +77,7 @@ def test_frames_are_indexed_like_an_array(small):
 
 
 def frames_seen_by_another_program(path):
-    code = f"from read_run import read_run; print(read_run({str(path)!r}).frames)"
+    code = f"from ricochet import read_run; print(read_run({str(path)!r}).frames)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT / "post"
     )
@@ -113,6 +116,15 @@ def test_restitution_per_pair_of_species(tmp_path):
     [
         (["snapshot", "run.h5", "--cuont", "3"], "did you mean --count?"),
         (["snapshot", "run.h5", "--colour=sped"], "did you mean speed?"),
+        (["animate", "run.h5", "--frames", "3"], "--frames 3 is a single frame; use --count"),
+        (["player", "run.h5", "--frames=300"], "--frames 300 is a single frame; use --count"),
+        (["player", "run.h5", "--disk", "1"], "--disk is now --disks"),
+        (["export", "run.h5", "--every=2"], "--every is now --frames ::N"),
+        (["trajectory", "run.h5", "--first", "2"], "--first is now --frames 0:N"),
+        (["speeds", "run.h5", "--first", "2"], "--first is now --frames 0:N, or N: for"),
+        (["gravity", "run.h5", "--after", "20"], "--after is now --skip X"),
+        (["lyapunov", "run.h5", "--skip", "0.2"], "--skip is now --fit-from SHARE"),
+        (["haff", "run.h5", "--out", "a.png"], "unknown argument --out; did you mean --output?"),
         (["snapshot", "rum.h5"], "no such file; did you mean run.h5?"),
     ],
 )
@@ -126,12 +138,15 @@ def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, w
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (["snapshot", "--frames", "0,a"], "'0,a' is no list"),
-        (["snapshot", "--count", "0"], "'0' is no whole number above 0"),
-        (["animate", "--frames", "-3"], "'-3' is no whole number above 0"),
-        (["trajectory", "--disks", "one"], "'one' is no list"),
+        (["snapshot", "--frames", "0,a"], "'0,a' is not a list"),
+        (["snapshot", "--frames", "::0"], "'::0' is not a list"),
+        (["snapshot", "--frames", "0:1:1:1"], "'0:1:1:1' is not a list"),
+        (["snapshot", "--frames", "-4:-5,3"], "no frame 3, there are 3"),
+        (["snapshot", "--count", "0"], "'0' is not a whole number above 0"),
+        (["animate", "--count", "-3"], "'-3' is not a whole number above 0"),
+        (["trajectory", "--disks", "one"], "'one' is not a list"),
         (["trajectory", "--disks", "0"], "no disk 0"),
-        (["export", "--every", "0.5"], "'0.5' is no whole number above 0"),
+        (["export", "--count", "0.5"], "'0.5' is not a whole number above 0"),
     ],
 )
 def test_numbers_that_are_none_are_refused(small, capsys, wrong, words):
@@ -158,3 +173,39 @@ def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "new" / "a.png").exists()
+
+
+def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
+    """In a copy of what set-up reads, with a `.venv` that lacks no other package."""
+    package = "post/ricochet/__init__.py"
+    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    environment = tmp_path / ".venv"
+    venv.create(environment, symlinks=True)
+    (environment / "purposes").write_text("demo\n")
+    wanted = [tmp_path / "requirements.txt", tmp_path / "tests" / "readers.txt"]
+    (environment / "requirements.txt").write_text("".join(path.read_text() for path in wanted))
+    subprocess.run([tmp_path / ".ci" / "set-up", "demo"], check=True)
+    code = "from importlib.util import find_spec; print(find_spec('ricochet').origin)"
+    command = [environment / "bin" / "python", "-c", code]
+    found = subprocess.run(command, cwd="/", capture_output=True, text=True, check=True).stdout
+    assert found.strip() == str(tmp_path / package)
+
+
+def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
+    x = np.full((1, 1, 2), 0.5)
+    path = write_run(tmp_path / "none.h5", x, x)
+    assert read_run(path).walls.shape == (0, 2, 2)
+    walls = [((0.1, 0.2), (0.9, 0.4)), ((0.5, 0.0), (0.5, 0.3))]
+    for periodic, copies in (((False, False), 1), ((True, False), 3), ((True, True), 9)):
+        run = read_run(write_run(tmp_path / "run.h5", x, x, walls=walls, periodic=periodic))
+        np.testing.assert_array_equal(run.walls, walls)
+        axes = plt.figure().add_subplot()
+        draw_box(axes, run)
+        drawn = [line.get_xydata() for line in axes.lines[4:]]  # the sides come first
+        plt.close()
+        assert len(drawn) == 2 * copies
+        for wall in walls:
+            for i in (-1, 0, 1) if periodic[0] else (0,):
+                assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)

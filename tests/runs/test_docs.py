@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import textwrap
+import tomllib
 
 import numpy as np
 import pytest
@@ -121,6 +122,26 @@ def test_the_script_that_the_page_on_extending_shows_works(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
     subprocess.run(command, cwd=tmp_path, env=environment, check=True)
     assert (tmp_path / "fastest.png").exists()
+
+
+def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
+    page = (ROOT / "docs" / "output.md").read_text()
+    section = re.search(r"^## Reading it$(.*?)^## ", page, re.DOTALL | re.MULTILINE)[1]
+    code = "\n".join(line[4:] for line in section.splitlines() if line.startswith("    "))
+    assert "from ricochet import read_run" in code and "import h5py" in code
+    (tmp_path / "runs").mkdir()
+    still = np.zeros((2, 3, 2))
+    energies = {"all/kinetic_energy": [0.0, 0.0]}
+    write_run(tmp_path / "runs" / "gas.h5", still, still, observables=energies)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
+    assert (tmp_path / "runs" / "gas.png").exists()
+
+
+def test_the_package_has_the_version_of_the_program(program):
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    project = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
+    assert said.split()[1].strip(",") == project["version"]
 
 
 def completed(program, *words):

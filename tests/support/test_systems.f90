@@ -88,7 +88,7 @@ contains
         0.5_dp], [3, 3])
       sim%law%wall_restitution = 0.85_dp
     end if
-    sim%law%smooth_walls = has("smooth")
+    sim%law%wall_rule = merge(2, 1, has("smooth"))
     if (has("contact")) sim%law%contact_time = 0.01_dp
     call fill_lattice(sim, spacing, count([has("giant"), has("giants")]), stream)
     if (has("bed")) call lay_to_rest(sim%disk(2:))

@@ -4,10 +4,3 @@ A case is a line: the inputs it runs, how it is measured (a pure function of the
 reference, the tolerance, the source.  `python tests/validate.py` runs them; docs/validation.md is
 its report.
 """
-
-import sys
-from pathlib import Path
-
-POST = str(Path(__file__).resolve().parents[2] / "post")
-if POST not in sys.path:
-    sys.path.insert(0, POST)

@@ -4,7 +4,7 @@ from math import pi, radians
 
 import numpy as np
 
-from read_run import Run
+from ricochet import Run
 
 from .case import AT_MOST, Case, Member, relative, within
 from .inputs import EVERY_EVENT, disk, namelist

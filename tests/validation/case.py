@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from theory import Estimate
+from ricochet.statistics import Estimate
 
 
 @dataclass(frozen=True)

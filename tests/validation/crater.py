@@ -6,8 +6,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
-from read_run import Run
-from theory import estimate
+from ricochet import Run
+from ricochet.statistics import estimate
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, Tolerance, relative, within
 from .estimators import closest_gap, differences

@@ -5,10 +5,10 @@ Frames in single precision: seven digits of a velocity are more than enough here
 
 import numpy as np
 
-import hard_disks as hd
+from ricochet import hard_disks as hd
 from correlations import velocity_memory
-from read_run import Run
-from theory import estimate
+from ricochet import Run
+from ricochet.statistics import estimate
 
 from .case import Case, Member, within
 from .inputs import gas

@@ -5,13 +5,14 @@ from math import log, sqrt
 
 import numpy as np
 
-import hard_disks as hd
-from read_run import Run
-from theory import Estimate, estimate
+from ricochet import Run
+from ricochet import hard_disks as hd
+from ricochet.statistics import Estimate, estimate
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
 from .estimators import at_collisions
 from .inputs import PERIODIC, disk, gas, namelist
+from .laws import cooling_ratio
 
 # --- one kind of disk ---
 
@@ -211,7 +212,7 @@ MIXTURE = [
     *[
         Case(
             "P9-06", f"dilute periodic mixture, xi = {xi}: K_heavy / K_light",
-            mixtures(xi, seeds=64), temperature_ratio, hd.cooling_ratio(4, xi),
+            mixtures(xi, seeds=64), temperature_ratio, cooling_ratio(4, xi),
             relative(0.03), "Garzo and Dufty 1999; D",
         )
         for xi in (0.9, 0.8)

@@ -4,25 +4,15 @@ from math import gamma, pi, sqrt
 
 import numpy as np
 
-import hard_disks as hd
-from read_run import Run
-from theory import Estimate
-from thermodynamics import (
-    blocks,
-    collision_rate,
-    combined,
-    force,
-    hit_rate,
-    packing,
-    ratio,
-    z_rate,
-    z_virial,
-    z_wall,
-)
+from ricochet import Run
+from ricochet import hard_disks as hd
+from ricochet.statistics import Estimate, combined, ratio
+from ricochet.thermodynamics import blocks, collision_rate, packing, z_rate, z_virial, z_wall
 
 from .case import AT_LEAST, Case, Member, relative, sigmas, within
-from .estimators import closest_gap, over_runs, several
+from .estimators import closest_gap, force, hit_rate, over_runs, several
 from .inputs import PERIODIC, ROOT_2, gas, namelist
+from .laws import mixture_rates, mixture_z
 
 N = 1000
 
@@ -275,7 +265,7 @@ def two_radii(eta: float) -> tuple[Member, ...]:
 
 def mixed_z(eta: float) -> float:
     """Z of radii 1 : 1.4, half of each."""
-    return hd.mixture_z(2 * np.array(radii_for(eta, 1.4, N)), [N / 2, N / 2])
+    return mixture_z(2 * np.array(radii_for(eta, 1.4, N)), [N / 2, N / 2])
 
 
 SPECIES_RATES = tuple(
@@ -308,7 +298,7 @@ MIXTURES = [
     Case(
         "P7-07", "radii 1 : 2, masses 1 : 4, packing 0.1: w_ij",
         SPECIES_RATES, lambda *runs: over_runs(species_rates, runs),
-        hd.mixture_rates(2 * np.array(radii_for(0.1, 2, N)), [N / 2, N / 2], [1, 4]).ravel(),
+        mixture_rates(2 * np.array(radii_for(0.1, 2, N)), [N / 2, N / 2], [1, 4]).ravel(),
         relative(0.01), "section 7",
     ),
 ]  # fmt: skip

@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from read_run import Run
-from theory import Estimate, estimate
+from ricochet import Run
+from ricochet.statistics import Estimate, estimate, ratio
+from ricochet.thermodynamics import blocks
 
 
 def over_runs(measure, runs: tuple[Run, ...]) -> Estimate:
@@ -29,6 +30,18 @@ def several(estimates: list[Estimate]) -> Estimate:
 def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
     """An observable after so many collisions per disk."""
     return np.interp(tau, run.collisions_per_disk.value, run.observable(name).value)
+
+
+def hit_rate(run: Run) -> Estimate:
+    """Hits of all sides per time."""
+    b = blocks(run)
+    return ratio(b.hits, b.time)
+
+
+def force(run: Run) -> Estimate:
+    """Mean force on one side."""
+    b = blocks(run)
+    return ratio(b.impulse.mean(axis=1), b.time)
 
 
 def closest_gap(run: Run) -> float:

@@ -4,8 +4,8 @@ from math import acos, log, pi, sqrt
 
 import numpy as np
 
-from read_run import Run
-from theory import scattering_angle
+from ricochet import Run
+from ricochet.theory import scattering_angle
 
 from .case import AT_MOST, EXACT, Case, Member, relative, within
 from .inputs import EVERY_EVENT, disk, namelist

@@ -5,8 +5,9 @@ from math import asin, pi, sqrt
 import numpy as np
 from scipy.optimize import brentq
 
-from read_run import Run
-from theory import Estimate, estimate, hold_against, maxwell_cdf
+from ricochet import Run
+from ricochet.statistics import Estimate, estimate, hold_against
+from ricochet.theory import maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import middle, over_runs

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from read_run import Run, RunError, read_run
+from ricochet import Run, RunError, read_run
 
 from .case import Case, Member, Verdict, failed, judge
 
@@ -25,7 +25,7 @@ class Workshop:
         folder.mkdir(parents=True, exist_ok=True)
 
     def order(self, member: Member) -> Future:
-        """The future result of a member. What it needs is ordered first: nobody waits in vain."""
+        """The future result of a member. Members that it is made from are ordered first."""
         for earlier in member.after:
             self.order(earlier)
         if member not in self.futures:

@@ -5,9 +5,10 @@ from math import gamma, pi, sqrt
 import numpy as np
 from scipy import stats
 
-from read_run import Run
-from theory import Estimate, estimate, excess_kurtosis, finite_n_cdf, hold_against, maxwell_cdf
-from thermodynamics import temperature
+from ricochet import Run
+from ricochet.statistics import Estimate, estimate, excess_kurtosis, hold_against
+from ricochet.theory import finite_n_cdf, maxwell_cdf
+from ricochet.thermodynamics import temperature
 
 from .case import AT_MOST, Case, Member, Tolerance, relative, sigmas, within
 from .estimators import at_collisions, middle, over_runs

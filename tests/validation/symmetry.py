@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from read_run import Run
+from ricochet import Run
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, within
 from .estimators import closest_gap, differences

@@ -5,12 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from ricochet.statistics import Estimate
 from validation import report
 from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relative, sigmas, within
 from validation.running import validate
 from validation.tables import CASES
-
-from theory import Estimate  # isort: skip, validation knows where it is
 
 QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-03", "P9-09", "P9-1", "P10-01", "P10-07")
 QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07")

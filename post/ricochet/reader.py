@@ -1,15 +1,15 @@
-"""Read a Ricochet run: the only module that knows where things are in the HDF5 file.
+"""Read a Ricochet run: the only module that knows the layout of the HDF5 file.
 
-    from read_run import read_run
+    from ricochet import read_run
     run = read_run("runs/gas.h5")
     run.time                 # (T,)    times of the frames
-    run.position[-1]         # (N, 2)  one frame, read from the file when asked for
+    run.position[-1]         # (N, 2)  one frame, read from the file on demand
     run.speed(-1)            # (N,)    derived quantities take a frame, a slice or a list
     run.observable("all/kinetic_energy").value
 
-T frames of N disks.  All quantities are in the units of the input file ("reduced units").
-Frames are read on demand, so a file may be larger than the memory.  A file that is still
-being written (`.part`) is read up to its last committed frame.
+T frames, N disks, S species.  All quantities are in the units of the input file ("reduced units").
+Frames are read on demand, so a file may be larger than memory.  A file that is still being written
+(`.part`) is read up to its last committed frame.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,20 +38,38 @@ class Series(NamedTuple):
 
 
 class Events(NamedTuple):
-    """The event log: collisions of any kind in their order, (E,) each."""
+    """The event log: collisions of any kind in chronological order, (E,) each.
+
+    `j` is the id of the other disk, or 0, -1, -2, -3 for the left, right, bottom and top side, then
+    -4, -5, ... for the obstacles followed by the straight walls.
+    """
 
     time: np.ndarray
     i: np.ndarray  # id of a disk
-    j: np.ndarray  # its partner; 0, -1, -2, -3 left, right, bottom, top side, -4, ... obstacles
-    impulse: np.ndarray  # length of the change of momentum
+    j: np.ndarray
+    impulse: np.ndarray  # magnitude of the change of momentum
 
 
 class Obstacle(NamedTuple):
-    """A circular wall; `inside` tells that the disks are kept in."""
+    """A circular wall, which keeps disks out, or in (`inside`)."""
 
     centre: np.ndarray
     radius: float
     inside: bool
+
+
+class Species(NamedTuple):
+    """What the disks of one species have in common."""
+
+    name: str
+    mass: float
+    radius: float
+    disks: np.ndarray  # (N,) mask
+
+    @property
+    def label(self) -> str:
+        """Name and mass, for a legend."""
+        return f"{self.name}, m = {self.mass:g}"
 
 
 @dataclass(frozen=True)
@@ -66,27 +84,20 @@ class Frames:
         return self.count
 
     def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
-        backwards = False
-        if isinstance(frame, slice):
-            start, stop, step = frame.indices(self.count)
-            backwards = step < 0
-            if backwards:
-                picked = range(start, stop, step)[::-1]
-                start, stop, step = picked.start, picked.stop, picked.step
-            chosen = slice(start, max(start, stop), step)
-        else:
-            for one in frame if isinstance(frame, list) else [frame]:
-                if not -self.count <= one < self.count:
-                    raise RunError(f"{self.path}: no frame {one}, there are {self.count}")
-            chosen = np.mod(frame, self.count).tolist()
+        try:
+            chosen = np.arange(self.count)[frame]
+        except IndexError:
+            raise RunError(f"{self.path}: no frame {frame}, there are {self.count}") from None
+        steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
         with open_file(self.path) as file:
             data = file[f"{DISKS}/{self.name}/value"]
-            if isinstance(chosen, list):  # far faster than a list as index in h5py
+            if len(steps) == 1 and steps[0] > 0:
+                values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
+            elif chosen.ndim and chosen.size:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
             else:
-                values = data[chosen]
-        values = values.astype(float) if values.dtype.kind == "f" else values
-        return values[::-1] if backwards else values
+                values = data[chosen] if chosen.size else data[:0]
+        return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return (self[k] for k in range(self.count))
@@ -110,6 +121,7 @@ class Run:
     edges: np.ndarray  # (2,) lengths of the box
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
+    walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
     parameters: dict = field(repr=False)  # group -> variable -> value, as used
     provenance: dict = field(repr=False)
 
@@ -127,6 +139,15 @@ class Run:
     def upper(self) -> np.ndarray:
         """(2,) upper right corner of the box."""
         return self.lower + self.edges
+
+    @cached_property
+    def by_species(self) -> tuple[Species, ...]:
+        """The species in the order of the input file."""
+        masks = [self.of_species(name) for name in self.names]
+        return tuple(
+            Species(name, float(self.mass[mask][0]), float(self.radius[mask][0]), mask)
+            for name, mask in zip(self.names, masks, strict=True)
+        )
 
     def of_species(self, name: str) -> np.ndarray:
         """(N,) mask of the disks of one species."""
@@ -149,7 +170,7 @@ class Run:
         return self.position[frame] + self.image[frame] * self.edges
 
     def displacement(self, frame: int | slice | list[int], origin: int = 0) -> np.ndarray:
-        """(..., N) distance travelled as the crow flies since the frame `origin`."""
+        """(..., N) straight-line distance from the place in the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
     def observable(self, name: str) -> Series:
@@ -175,12 +196,12 @@ class Run:
 
     @cached_property
     def collisions_per_disk(self) -> Series:
-        """2 C / N with C the pair collisions since the start, at the times of the observables."""
+        """2 C / N, C the pair collisions since the start, at the times of the observables."""
         time, collisions = self.observable("collisions")
         return Series(time, 2 * collisions / self.count)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """The same at any times of the run, by linear interpolation."""
+        """The same at other times, by linear interpolation."""
         return np.interp(time, *self.collisions_per_disk)
 
     def parameter(self, group: str, variable: str, default: object = None) -> object:
@@ -196,8 +217,14 @@ class Run:
         return float(values[0]) if len(values) == 1 else np.nan
 
     @property
+    def time_step(self) -> float:
+        """The dt of a run by time steps; 0 for an event-driven one."""
+        steps = self.parameter("run", "dynamics", "events") == "steps"
+        return float(self.parameter("run", "dt")) if steps else 0.0
+
+    @property
     def seed(self) -> int:
-        """Seed of the random numbers."""
+        """Seed of the random number generator."""
         return int(self.parameter("run", "seed", self.parameters.get("seed", 0)))
 
     @property
@@ -216,7 +243,7 @@ def read_run(path: str | Path) -> Run:
 
 @contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file for reading; whatever turns out to be wrong with it is a RunError."""
+    """The HDF5 file for reading; any fault found in it becomes a RunError."""
     with hdf5_file(path) as file:
         try:
             yield file
@@ -253,7 +280,7 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
 
 
 def checked(data: h5py.Dataset, count: int, item: tuple[int, ...] | None = None) -> h5py.Dataset:
-    """A dataset of numbers, `count` or more, or of arrays of them of the shape `item`."""
+    """The dataset, if it holds at least `count` numbers, or arrays of the shape `item`."""
     usual = data.dtype.kind in "iuf" and data.dtype.itemsize <= 8
     if not usual or len(data) < count or item not in (None, data.shape[1:]):
         raise ValueError(f"{data.name}: not {count} numbers, or arrays of the shape {item}")
@@ -301,6 +328,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         edges=vector(box, "edges", None),
         periodic=np.array([plain(b) == "periodic" for b in box.attrs["boundary"]]),
         obstacles=obstacles_of(parameters.get("obstacle", {})),
+        walls=walls_of(parameters.get("wall", {})),
         parameters=parameters,
         provenance=tree(file["provenance"]) if "provenance" in file else {},
     )
@@ -328,6 +356,14 @@ def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
     )
 
 
+def walls_of(group: dict) -> np.ndarray:
+    """(W, 2, 2) the straight walls in /parameters/wall."""
+    if "from" not in group:
+        return np.empty((0, 2, 2))
+    ends = [np.reshape(group[end], (-1, 2)).astype(float) for end in ("from", "to")]
+    return np.stack(ends, axis=1)
+
+
 def vector(group: h5py.Group, name: str, default: np.ndarray | None) -> np.ndarray:
     """A small vector that is a dataset or an attribute."""
     if name in group:
@@ -346,7 +382,7 @@ def tree(group: h5py.Group) -> dict:
 
 
 def plain(value: object) -> object:
-    """Text instead of bytes, numbers instead of arrays without an axis."""
+    """Text instead of bytes, Python numbers instead of arrays without an axis."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").rstrip()
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
@@ -354,22 +390,3 @@ def plain(value: object) -> object:
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return plain(value.item())
     return value
-
-
-def mdanalysis_universe(run: Run):
-    """The run as an MDAnalysis Universe (needs the package MDAnalysis).
-
-    MDAnalysis knows three dimensions only: z = 0 is added.  Lengths and times keep their
-    numbers; the time between frames is their mean.  Selections go by species, such as
-    `u.select_atoms("type projectile")`; the analysis classes work on `u.trajectory`.
-    """
-    import MDAnalysis
-
-    universe = MDAnalysis.Universe.empty(run.count, trajectory=True, velocities=True)
-    flat = [np.pad(a[:], ((0, 0), (0, 0), (0, 1))) for a in (run.position, run.velocity)]
-    step = (run.time[-1] - run.time[0]) / (run.frames - 1) if run.frames > 1 else 1.0
-    universe.load_new(flat[0], velocities=flat[1], order="fac", dt=step)
-    universe.add_TopologyAttr("masses", run.mass)
-    universe.add_TopologyAttr("radii", run.radius)
-    universe.add_TopologyAttr("types", [run.names[s - 1] for s in run.species])
-    return universe

@@ -1,4 +1,4 @@
-"""What is known of hard disks: equation of state, collision rates, cooling, diffusion.
+"""Published results for hard disks: equation of state, collision rates, cooling, diffusion.
 
 eta = packing fraction, n = disks per area, s = diameter, m = mass, w = pair collisions per disk and
 time, chi = pair correlation at contact, Z = P / (n kT).
@@ -34,7 +34,7 @@ SHIFT = np.array(
 )
 CLOSE_PACKING = math.pi / math.sqrt(12)
 
-# Z (1 - eta)^2 hardly differs from 1: what lies between the points is safe.
+# Z (1 - eta)^2 is close to 1 and smooth, so interpolating it is safe.
 _smooth = CubicSpline(np.append(0, FLUID[:, 0]), np.append(1, FLUID[:, 1] * (1 - FLUID[:, 0]) ** 2))
 _shift = CubicSpline(np.append(0, FLUID[:10, 0]), np.append(0, SHIFT))
 
@@ -42,11 +42,6 @@ _shift = CubicSpline(np.append(0, FLUID[:10, 0]), np.append(0, SHIFT))
 def henderson(eta: np.ndarray) -> np.ndarray:
     """Z of the fluid by Henderson, Mol. Phys. 30, 971 (1975)."""
     return (1 + eta**2 / 8) / (1 - eta) ** 2
-
-
-def luding(eta: np.ndarray) -> np.ndarray:
-    """Z with the next term, Luding, Phys. Rev. E 63, 042201 (2001)."""
-    return henderson(eta) - eta**4 / (64 * (1 - eta) ** 4)
 
 
 def simulated(eta: np.ndarray) -> np.ndarray:
@@ -84,37 +79,8 @@ def finite_rate(free: int) -> float:
 
 
 def collision_rate(z: float, diameter: float, free: int, kt: float = 1.0, mass: float = 1.0):
-    """The w that belongs to Z."""
+    """The w that follows from Z."""
     return 4 * (z - 1) * finite_rate(free) / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
-
-
-def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
-    """chi_ij of a mixture, from that of equal disks at the same packing fraction.
-
-    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
-    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002). Good to a percent.
-    """
-    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
-    eta = math.pi / 4 * np.sum(n * s**2)
-    mean = np.sum(n * s) / np.sum(n * s**2)
-    pair = (s[:, None] + s) / 2
-    more = contact_value(float(simulated(eta)), eta) - 1 / (1 - eta)
-    return 1 / (1 - eta) + more * (s[:, None] * s / pair) * mean
-
-
-def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
-    """w_ij: collisions of a disk of species i with those of species j, per time."""
-    s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
-    pair = (s[:, None] + s) / 2
-    reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
-    return n * pair * mixture_contact(s, n) * np.sqrt(reduced)
-
-
-def mixture_z(diameters, density) -> float:
-    """Z of a mixture with the contact values above."""
-    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
-    pair, share = (s[:, None] + s) / 2, n / np.sum(n)
-    return float(1 + math.pi / 2 * np.sum(n) * share @ (pair**2 * mixture_contact(s, n)) @ share)
 
 
 def cooling_kurtosis(xi: float) -> float:
@@ -130,29 +96,6 @@ def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     """K / K0 after the time t, w0 = w at the start; Haff, J. Fluid Mech. 134, 401 (1983)."""
     return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
-
-
-def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
-    """T_heavy / T_light of a dilute cooling mixture of disks of equal size.
-
-    Both species cool at the same rate; rates with Maxwellian velocities as in Garzo and Dufty,
-    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` = heavy disks over all.
-    """
-    mass, part = np.array([1.0, mass_ratio]), np.array([1 - share, share])
-
-    def difference(ratio: float) -> float:
-        square = np.array([1.0, ratio]) / mass  # kT / m
-        opposite = mass / (mass[:, None] + mass)  # m_j / (m_i + m_j)
-        total = square[:, None] + square
-        gain = 1 - opposite * (1 + xi) / 2 * total / square[:, None]
-        rates = np.sum(part * opposite * np.sqrt(total) * gain, axis=1)
-        return rates[1] - rates[0]
-
-    low, high = 0.1, 10.0
-    while high - low > 1e-12:
-        middle = (low + high) / 2
-        low, high = (low, middle) if difference(middle) > 0 else (middle, high)
-    return (low + high) / 2
 
 
 def enskog_diffusion(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):

@@ -1,0 +1,14 @@
+"""Read and analyse the output files of Ricochet.
+
+    from ricochet import read_run
+    run = read_run("runs/gas.h5")
+
+`reader` opens files, `bridges` hands them to other programs; `statistics`, `theory`, `hard_disks`,
+`thermodynamics` and `crater` measure and compare; `drawing` draws disks and walls; `script` is what
+the command-line scripts share.
+"""
+
+from .bridges import mdanalysis_universe
+from .reader import Events, Obstacle, Run, RunError, Series, read_run
+
+__all__ = ["Events", "Obstacle", "Run", "RunError", "Series", "mdanalysis_universe", "read_run"]

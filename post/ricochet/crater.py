@@ -1,0 +1,86 @@
+"""A crater: the projectile, the bed, and the size of what the one did to the other.
+
+The projectile is the species of that name, or else the only disk that moves at the start; the
+others are the bed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from .reader import Run, RunError
+
+
+class Crater(NamedTuple):
+    """The size of a crater by four definitions, and how the run ended."""
+
+    hit: int
+    displaced: int
+    width: float
+    depth: float
+    energy_left: float  # over the energy at the start
+    time: float
+    collisions: int
+    wall_collisions: int
+
+
+def projectile(run: Run) -> int:
+    """Index of the projectile."""
+    if run.count < 2:
+        raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
+    if "projectile" in run.names:
+        return int(np.flatnonzero(run.of_species("projectile"))[0])
+    moving = np.flatnonzero(run.speed(0) > 0)
+    if len(moving) != 1:
+        raise RunError(f"{run.path}: no species 'projectile' and {len(moving)} disks that move")
+    return int(moving[0])
+
+
+def bed(run: Run) -> np.ndarray:
+    """(N,) mask of the disks at rest at the start."""
+    mask = np.ones(run.count, dtype=bool)
+    mask[projectile(run)] = False
+    return mask
+
+
+def displaced(run: Run, frame: int = -1) -> np.ndarray:
+    """(N,) mask of the bed disks further than their radius from their first position."""
+    return bed(run) & (run.displacement(frame) > run.radius)
+
+
+def crater(run: Run) -> Crater:
+    """The sizes of the crater in the last frame."""
+    if run.collisions is None:
+        raise RunError(f"{run.path}: has no collisions per disk")
+    moved, lying = displaced(run), bed(run)
+    start = run.position[0]
+    rim = np.max((start[:, 1] + run.radius)[lying])
+    bottom = np.min((start[:, 1] - run.radius)[moved], initial=rim)
+    return Crater(
+        hit=int(np.sum(run.collisions[-1][lying] > 0)),
+        displaced=int(moved.sum()),
+        width=float(np.ptp(start[moved, 0])) if moved.any() else 0.0,
+        depth=float(rim - bottom),
+        energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
+        time=float(run.time[-1]),
+        collisions=int(run.observable("collisions").value[-1]),
+        wall_collisions=int(run.observable("wall_collisions").value[-1].sum()),
+    )
+
+
+def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:
+    """Area fraction smoothed over a few disks: x and y of the cells and values (y, x)."""
+    here = bed(run)
+    side = run.edges.max() / cells
+    shape = np.maximum(1, np.round(run.edges / side)).astype(int)
+    limits = np.stack([run.lower, run.upper], axis=1)
+    area, xs, ys = np.histogram2d(
+        *run.position[frame][here].T,
+        bins=shape,
+        range=limits,
+        weights=np.pi * run.radius[here] ** 2,
+    )
+    smooth = gaussian_filter(area, 2.5 * np.median(run.radius[here]) / side, mode="reflect")
+    fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
+    return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, fraction

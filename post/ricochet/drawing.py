@@ -1,0 +1,154 @@
+"""Draw disks of true size, walls and obstacles with Matplotlib; save figures.
+
+`plt.style.use(drawing.STYLE)` gives a notebook the style of the scripts.
+"""
+
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from matplotlib.patches import Circle, Rectangle
+
+from .reader import Run, RunError
+
+STYLE = Path(__file__).with_name("style.mplstyle")
+COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
+WALL = {"color": "0.25", "linewidth": 1.2}
+
+#: What disks can be coloured by, apart from their species.
+LABELS = {
+    "speed": "speed (reduced units)",
+    "displacement": "displacement (reduced units)",
+    "collisions": "collisions so far",
+}
+
+
+def caption(runs: list[Run]) -> str:
+    """What a reader must know: number of disks, restitution, seeds."""
+    counts = sorted({run.count for run in runs})
+    parts = [f"N = {', '.join(map(str, counts))}"]
+    restitutions = sorted({run.restitution for run in runs})
+    if all(np.isfinite(restitutions)):
+        parts.append(f"ξ = {', '.join(f'{x:g}' for x in restitutions)}")
+    seeds = sorted({run.seed for run in runs})
+    parts.append(f"seed {seeds[0]}" if len(seeds) == 1 else f"{len(seeds)} seeds")
+    return ",  ".join(parts)
+
+
+def panel_grid(count: int, aspect: float) -> tuple[int, int]:
+    """Rows and columns for `count` panels of this height over width, wider than high."""
+    columns = int(np.clip(np.ceil(np.sqrt(count * aspect * 1.4)), 1, count))
+    rows = int(np.ceil(count / columns))
+    return rows, int(np.ceil(count / rows))
+
+
+def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
+    """(..., N) the number that colours each disk, see `LABELS`."""
+    if colour == "collisions":
+        return run.collisions[frame].astype(float)
+    return run.displacement(frame) if colour == "displacement" else run.speed(frame)
+
+
+def chosen_colour(run: Run, wish: str | None) -> str:
+    """The wish if the run has the data; without one by species where there are several."""
+    if wish == "collisions" and run.collisions is None:
+        raise RunError(f"{run.path}: has no collisions per disk")
+    return wish or ("species" if len(run.names) > 1 else "speed")
+
+
+def draw_box(axes: plt.Axes, run: Run) -> None:
+    """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners."""
+    (x0, y0), (x1, y1) = run.lower, run.upper
+    sides = (axes.axvline, x0, x1), (axes.axhline, y0, y1)
+    for (line, *ends), periodic in zip(sides, run.periodic, strict=True):
+        for end in ends:
+            line(end, ls="--" if periodic else "-", clip_on=False, zorder=3, **WALL)
+    for wall in run.walls:
+        for shift in periods(run):
+            axes.plot(*(wall + shift).T, zorder=3, **WALL)
+    for obstacle in run.obstacles:
+        if obstacle.inside:
+            axes.add_patch(Rectangle(run.lower, *run.edges, facecolor="0.85", zorder=0))
+        fill = "white" if obstacle.inside else "0.75"
+        for shift in periods(run):
+            centre = obstacle.centre + shift
+            axes.add_patch(
+                Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
+            )
+    axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1))
+    axes.set_xticks([x0, x1], [f"{x0:g}", f"{x1:g}"])
+    axes.set_yticks([y0, y1], [f"{y0:g}", f"{y1:g}"])
+    axes.set_xlabel("x", labelpad=-8)
+    axes.set_ylabel("y", labelpad=-8)
+    axes.tick_params(length=3)
+    axes.label_outer()
+    axes.spines[:].set_visible(False)
+
+
+def periods(run: Run) -> np.ndarray:
+    """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
+    along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
+    return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
+
+
+def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
+    """Disks of true size at `position` (N, 2); `array=` colours them by value."""
+    diameter = 2 * run.radius
+    style = {"linewidths": 0, **style}
+    collection = EllipseCollection(
+        diameter,
+        diameter,
+        np.zeros(run.count),
+        units="xy",
+        offsets=position,
+        offset_transform=axes.transData,
+        **style,
+    )
+    axes.add_collection(collection)
+    return collection
+
+
+def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
+    """A line with its standard error."""
+    axes.plot(x, y, **style)
+    axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
+
+
+def dilute_limit(axes: plt.Axes, points: np.ndarray, of: str = "") -> None:
+    """Points (P, 2) of a solution of the Boltzmann equation as open circles."""
+    label = f"{of}dilute limit (Boltzmann equation)"
+    axes.plot(*points.T, ls="", marker="o", mfc="none", color="black", label=label)
+
+
+def species_colours(run: Run) -> list[str]:
+    """A colour for each disk."""
+    return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
+
+
+def species_legend(figure: plt.Figure, run: Run) -> None:
+    """Which colour is which species, below all panels; nothing for a single one."""
+    handles = [
+        plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
+        for k in range(len(run.names))
+    ]
+    if len(run.names) > 1:
+        figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
+
+
+def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
+    """Write the figure, its source in the metadata; missing folders are made."""
+    sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
+    commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
+    origin = f"{sources} (ricochet {', '.join(commits)})"
+    keys = {
+        ".pdf": {"Title": title, "Subject": origin},
+        ".svg": {"Title": title, "Description": origin},
+        ".png": {"Title": title, "Description": origin},
+    }
+    if path.suffix not in keys:
+        raise RunError(f"{path}: a figure ends in {', '.join(keys)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, metadata=keys[path.suffix])
+    plt.close(figure)

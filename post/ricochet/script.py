@@ -1,0 +1,290 @@
+"""What the scripts in post/ share: options, the report at the end, exit codes.
+
+Figures are drawn without a display, in the style of `style.mplstyle`.
+"""
+
+import argparse
+import csv
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import NoReturn
+
+import matplotlib
+import numpy as np
+
+from .drawing import LABELS, STYLE, plt, save
+from .reader import Run, RunError, did_you_mean, read_run
+from .statistics import Estimate
+from .thermodynamics import equilibrium_frames
+
+matplotlib.use("Agg")
+plt.style.use(STYLE)
+
+Table = dict[str, Iterable] | list[dict]  # columns by name, or rows
+
+
+# --- options ---
+
+
+def one_of(*words: str) -> Callable[[str], str]:
+    """A word on the command line, one of a few."""
+
+    def chosen(text: str) -> str:
+        if text not in words:
+            hint = did_you_mean(text, words)
+            raise argparse.ArgumentTypeError(f"'{text}' is not one of {', '.join(words)}{hint}")
+        return text
+
+    return chosen
+
+
+def frame_list(text: str) -> tuple[int | slice, ...]:
+    """Frame numbers and ranges (first:end:step, as in Python) such as '0,10,-1' or '100:200'."""
+
+    def chosen(part: str) -> int | slice:
+        if ":" not in part:
+            return int(part)
+        frames = slice(*(int(number) if number else None for number in part.split(":")))
+        frames.indices(1)  # refuses a step of 0
+        return frames
+
+    try:
+        return tuple(map(chosen, text.split(",")))
+    except (TypeError, ValueError):
+        problem = f"'{text}' is not a list of frames such as 0,10,-1 or 100:200 or ::5"
+        raise argparse.ArgumentTypeError(problem) from None
+
+
+def disk_list(text: str) -> list[int]:
+    """Ids of disks such as '1,5,9'."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        problem = f"'{text}' is not a list of disks such as 1,5,9"
+        raise argparse.ArgumentTypeError(problem) from None
+
+
+def positive(text: str) -> int:
+    """A number of things on the command line."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+    return int(text)
+
+
+#: Options that several scripts have (type, value, meaning): a name means the same everywhere.
+OPTIONS = {
+    "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
+    "count": (positive, "N", "at most this many of the frames, evenly spread"),
+    "skip": (float, "X", "leave out the first X collisions per disk"),
+    "apart": (float, "X", "take frames at least X collisions per disk apart"),
+    "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
+    "colour": (
+        one_of("species", *LABELS),
+        "WHAT",
+        f"species, {', '.join(LABELS)} [species; speed if there is one]",
+    ),
+}
+
+#: Options of earlier versions, and what to write instead.
+FORMER = {
+    "--after": "--skip X",
+    "--disk": "--disks IDS",
+    "--every": "--frames ::N",
+    "--first": "--frames 0:N, or N: for all from N on",
+    "--skip": "--fit-from SHARE",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """Wants options in full, and answers a wrong one with the right one."""
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace=None) -> argparse.Namespace:
+        words = joined(sys.argv[1:] if args is None else args)
+        known, unknown = self.parse_known_args(words, namespace)
+        if unknown:
+            self.error(self.complaint(unknown[0].split("=")[0]))
+        return known
+
+    def complaint(self, word: str) -> str:
+        """What is wrong with a word that argparse could not place."""
+        former = FORMER.get(word)
+        if former and former.split()[0] in self._option_string_actions:
+            return f"{word} is now {former}"
+        return f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}"
+
+
+def joined(words: Iterable[str]) -> list[str]:
+    """The words, with a list such as '-10:' joined to its option, lest it be taken for one."""
+    result: list[str] = []
+    for word in words:
+        if re.fullmatch(r"-\d+[,:][-\d,:]*", word) and result and result[-1].startswith("--"):
+            result[-1] += f"={word}"
+        else:
+            result.append(word)
+    return result
+
+
+def command_line(doc: str, output: str, one: bool = False, csv: bool = True, **defaults) -> Parser:
+    """A parser whose help is the script's docstring and whose output has this default.
+
+    It takes `one` run or any number, --csv if there are numbers to write, and those of the shared
+    `OPTIONS` that are named, with their defaults (None: no default).
+    """
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
+    if one:
+        parser.add_argument("run", metavar="RUN.h5", help="file written by ricochet")
+    else:
+        parser.add_argument("runs", nargs="+", metavar="RUN.h5", help="files written by ricochet")
+    fixed = None if output.startswith("RUN") else Path(output)
+    parser.add_argument(
+        "-o",
+        "--output",
+        default=fixed,
+        type=Path,
+        metavar="FILE",
+        help=f"where to write [{output}]",
+    )
+    if csv:
+        parser.add_argument("--csv", type=Path, metavar="FILE", help="write the numbers to a table")
+    for name, default in defaults.items():
+        convert, value, meaning = OPTIONS[name]
+        meaning += "" if default is None else f" [{default:g}]"
+        parser.add_argument(f"--{name}", type=convert, default=default, metavar=value, help=meaning)
+    return parser
+
+
+def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | None) -> list[int]:
+    """Numbers of the frames of --frames [all], at most --count of them, evenly spread."""
+    frames: list[int] = []
+    for part in which if which is not None else [slice(None)]:
+        if isinstance(part, int) and not -run.frames <= part < run.frames:
+            raise RunError(f"{run.path}: no frame {part}, there are {run.frames}")
+        frames += np.atleast_1d(np.arange(run.frames)[part]).tolist()
+    if not frames:
+        raise RunError(f"{run.path}: no such frames, there are {run.frames}")
+    if count is None or count >= len(frames):
+        return frames
+    return [frames[k] for k in np.linspace(0, len(frames) - 1, count).round().astype(int)]
+
+
+def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
+    """Of --frames those after --skip and --apart; the last of them if none is that late."""
+    frames = chosen_frames(run, args.frames, None)
+    return equilibrium_frames(run, args.skip, args.apart, frames) or frames[-1:]
+
+
+def film_frames(run: Run, args: argparse.Namespace) -> list[int]:
+    """The frames of a film; a single number is refused, it would once have been their count."""
+    match args.frames:
+        case [int(number)] if run.frames > 1:
+            raise RunError(f"--frames {number} is a single frame; use --count for how many")
+    return chosen_frames(run, args.frames, args.count)
+
+
+def chosen_disks(run: Run, ids: list[int]) -> list[int]:
+    """Indices of the disks of --disks, whose ids count from 1."""
+    for number in ids:
+        if not 1 <= number <= run.count:
+            raise RunError(f"{run.path}: no disk {number}, there are {run.count}")
+    return [number - 1 for number in ids]
+
+
+def read_all(paths: Iterable[str]) -> list[Run]:
+    """The runs in the order given."""
+    return [read_run(path) for path in paths]
+
+
+def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
+    """Runs with the same value of `key` together, in ascending order."""
+    ordered = sorted(runs, key=key)
+    return [(value, list(group)) for value, group in groupby(ordered, key=key)]
+
+
+# --- the report ---
+
+
+def report(
+    args: argparse.Namespace,
+    runs: list[Run],
+    title: str,
+    figure: plt.Figure | None,
+    *tables: Table,
+    data: Table | None = None,
+) -> None:
+    """Print the tables, save the figure, write `data` (else the first table) to --csv."""
+    print("\n\n".join(text_of(table) for table in tables if table))
+    if figure is not None:
+        save(figure, args.output, runs, title)
+    if args.csv:
+        write_csv(args.csv, tables[0] if data is None else data)
+
+
+def measured(name: str, estimate: Estimate) -> dict[str, float]:
+    """Two cells of a row: a mean and its standard error."""
+    return {name: float(estimate.mean), f"{name}_error": float(estimate.error)}
+
+
+def columns(table: Table) -> dict[str, Iterable]:
+    """A table by columns; rows must have the same keys."""
+    if isinstance(table, dict):
+        return table
+    return {name: [row[name] for row in table] for name in (table[0] if table else ())}
+
+
+def write_csv(path: Path, table: Table) -> None:
+    """A table with one header line; numbers keep all their digits."""
+    table = columns(table)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+
+
+def text_of(table: Table) -> str:
+    """A table for people: aligned, six digits."""
+    table = columns(table)
+    rows = [
+        [f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
+        for row in zip(*table.values(), strict=True)
+    ]
+    widths = [max(map(len, column)) for column in zip(table, *rows, strict=True)]
+    lines = (
+        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        for row in (table, *rows)
+    )
+    return "\n".join(lines)
+
+
+# --- how a script ends ---
+
+
+def launch(main: Callable[[], None]) -> None:
+    """Run a script; whatever it cannot use is one line on stderr and exit code 2.
+
+    That includes numbers it can make no sense of: `python -X dev` shows where.
+    """
+    name = Path(sys.argv[0]).name
+    try:
+        main()
+    except RunError as problem:
+        give_up(name, str(problem))
+    except OSError as problem:  # without a name: while writing, on a full disk
+        give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
+    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as problem:
+        if sys.flags.dev_mode:
+            raise
+        give_up(name, f"cannot make sense of {' '.join(sys.argv[1:])}: {problem!r}")
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+def give_up(name: str, reason: str) -> NoReturn:
+    """Exit code 2 and one line."""
+    print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
+    sys.exit(2)

@@ -1,0 +1,171 @@
+!> Whether the system of an input fits together: obstacles and regions in the box, disks in their regions,
+!> and explicit disks beside each other. What is wrong is reported with the line of the input.
+module input_fit
+  use kinds, only: int32, pi, real64
+  use box_geometry, only: box_t, obstacle_t
+  use input_problems, only: problem_list_t
+  use known_places, only: add_known, misfit_t, misfit_text
+  use packing, only: packing_t
+  use parameter_values, only: parameter_group_t, range_of
+  use regular_places, only: spans
+  use settings, only: settings_t, species_settings_t
+  use texts, only: written
+  implicit none
+  private
+  public :: check_fit
+
+  real(real64), parameter :: rounding = 1.0e-12_real64        !! relative, of touching disks
+  real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
+  real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
+  real(real64), parameter :: closest_packing = 0.9068_real64  !! pi/sqrt(12), triangular lattice
+
+contains
+
+  !> Checks every species that is known well enough; the others have been reported already.
+  subroutine check_fit(settings, groups, problems)
+    type(settings_t), intent(in) :: settings                  !! empty if the text could not be understood
+    type(parameter_group_t), intent(in) :: groups(:)
+    type(problem_list_t), intent(inout) :: problems
+    type(species_settings_t), allocatable :: species(:)
+    logical :: sound
+    integer :: o(2), s(2), k
+
+    if (.not. allocated(settings%species)) return
+    if (any(settings%box%lower >= settings%box%upper)) return
+    o = range_of(groups, "obstacle")
+    s = range_of(groups, "species")
+    associate (box => settings%box)
+      do k = 1, size(box%obstacle)
+        call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
+      end do
+      species = settings%species
+      do k = 1, size(species)
+        call check_species(groups(s(1) + k - 1), species(k), box, problems, sound)
+        sound = sound .and. species(k)%placement == "explicit" .and. size(species(k)%position, 2) == species(k)%count
+        if (sound) cycle
+        species(k)%count = 0
+        species(k)%radius = 0
+      end do
+      call check_positions(groups(s(1):s(2)), species, box, problems)
+    end associate
+  end subroutine check_fit
+
+  !> What an obstacle itself finds wrong with its place in the box.
+  subroutine check_obstacle(group, obstacle, box, problems)
+    type(parameter_group_t), intent(in) :: group
+    type(obstacle_t), intent(in) :: obstacle
+    type(box_t), intent(in) :: box
+    type(problem_list_t), intent(inout) :: problems
+    character(len=:), allocatable :: misfit              ! variable: what
+    integer :: colon
+
+    misfit = obstacle%shape%misfit(box%lower, box%upper, box%periodic)
+    colon = index(misfit, ": ")
+    if (colon > 0) call group%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
+  end subroutine check_obstacle
+
+  !> A species must have room: in its region, in a period, and in every container.
+  subroutine check_species(group, s, box, problems, sound)
+    type(parameter_group_t), intent(in) :: group
+    type(species_settings_t), intent(in) :: s
+    type(box_t), intent(in) :: box
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(out) :: sound
+    integer :: axis, k
+
+    sound = .false.
+    if (s%radius <= 0 .or. s%count < 1 .or. group%faulty("region")) return
+    do axis = 1, 2
+      call check_axis(group, s, box, axis, problems, sound)
+      if (.not. sound) return
+    end do
+    call check_fraction(group, s, problems)
+    do k = 1, size(box%obstacle)
+      associate (shape => box%obstacle(k)%shape)
+        if (shape%encloses .and. any(shape%extent() <= s%radius)) call group%complain("radius", "a disk of radius "// &
+          written(s%radius)//" does not fit in obstacle """//box%obstacle(k)%name//'"', problems)
+      end associate
+    end do
+  end subroutine check_species
+
+  !> Along each axis the region must lie in the box and hold a disk; a period must hold two.
+  subroutine check_axis(group, s, box, axis, problems, sound)
+    type(parameter_group_t), intent(in) :: group
+    type(species_settings_t), intent(in) :: s
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: axis
+    type(problem_list_t), intent(inout) :: problems
+    logical, intent(out) :: sound
+    logical :: endless(2)
+    real(real64) :: lower, upper, farthest
+
+    sound = .false.
+    endless = spans(s%region, box)
+    lower = s%region(2*axis - 1)
+    upper = s%region(2*axis)
+    farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
+    if (lower >= upper) then
+      call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
+    else if (lower < box%lower(axis) .or. upper > box%upper(axis)) then
+      call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
+    else if (.not. endless(axis) .and. 2*s%radius > (upper - lower)*(1 + rounding)) then
+      call complain("radius", "a disk of diameter "//written(2*s%radius)// &
+        " does not fit in its region of width "//written(upper - lower))
+    else if (box%periodic(axis) .and. 4*s%radius > box%upper(axis) - box%lower(axis)) then
+      call complain("radius", "a periodic box must be at least two diameters wide: "// &
+        written(4*s%radius)//" > "//written(box%upper(axis) - box%lower(axis)))
+    else if (s%radius < resolution*farthest) then
+      call complain("radius", written(s%radius)//" is too small to be resolved at coordinates of "//written(farthest))
+    else
+      sound = .true.
+    end if
+  contains
+    !> Reports the axis, too.
+    subroutine complain(variable, what)
+      character(len=*), intent(in) :: variable, what
+
+      call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
+    end subroutine complain
+  end subroutine check_axis
+
+  !> No placement can exceed its densest packing.
+  subroutine check_fraction(group, s, problems)
+    type(parameter_group_t), intent(in) :: group
+    type(species_settings_t), intent(in) :: s
+    type(problem_list_t), intent(inout) :: problems
+    real(real64) :: packing
+    character(len=:), allocatable :: variable, filled
+
+    packing = s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))
+    variable = "radius"
+    if (group%given("packing_fraction")) variable = "packing_fraction"
+    filled = "the disks would fill "//written(packing)//" of their region; "
+    if (packing > closest_packing) then
+      call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
+    else if (packing > random_limit .and. s%placement == "random") then
+      call group%complain(variable, filled//"random placement reaches "//written(random_limit)// &
+        ", placement = 'dense' more", problems)
+    end if
+  end subroutine check_fraction
+
+  !> Explicit disks must be in their regions, clear of obstacles and of each other.
+  subroutine check_positions(groups, species, box, problems)
+    type(parameter_group_t), intent(in) :: groups(:)          !! the species
+    type(species_settings_t), intent(in) :: species(:)        !! those without count are left out
+    type(box_t), intent(in) :: box
+    type(problem_list_t), intent(inout) :: problems
+    type(packing_t) :: packing
+    type(misfit_t), allocatable :: misfits(:)
+    integer :: s, k
+
+    packing = packing_t(box, sum(species%count), size(species))
+    do s = 1, size(species)
+      if (species(s)%count == 0) cycle
+      call add_known(packing, species, s, species(s)%position, misfits)
+      do k = 1, size(misfits)
+        call groups(s)%complain("position", misfit_text(packing, species, species(s)%position, misfits(k)), problems)
+      end do
+    end do
+  end subroutine check_positions
+
+end module input_fit

@@ -1,0 +1,89 @@
+!> Disks at places that are known before: whether each of them fits.
+module known_places
+  use kinds, only: int32, real64
+  use packing, only: packing_t
+  use regular_places, only: centre_range
+  use settings, only: species_settings_t
+  use texts, only: written
+  implicit none
+  private
+  public :: add_known, misfit_t, misfit_text, offset
+
+  integer, parameter :: most_reports = 5                    !! of a kind, for one species
+  real(real64), parameter :: rounding = 1.0e-12_real64      !! relative, of disks that touch
+
+  !> A disk that does not fit.
+  type :: misfit_t
+    integer(int32) :: disk                                  !! its number in its species
+    integer(int32) :: blocker                               !! as in `packing%find_blocker`; 0: its region ends
+  end type misfit_t
+
+contains
+
+  !> Number of the disk before the first one of species s.
+  pure function offset(species, s) result(n)
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer :: n
+
+    n = sum(species(:s - 1)%count)
+  end function offset
+
+  !> Adds a species at known places. Disks that overlap others are added all the same and listed, as are
+  !> those, not added, that are not wholly in their region.
+  pure subroutine add_known(packing, species, s, x, misfits)
+    type(packing_t), intent(inout) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    type(misfit_t), allocatable, intent(out) :: misfits(:)
+    real(real64) :: lower(2), upper(2), slack
+    integer(int32) :: k, blocker
+    logical :: outside
+
+    allocate (misfits(0))
+    associate (radius => species(s)%radius)
+      slack = rounding*(radius + maxval(species%radius))
+      call centre_range(species(s)%region, packing%box, radius, lower, upper)
+      lower = lower - slack
+      upper = upper + slack
+      call packing%open_species(int(s, int32), radius, species(s)%count, &
+        min(max(minval(x(1:2, :), dim=2), lower), upper), max(min(maxval(x(1:2, :), dim=2), upper), lower))
+      do k = 1, species(s)%count
+        blocker = 0
+        outside = any(x(1:2, k) < lower .or. x(1:2, k) > upper)
+        if (.not. outside) then
+          call packing%find_blocker(x(1:2, k), [0.0_real64, 0.0_real64], radius - slack, blocker)
+          call packing%add(offset(species, s) + k, int(s, int32), x(1:2, k))
+        end if
+        if (.not. outside .and. blocker == 0) cycle
+        if (count((misfits%blocker > 0) .eqv. (blocker > 0)) == most_reports) cycle
+        misfits = [misfits, misfit_t(k, blocker)]
+        if (size(misfits) == 2*most_reports) return
+      end do
+    end associate
+  end subroutine add_known
+
+  !> What is wrong with a disk.
+  pure function misfit_text(packing, species, x, misfit) result(text)
+    type(packing_t), intent(in) :: packing
+    type(species_settings_t), intent(in) :: species(:)
+    real(real64), intent(in) :: x(:, :)                     !! of its species [length]
+    type(misfit_t), intent(in) :: misfit
+    character(len=:), allocatable :: text
+    integer :: other
+
+    text = "disk "//written(misfit%disk)//" at "//written(x(1, misfit%disk))//", "//written(x(2, misfit%disk))
+    if (misfit%blocker == 0) then
+      text = text//" is not wholly in its region"
+    else if (misfit%blocker < 0) then
+      text = text//" overlaps, or is on the wrong side of, obstacle """// &
+        packing%box%obstacle(-misfit%blocker)%name//'"'
+    else
+      other = packing%disk(misfit%blocker)%species
+      text = text//" overlaps disk "//written(misfit%blocker - offset(species, other))// &
+        " of """//species(other)%name//'"'
+    end if
+  end function misfit_text
+
+end module known_places

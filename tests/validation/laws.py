@@ -1,0 +1,61 @@
+"""Published laws that only the validation compares with; symbols as in `ricochet.hard_disks`."""
+
+import math
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ricochet import hard_disks as hd
+
+
+def luding(eta: np.ndarray) -> np.ndarray:
+    """Z with the next term, Luding, Phys. Rev. E 63, 042201 (2001)."""
+    return hd.henderson(eta) - eta**4 / (64 * (1 - eta) ** 4)
+
+
+def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
+    """chi_ij of a mixture, from that of equal disks at the same packing fraction.
+
+    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
+    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002). Good to a percent.
+    """
+    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
+    eta = math.pi / 4 * np.sum(n * s**2)
+    mean = np.sum(n * s) / np.sum(n * s**2)
+    pair = (s[:, None] + s) / 2
+    more = hd.contact_value(float(hd.simulated(eta)), eta) - 1 / (1 - eta)
+    return 1 / (1 - eta) + more * (s[:, None] * s / pair) * mean
+
+
+def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
+    """w_ij: collisions of a disk of species i with those of species j, per time."""
+    s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
+    pair = (s[:, None] + s) / 2
+    reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
+    return n * pair * mixture_contact(s, n) * np.sqrt(reduced)
+
+
+def mixture_z(diameters, density) -> float:
+    """Z of a mixture with the contact values above."""
+    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
+    pair, share = (s[:, None] + s) / 2, n / np.sum(n)
+    return float(1 + math.pi / 2 * np.sum(n) * share @ (pair**2 * mixture_contact(s, n)) @ share)
+
+
+def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
+    """T_heavy / T_light of a dilute cooling mixture of disks of equal size.
+
+    Both species cool at the same rate; rates with Maxwellian velocities as in Garzo and Dufty,
+    Phys. Rev. E 60, 5706 (1999), here in two dimensions.  `share` = heavy disks over all.
+    """
+    mass, part = np.array([1.0, mass_ratio]), np.array([1 - share, share])
+
+    def difference(ratio: float) -> float:
+        square = np.array([1.0, ratio]) / mass  # kT / m
+        opposite = mass / (mass[:, None] + mass)  # m_j / (m_i + m_j)
+        total = square[:, None] + square
+        gain = 1 - opposite * (1 + xi) / 2 * total / square[:, None]
+        rates = np.sum(part * opposite * np.sqrt(total) * gain, axis=1)
+        return rates[1] - rates[0]
+
+    return float(brentq(difference, 0.1, 10.0, xtol=1e-13))
