@@ -1,14 +1,14 @@
 !> From the values of the input to `settings`: what follows from what, and what contradicts what.
 module input_settings
   use kinds, only: int64, never, real64
-  use box_geometry, only: box_t, obstacle_t
-  use circles, only: new_circle
+  use box_geometry, only: box_t
   use collisions, only: contact_law_t, wall_rules
+  use input_obstacles, only: take_obstacles
   use input_problems, only: problem_list_t
-  use input_species, only: check_name, take_species
+  use input_species, only: take_species
   use input_values, only: counted
   use parameter_values, only: parameter_group_t, range_of
-  use parameters, only: row_of, words_of
+  use parameters, only: obstacle_groups, row_of, words_of
   use settings, only: output_settings_t, run_settings_t, settings_t
   use stop_rules, only: stop_settings_t
   use texts, only: place_of, written
@@ -28,8 +28,8 @@ contains
     type(problem_list_t), intent(inout) :: problems
     integer :: o(2), s(2)
 
-    o = range_of(groups, "obstacle")
-    s = range_of(groups, "species")
+    o = range_of(groups, obstacle_groups)
+    s = range_of(groups, ["species"])
     call take_run(groups(place_of("run", groups%name)), settings%run, problems)
     call take_box(groups(place_of("box", groups%name)), settings%box, problems)
     call take_obstacles(groups(o(1):o(2)), settings%box%obstacle, problems)
@@ -75,29 +75,6 @@ contains
         " is not above box.lower, "//written(box%lower(axis))//", along "//merge("x", "y", axis == 1), problems)
     end do
   end subroutine take_box
-
-  !> From obstacle groups to obstacles; none if one of them is incomplete.
-  subroutine take_obstacles(groups, obstacles, problems)
-    type(parameter_group_t), intent(in) :: groups(:)
-    type(obstacle_t), allocatable, intent(out) :: obstacles(:)
-    type(problem_list_t), intent(inout) :: problems
-    logical :: complete
-    integer :: k
-
-    complete = .true.
-    do k = 1, size(groups)
-      call check_name(groups, k, problems)
-      call groups(k)%demand("centre", problems)
-      call groups(k)%demand("radius", problems)
-      complete = complete .and. size(groups(k)%reals_of("centre")) > 0 .and. size(groups(k)%reals_of("radius")) > 0
-    end do
-    allocate (obstacles(merge(size(groups), 0, complete)))
-    do k = 1, size(obstacles)
-      obstacles(k)%name = trim(groups(k)%instance)
-      allocate (obstacles(k)%shape, source=new_circle(groups(k)%reals_of("centre"), &
-        groups(k)%real_of("radius", 0.0_real64), encloses=groups(k)%text_of("side") == "inside"))
-    end do
-  end subroutine take_obstacles
 
   !> Restitution by pair of species, and the rule for walls.
   subroutine take_contact(group, n, law, problems)

@@ -4,7 +4,7 @@ module parameter_values
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
   use parameters, only: allowed, name_length, row_of, table
-  use texts, only: place_of, written, written_exactly
+  use texts, only: written, written_exactly
   implicit none
   private
   public :: parameter_value_t, parameter_group_t, text_length, range_of, values_text
@@ -198,14 +198,16 @@ contains
     end associate
   end subroutine demand
 
-  !> First and last of the groups of one name; if there are none, the last comes before the first.
-  pure function range_of(groups, name) result(range)
-    type(parameter_group_t), intent(in) :: groups(:)   !! those of one name side by side
-    character(len=*), intent(in) :: name
-    integer :: range(2)
+  !> First and last of the groups of some names; if there are none, the last comes before the first.
+  pure function range_of(groups, names) result(range)
+    type(parameter_group_t), intent(in) :: groups(:)   !! in the order of the table
+    character(len=*), intent(in) :: names(:)           !! neighbours in the table
+    integer :: range(2), k
+    logical :: named(size(groups))
 
-    range(1) = max(place_of(name, groups%name), 1)
-    range(2) = range(1) + count(groups%name == name) - 1
+    named = [(any(names == groups(k)%name), k=1, size(groups))]
+    range(1) = max(findloc(named, .true., dim=1), 1)
+    range(2) = range(1) + count(named) - 1
   end function range_of
 
   !> Every value as it is used, one variable per line: `species.bed.radius = 0.005`.

@@ -7,7 +7,7 @@ module parameters
   use texts, only: joined, lower_case, nearest_word, shown, suggestion, written
   implicit none
   private
-  public :: parameter_t, table, group_names, is_repeated, variables_of, row_of, full_names, words_of
+  public :: parameter_t, table, group_names, obstacle_groups, is_repeated, variables_of, row_of, full_names, words_of
   public :: allowed, either, defaults_text, explain, smallest, largest, name_length
 
   integer, parameter :: name_length = 28
@@ -20,6 +20,9 @@ module parameters
     real(real64) :: lower, upper             !! both belong to the range
     character(len=24) :: words
   end type range_t
+
+  !> The groups of which each describes an obstacle, of one shape or another.
+  character(len=8), parameter :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
 
   type(range_t), parameter :: anything = range_t(-largest, largest, "")
   type(range_t), parameter :: positive = range_t(smallest, largest, "> 0")
@@ -49,8 +52,8 @@ module parameters
   ! example    an example, no default          as it is, because something must be given
   ! optional   an example, no default          as a comment; its choice needs it, if it goes with one
 
-  character(len=8), parameter :: group_names(7) = [character(len=8) :: &
-    "run", "box", "obstacle", "species", "contact", "stop", "output"]
+  character(len=8), parameter :: group_names(8) = [character(len=8) :: &
+    "run", "box", "obstacle", "wall", "species", "contact", "stop", "output"]
 
   type(parameter_t), parameter :: run_rows(*) = [ &
     parameter_t("run", "title", "text", 1, "default", "''", "one line that describes the run"), &
@@ -79,6 +82,11 @@ module parameters
     parameter_t("obstacle", "radius", "real", 1, "example", "0.2", "radius of the circular wall", positive, "length"), &
     parameter_t("obstacle", "side", "text", 1, "default", "'outside'", &
       "disks bounce off the outside, or are kept inside", choices="outside inside")]
+
+  type(parameter_t), parameter :: wall_rows(*) = [ &
+    parameter_t("wall", "name", "text", 1, "optional", "'ramp'", "name; default wall1, wall2, ..."), &
+    parameter_t("wall", "from", "real", 2, "example", "0.2, 0.3", "one end of the straight wall", unit="length"), &
+    parameter_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length")]
 
   type(parameter_t), parameter :: species_rows(*) = [ &
     parameter_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
@@ -159,7 +167,7 @@ module parameters
     parameter_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "computing time between checkpoints", positive, "s")]
 
-  type(parameter_t), parameter :: table(*) = [run_rows, box_rows, obstacle_rows, species_rows, &
+  type(parameter_t), parameter :: table(*) = [run_rows, box_rows, obstacle_rows, wall_rows, species_rows, &
     contact_rows, stop_rows, output_rows]
 
 contains
@@ -169,7 +177,7 @@ contains
     character(len=*), intent(in) :: group
     logical :: is_repeated
 
-    is_repeated = group == "obstacle" .or. group == "species"
+    is_repeated = any(obstacle_groups == group) .or. group == "species"
   end function is_repeated
 
   !> Names of the variables of a group, in order.
@@ -258,7 +266,7 @@ contains
 
     text = "! Every variable of Ricochet with its default; a file needs only what differs."//eol// &
       "! A variable that is commented out or called an example has no default, or not in all cases."//eol// &
-      "! Groups may be in any order; &obstacle and &species may be repeated."//eol
+      "! Groups may be in any order; &obstacle, &wall and &species may be repeated."//eol
     do g = 1, size(group_names)
       text = text//eol//margin(group_names(g))//"&"//trim(group_names(g))//eol
       do k = 1, size(table)
@@ -268,13 +276,13 @@ contains
     end do
   end function defaults_text
 
-  !> The reference file has no obstacle: that whole group is a comment.
+  !> The reference file has no obstacles: those groups are comments.
   pure function margin(group)
     character(len=*), intent(in) :: group
     character(len=:), allocatable :: margin
 
     margin = ""
-    if (group == "obstacle") margin = "! "
+    if (any(obstacle_groups == group)) margin = "! "
   end function margin
 
   !> A variable in the reference file; a choice has a second line that lists its words.
@@ -286,7 +294,7 @@ contains
 
     indent = "  "
     if (row%status == "optional" .or. row%status == "fallback") indent = "  ! "
-    if (row%group == "obstacle") indent = "!   "
+    if (any(obstacle_groups == row%group)) indent = "!   "
     setting = indent//trim(row%name)//" = "//row%value
     line = setting//" ! "
     if (row%status == "example") line = line//"an example: "

@@ -5,8 +5,8 @@ module run_description
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
   use hdf5_objects, only: hdf5_file_t, hdf5_version
-  use parameter_values, only: parameter_group_t, parameter_value_t
-  use parameters, only: is_repeated, table
+  use parameter_values, only: parameter_group_t, parameter_value_t, range_of
+  use parameters, only: is_repeated, obstacle_groups, table
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use system, only: host_name
@@ -28,6 +28,7 @@ contains
     character(len=*), intent(in) :: input_text
     type(text_t), intent(in) :: overrides(:)
     type(simulation_t), intent(in) :: sim
+    integer :: k, range(2)
 
     call describe_format(file)
     call describe_box(file, sim%box)
@@ -35,8 +36,10 @@ contains
     call describe_input(file, groups, input_text, overrides)
     call describe_species(file, sim)
     call describe_populations(file, sim)
-    call describe_table(file, pack(groups, groups%name == "obstacle"))
-    call describe_table(file, pack(groups, groups%name == "wall"))
+    do k = 1, size(obstacle_groups)
+      range = range_of(groups, obstacle_groups(k:k))
+      call describe_table(file, groups(range(1):range(2)))
+    end do
     call file%put("parameters/seed", [integer ::], [settings%run%seed])
     call describe_origin(file)
     call describe_cost(file, 0.0_real64, 0.0_real64)     ! so that nothing is added at the end
@@ -105,7 +108,7 @@ contains
     integer :: g, k
 
     do g = 1, size(groups)
-      if (groups(g)%name == "obstacle" .or. groups(g)%name == "wall") cycle     ! one table each, below
+      if (any(obstacle_groups == groups(g)%name)) cycle     ! one table for each name, below
       group = "parameters/"//trim(groups(g)%name)
       if (is_repeated(groups(g)%name)) group = group//"/"//trim(groups(g)%instance)
       call file%make_group(group)

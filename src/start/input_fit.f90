@@ -6,6 +6,7 @@ module input_fit
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text
   use packing, only: packing_t
+  use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
@@ -32,8 +33,8 @@ contains
 
     if (.not. allocated(settings%species)) return
     if (any(settings%box%lower >= settings%box%upper)) return
-    o = range_of(groups, "obstacle")
-    s = range_of(groups, "species")
+    o = range_of(groups, obstacle_groups)
+    s = range_of(groups, ["species"])
     associate (box => settings%box)
       do k = 1, size(box%obstacle)
         call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
