@@ -6,7 +6,7 @@ import numpy as np
 
 from ricochet import Run
 
-from .case import AT_MOST, Case, Member, relative, within
+from .case import AT_MOST, EXACT, Case, Member, relative, within
 from .inputs import EVERY_EVENT, disk, namelist
 
 ROUND_BOX = {"lower": (-1, -1), "upper": (1, 1)}
@@ -54,6 +54,39 @@ HEAVY = Member(
 )
 
 
+APEX, START, PUSH, RIM = np.array((2, 1)), np.array((2.3, 2)), np.array((0.1, 0)), 0.1
+WEDGE = {
+    "box": {"upper": (4, 3), "gravity": (0, -1)},
+    "wall": [{"from": (0.5, 2.5), "to": (2, 1)}, {"from": (2, 1), "to": (3.5, 2.5)}],
+    "species": disk(tuple(START), tuple(PUSH), RIM),
+}
+FALL = Member(namelist(**WEDGE, stop={"time": 200}, output={"frames_every_time": 0.05}))
+STEPS = Member(
+    namelist(
+        **WEDGE, run={"dynamics": "steps", "dt": 1e-5}, stop={"time": 10},
+        output={"frames_every_time": 0.05},
+    )
+)  # fmt: skip
+
+
+def miss(run: Run) -> float:
+    """Largest distance from the exact path in a right-angled wedge under gravity.
+
+    The heights over the two walls are two balls that bounce on floors of their own, with the
+    accelerations g/sqrt 2, and do not know of each other.
+    """
+    t, x = run.time, run.position[:][:, 0]
+    normals = np.array(((-1, 1), (1, 1))) / np.sqrt(2)
+    g, errors = 1 / np.sqrt(2), []
+    for normal in normals:
+        height, speed = (START - APEX) @ normal - RIM, PUSH @ normal
+        fastest = np.sqrt(speed**2 + 2 * g * height)
+        since = np.mod(t + (fastest - speed) / g, 2 * fastest / g)
+        exact = fastest * since - g * since**2 / 2
+        errors.append((x - APEX) @ normal - RIM - exact)
+    return float(np.hypot(*errors).max())
+
+
 def last(run: Run, name: str) -> float:
     """Sum of an observable at the end."""
     return float(np.sum(run.observable(name).value[-1]))
@@ -97,6 +130,18 @@ CASES = [
         "P12-02", "the same: time and polar angle of the last",
         (ROUND,), lambda run: [run.events.time[100], angles(run)[100] % (2 * pi)],
         [184.576068641872, 6.14074471547], relative(1e-9), "D",
+    ),
+    Case(
+        "W1-01", "right-angled wedge of two straight walls under gravity, 160 hits: path",
+        (FALL,), miss, 0, within(1e-10), "two independent bouncing balls",
+    ),
+    Case(
+        "W1-02", "the same, counted as hits of obstacles",
+        (FALL,), lambda run: last(run, "obstacle_collisions"), 160, EXACT, "the same",
+    ),
+    Case(
+        "W1-03", "the same with time steps of 1e-5, 8 hits: path",
+        (STEPS,), miss, 0, within(1e-3), "the same",
     ),
     Case(
         "P12-03", "Sinai's billiard, 2e6 hits: mean free path",

@@ -12,7 +12,7 @@ from validation.running import validate
 from validation.tables import CASES
 
 QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-03", "P9-09", "P9-1", "P10-01", "P10-07")
-QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07")
+QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07", "W1-")
 
 
 def case(measure, reference, tolerance, members=()) -> Case:
