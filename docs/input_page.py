@@ -12,6 +12,8 @@ GROUPS = {
     "run": "What is run, and by which method.",
     "box": "The box and the gravity in it.",
     "obstacle": "A circular wall; the group is repeated for each.",
+    "wall": "A straight wall, solid on both sides; disks bounce off its ends as off points. The "
+    "group is repeated for each.",
     "species": "Disks of one kind; the group is repeated for each.",
     "contact": "What happens at a contact.",
     "stop": "When the run ends: at the first of these that is met. At least one is needed.",
@@ -26,9 +28,9 @@ default is needed. The rules, and the ways to describe disks, are in
 [input/README](../input/README.md); [input/reference.nml](../input/reference.nml) is a file with
 all variables. `docs/input_page.py` generates this page from `ricochet --explain`.
 
-On the command line a variable is set with `--set GROUP.VARIABLE=VALUE`; a species or an obstacle is
-addressed by its name: `--set species.projectile.mass=50`. The file chooses the units of length,
-time and mass.
+On the command line a variable is set with `--set GROUP.VARIABLE=VALUE`; a species, an obstacle or a
+wall is addressed by its name: `--set species.projectile.mass=50`. The file chooses the
+units of length, time and mass.
 """
 
 ENTRY = re.compile(

@@ -5,7 +5,7 @@
 # "run.title" "run.seed" ...: every variable, those of species and obstacles also by the names in FILE.
 _ricochet_variables() { # program, input file or nothing
   local group
-  for group in run box obstacle species contact stop output; do
+  for group in run box obstacle wall species contact stop output; do
     "$1" --explain "$group" 2>/dev/null | sed -n 's/^\([a-z]\{1,\}\.[a-z_]\{1,\}\).*/\1/p'
   done | awk -v file="$2" '
     BEGIN {

@@ -77,8 +77,10 @@ contains
     if (misfit%blocker == 0) then
       text = text//" is not wholly in its region"
     else if (misfit%blocker < 0) then
-      text = text//" overlaps, or is on the wrong side of, obstacle """// &
-        packing%box%obstacle(-misfit%blocker)%name//'"'
+      associate (obstacle => packing%box%obstacle(-misfit%blocker))
+        text = text//trim(merge(" is not wholly inside", " overlaps            ", obstacle%shape%encloses))// &
+          " obstacle """//obstacle%name//'"'
+      end associate
     else
       other = packing%disk(misfit%blocker)%species
       text = text//" overlaps disk "//written(misfit%blocker - offset(species, other))// &

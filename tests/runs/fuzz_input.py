@@ -248,6 +248,7 @@ def used_values(path: Path) -> dict[str, list]:
         species = groups.pop("species")
         table = groups.pop("obstacle", {"name": []})
         groups |= {f"species.{name}": group for name, group in species.items() if is_group(group)}
+        walls = groups.pop("wall", {"name": []})
         for prefix, group in groups.items():
             values |= {f"{prefix}.{name}": python_list(x) for name, x in group.attrs.items()}
         for number, name in enumerate(python_list(table["name"][:])):
@@ -258,6 +259,10 @@ def used_values(path: Path) -> dict[str, list]:
                 f"obstacle.{name}.radius": python_list(table["radius"][number]),
                 f"obstacle.{name}.side": [side],
             }
+        for number, name in enumerate(python_list(walls["name"][:])):
+            ends = {key: python_list(walls[key][number]) for key in ("from", "to")}
+            values |= {f"wall.{name}.name": [name]}
+            values |= {f"wall.{name}.{key}": place for key, place in ends.items()}
     return values
 
 
@@ -293,7 +298,7 @@ def contradiction(data: bytes, used: dict[str, list]) -> str | None:
     for group, variables in groups:
         numbers[group] += 1
         prefix = group
-        if group in ("species", "obstacle"):
+        if group in ("species", "obstacle", "wall"):
             name = plain(variables.get("name", ["''"]))[0] or f"{group}{numbers[group]}"
             prefix = f"{group}.{name}"
         elif numbers[group] > 1:

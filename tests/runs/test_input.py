@@ -12,6 +12,10 @@ import fuzz_input
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
+NAMES = {"species": ["gas"], "obstacle": ["pin"], "wall": ["ramp"]}
+OBSTACLES = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
+&wall name = 'ramp' from = 0.1, 0.1 to = 0.3, 0.2 /
+"""
 GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 0.1 /
 """
@@ -217,19 +221,19 @@ def numbers() -> list[str]:
             group = found[1]
         elif found := re.match(r"[ !]+(\w+) = +(\d[^!]*)", line):
             count = found[2].count(",") + 1
-            prefix = {"species": "species.gas", "obstacle": "obstacle.pin"}.get(group, group)
+            prefix = ".".join([group, *NAMES.get(group, [])])
             names.append(f"{prefix}.{found[1]} {count}")
     return names
 
 
 def test_all_numbers_of_the_reference_are_tried():
-    assert len(numbers()) == 34
+    assert len(numbers()) == 36
 
 
 @pytest.mark.parametrize("variable", numbers())
 def test_numbers_that_are_none_are_refused(checked, variable):
     name, count = variable.split()
-    pin = "&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /\n"
+    pin = OBSTACLES
     for value in ["nan", "inf", "-inf", "1e999", "1e-320", "1e-400", "1d", "0x1", "1e101", "''"]:
         run = checked(GOOD + pin, "--set", f"{name}=" + ",".join([value] * int(count)))
         assert run.returncode == USAGE, value
@@ -239,7 +243,7 @@ def test_numbers_that_are_none_are_refused(checked, variable):
 @pytest.mark.parametrize("variable", numbers())
 def test_numbers_that_mean_nothing_are_refused(checked, variable):
     name, count = variable.split()
-    pin = "&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /\n"
+    pin = OBSTACLES
     for value in ["0", "-1", "1e-99", "1e99"]:
         run = checked(GOOD + pin, "--set", f"{name}=" + ",".join([value] * int(count)))
         assert run.returncode in (0, USAGE), (value, run.stderr)
@@ -302,3 +306,23 @@ def test_ten_thousand_damaged_files_never_harm(program):
     command = [sys.executable, fuzz_input.__file__, "--program", program, "--count", "10000"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr[-5000:]
+
+
+@pytest.mark.parametrize(
+    ("wall", "says"),
+    [
+        ("from = 0, 0 to = 1, 0.5", ""),
+        ("from = 0.2, 0.2", "wall.to: is missing"),
+        ("from = 0.2, 0.2 to = 0.2, 0.2", "wall.to: is the same point as from"),
+        ("from = 0.2, 0.2 to = 1.2, 0.2", "wall.from: both ends must lie in the box"),
+        ("from = 0.2, 0.2 to = 0.4, 0.2 radius = 1", "wall.radius: unknown variable"),
+        ("name = 'gas wall' from = 0, 0 to = 1, 0.5", "wall.name: "),
+        ("from = 0.2, 0.5 to = 0.8, 0.5", "species.position: disk 1 at"),
+    ],
+)
+def test_a_wall_is_taken_or_refused_with_a_reason(ricochet, tmp_path, wall, says):
+    disk = "&species count = 1 radius = 0.05 position = 0.5, 0.54 velocity = 1, 0 /"
+    (tmp_path / "wall.nml").write_text(f"&wall {wall} /\n{disk}\n&stop time = 1 /\n")
+    run = ricochet("wall.nml", "--check")
+    assert (run.returncode == 0) == (says == ""), run.stderr
+    assert says in run.stderr and len(run.stderr.splitlines()) <= 1

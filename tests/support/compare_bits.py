@@ -70,6 +70,8 @@ def compare(programs: tuple[str, str], path: Path, overrides: list[str], work: P
         command = [Path(program).resolve(), path.resolve(), "-o", "run.h5", "--quiet", *overrides]
         folder = work / place
         run = subprocess.run(command, check=False, cwd=folder, capture_output=True, text=True)
+        if place == "old" and run.returncode == 2 and "unknown" in run.stderr:
+            return []  # an input with a variable that the old program does not have yet
         if run.returncode != 0:
             return [f"{place}: exit {run.returncode}: {run.stderr.strip()}"]
         files.append(work / place / "run.h5")
