@@ -1,9 +1,9 @@
-!> Velocities after a contact: restitution by pair of species and for walls, both wall rules, the TC model.
+!> The contact law: restitution by pair of species and for walls, the wall rules, the TC model.
 module collisions
-  use kinds, only: real64
+  use kinds, only: int32, real64
   implicit none
   private
-  public :: contact_law_t, pair_impulse, wall_rebound, wall_rules
+  public :: contact_law_t, pair_impulse, still_in_contact, wall_rebound, wall_rules
 
   !> The rules for walls by their names in the input; a rule is its number in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
@@ -19,6 +19,16 @@ module collisions
   end type contact_law_t
 
 contains
+
+  !> Whether the last contact of a disk is not over yet, so that the next one is elastic (TC model).
+  elemental function still_in_contact(law, collisions, elapsed) result(yes)
+    type(contact_law_t), intent(in) :: law
+    integer(int32), intent(in) :: collisions         !! of the disk, so far
+    real(real64), intent(in) :: elapsed              !! since the last of them [time]
+    logical :: yes
+
+    yes = collisions > 0 .and. elapsed < law%contact_time
+  end function still_in_contact
 
   !> Impulse on disk i divided by the separation vector dx = x_j - x_i: v_i grows by q dx/m_i, v_j by
   !> -q dx/m_j. It takes the true distance, not the nominal one: energy is kept to rounding.

@@ -1,9 +1,9 @@
-!> Encounters: what changes in the state when two disks, a disk and a wall, or a disk and a periodic side
-!> meet. Both dynamics share it, with all counts and sums.
+!> What changes in the state when two disks, a disk and a wall, or a disk and a periodic side meet, with all counts
+!> and sums. Both dynamics use it.
 module encounters
   use kinds, only: int32, real64
   use box_geometry, only: wall_normal
-  use collisions, only: pair_impulse, wall_rebound
+  use collisions, only: pair_impulse, still_in_contact, wall_rebound
   use disks, only: disk_t
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
@@ -17,8 +17,8 @@ module encounters
 
 contains
 
-  !> Lets disk i collide at the time t with what `code` names, and lists the collision if the log is on:
-  !> the same line whichever of two disks expected it.
+  !> Collides disk i at the time t with what `code` names, and logs the collision if the log is on: the same entry
+  !> whichever of two disks expected it.
   subroutine collide(sim, i, code, t, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -46,7 +46,7 @@ contains
     end associate
   end subroutine collide
 
-  !> Brings a disk's own state to the time t.
+  !> Advances a disk's own state to the time t.
   pure subroutine land(disk, gravity, t)
     type(disk_t), intent(inout) :: disk
     real(real64), intent(in) :: gravity(2), t
@@ -59,17 +59,17 @@ contains
     disk%stamp = disk%stamp + 1
   end subroutine land
 
-  !> Whether a contact of disk i at t counts as elastic because its last one is not over (TC model).
+  !> Whether disk i is still in contact at the time t, by the contact law.
   pure function in_contact(sim, i, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
     logical :: yes
 
-    yes = sim%tag(i)%collisions > 0 .and. t - sim%disk(i)%clock < sim%law%contact_time
+    yes = still_in_contact(sim%law, sim%tag(i)%collisions, t - sim%disk(i)%clock)
   end function in_contact
 
-  !> Lets the disks i < j collide at the time t.
+  !> Collides the disks i < j at the time t.
   subroutine collide_pair(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -113,8 +113,7 @@ contains
     if (is_side(code)) yes = sim%box%periodic(axis_of(code))
   end function passes
 
-  !> Takes disk i through a periodic side: it goes on from one period away. Its clock, the time of its last
-  !> collision, stays.
+  !> Moves disk i by one period through a periodic side. Its clock, the time of its last collision, stays.
   subroutine pass_side(sim, i, code)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -129,7 +128,7 @@ contains
     end associate
   end subroutine pass_side
 
-  !> Lets disk i collide with a side or an obstacle at the time t.
+  !> Collides disk i with a side or an obstacle at the time t.
   subroutine collide_wall(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
