@@ -86,6 +86,7 @@ contains
     real(real64) :: shift(2)
     integer(int32) :: there(2, -1:1), image(2, -1:1), k, image_x, image_y, dx, dy, c
     integer(int64) :: n
+    logical :: crowded
 
     do k = -1, 1
       there(:, k) = sim%tag(i)%cell + k
@@ -96,15 +97,18 @@ contains
       do image_x = minval(image(1, :)), maxval(image(1, :))
         shift = [image_x, image_y]*sim%box%edges()
         n = 0
+        crowded = .false.
         do dy = -1, 1
           do dx = -1, 1
             if (image(1, dx) /= image_x .or. image(2, dy) /= image_y) cycle
             c = there(1, dx) + cells%stride*there(2, dy)
             call append(cells%cell(c), near%list, n)
+            crowded = crowded .or. cells%chain(c) > 0
           end do
         end do
         near%n = int(n, int32)
         call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+        if (.not. crowded) cycle
         do dy = -1, 1
           do dx = -1, 1
             if (image(1, dx) /= image_x .or. image(2, dy) /= image_y) cycle
