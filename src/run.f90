@@ -3,28 +3,36 @@ module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use checkpoint, only: read_checkpoint, write_checkpoint
   use command_line, only: command_t
-  use errors, only: error_t, exit_stopped, exit_usage, fail
-  use event_log, only: event_log_t
+  use errors, only: error_t, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
   use output, only: output_t
-  use parameter_values, only: parameter_group_t
   use progress_line, only: progress_line_t
+  use run_input, only: run_input_t
   use run_setup, only: choose_evolution, new_simulation, read_input
-  use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
   use texts, only: written
-  use time_stepped, only: step_warning
   implicit none
   private
   public :: perform_run
 
-  integer, parameter :: log_capacity = 4096                !! collisions listed between two writes
-  real(real64), parameter :: look_around = 0.05_real64     !! time between looks at signals and clocks [s]
+  real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
+  character(len=1), parameter :: eol = new_line("a")
+
+  type :: run_t
+    type(command_t) :: command
+    type(run_input_t) :: input
+    type(simulation_t) :: sim
+    class(evolution_t), allocatable :: evolution
+    type(stop_rule_t) :: stop_rule
+    type(output_t) :: output
+    real(real64) :: started = 0.0_real64                   !! by the clock of `seconds` [s]
+    real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
+  end type run_t
 
 contains
 
@@ -32,168 +40,162 @@ contains
   subroutine perform_run(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
-    type(settings_t) :: settings
-    type(parameter_group_t), allocatable :: groups(:)
-    character(len=:), allocatable :: input_text
-    type(simulation_t) :: sim
-    type(output_t) :: output
-    class(evolution_t), allocatable :: evolution
-    type(stop_rule_t) :: stop_rule
-    real(real64) :: started, cpu(2), rate             ! [s], [1/s]
-    integer(int64) :: before
+    type(run_t) :: run
+
+    run%started = seconds()
+    run%command = command
+    call watch_signals()
+    call read_input(command%input, command%overrides, run%input, error)
+    if (.not. allocated(error)) call check_memory(run%input%settings%species, error)
+    if (allocated(error)) return
+    call choose_evolution(run%input%settings, run%evolution)
+    if (command%resume) then
+      call read_checkpoint(command%output, run%input, run%sim, run%output, error)
+    else
+      call begin(run, error)
+    end if
+    if (allocated(error) .or. command%check) return
+    run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
+    call follow(run, error)
+    if (.not. allocated(error)) call run%output%finish(run%sim, seconds() - run%started, run%rate, error)
+    if (.not. allocated(error)) call print_text(summary(run), error)
+    call run%output%release()
+  end subroutine perform_run
+
+  !> Creates the state of a new run and opens its output; with --check says only that all is well.
+  subroutine begin(run, error)
+    type(run_t), intent(inout) :: run
+    type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new
 
-    started = seconds()
-    input_text = ""
-    call watch_signals()
-    call read_input(command%input, command%overrides, settings, groups, input_text, error)
-    if (.not. allocated(error)) call check_memory(settings%species, error)
+    call new_simulation(run%input%settings, run%sim, error)
     if (allocated(error)) return
-    if (command%resume) then
-      call read_checkpoint(command%output, settings, groups, sim, output, error)
-    else
-      call new_simulation(settings, sim, error)
-      if (allocated(error)) return
-      if (.not. command%quiet) call warn(settings, sim)
+    associate (command => run%command)
+      if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": fine; "//written(int(sim%n_disks()))//" disks", error)
+        call print_text(command%input//": fine; "//written(int(run%sim%n_disks()))//" disks", error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
-      call output%open(command%output, settings, groups, input_text, command%overrides, sim, command%force, error)
+      call run%output%open(command%output, run%input, run%sim, command%force, error)
       if (folder_is_new .and. .not. (allocated(error) .or. command%quiet)) write (error_unit, "(a)") &
-        "note: "//folder_of(command%output)//" was not there: it is made for the output"
-    end if
-    if (allocated(error)) return
-    call choose_evolution(settings%run, evolution)
-    if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
-    stop_rule = stop_rule_t(settings%stop, sim)
-    before = sim%collisions
-    call cpu_time(cpu(1))
-    call evolution%start(sim)
-    call main_loop(command, settings, groups, sim, evolution, stop_rule, output, started, error)
-    call cpu_time(cpu(2))
-    rate = (sim%collisions - before)/max(cpu(2) - cpu(1), 1.0e-9_real64)
-    if (.not. allocated(error)) call output%finish(sim, seconds() - started, rate, error)
-    if (.not. allocated(error)) &
-      call print_text(summary(command%output, sim, stop_rule, seconds() - started, rate), error)
-    call output%release()
-  end subroutine perform_run
+        "note: folder "//folder_of(command%output)//" has been created for the output"
+    end associate
+  end subroutine begin
 
-  !> Lets the simulation move from one thing that is due to the next, until its end.
-  subroutine main_loop(command, settings, groups, sim, evolution, stop_rule, output, started, error)
-    type(command_t), intent(in) :: command
-    type(settings_t), intent(in) :: settings
-    type(parameter_group_t), intent(in) :: groups(:)
-    type(simulation_t), intent(inout) :: sim
-    class(evolution_t), intent(inout) :: evolution
-    type(stop_rule_t), intent(in) :: stop_rule
-    type(output_t), intent(inout) :: output
-    real(real64), intent(in) :: started               !! [s]
+  !> Warns of what is legal but rarely meant.
+  subroutine warn(run)
+    type(run_t), intent(in) :: run
+    character(len=:), allocatable :: text
+
+    text = run%evolution%warning(run%sim)
+    if (text /= "") write (error_unit, "(a)") "warning: "//text
+    if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
+      "warning: nothing moves at the start: stop.energy_fraction is met at once"
+  end subroutine warn
+
+  !> Follows the simulation to its end, and measures how fast it is.
+  subroutine follow(run, error)
+    type(run_t), intent(inout) :: run
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: collisions
+    real(real64) :: cpu(2)                                 ! [s]
+
+    collisions = run%sim%collisions
+    call cpu_time(cpu(1))
+    call run%evolution%start(run%sim)
+    call main_loop(run, error)
+    call cpu_time(cpu(2))
+    run%rate = (run%sim%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+  end subroutine follow
+
+  !> Advances the simulation from one thing that is due to the next, until its end.
+  subroutine main_loop(run, error)
+    type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     type(progress_line_t) :: line
     type(limits_t) :: limits
     integer(int64) :: turns
-    real(real64) :: now, looked, next_checkpoint      ! [s]
-    real(real64) :: begun                             ! by the clock of the simulation [time]
+    real(real64) :: now, before, next_checkpoint      ! [s]
+    real(real64) :: first_time                        ! of the simulation [time]
 
     turns = 1
-    begun = sim%time()
-    looked = seconds()
-    next_checkpoint = looked + settings%output%checkpoint_every
-    call line%start(sim, stop_rule, started, command%quiet)
-    do while (.not. is_over(sim, evolution, stop_rule))
-      limits = stop_rule%limits
-      limits%time = min(limits%time, output%next_time())
-      limits%collisions = min(limits%collisions, output%next_collisions())
-      limits%events = min(limits%events, output%next_events(), stop_rule%next_look(sim))
+    first_time = run%sim%time()
+    before = seconds()
+    next_checkpoint = before + run%input%settings%output%checkpoint_every
+    call line%start(run%sim, run%stop_rule, run%started, run%command%quiet)
+    do while (.not. is_over(run))
+      limits = run%stop_rule%limits
+      limits%events = min(limits%events, run%stop_rule%next_check(run%sim))
       limits%turns = turns
-      call evolution%advance(sim, limits, error)
-      if (allocated(error)) exit
-      call output%write_what_is_due(sim, error)
-      if (.not. allocated(error)) call output%write_events(evolution%log, error)
+      call run%output%tighten(limits)
+      call run%evolution%advance(run%sim, limits, error)
+      if (.not. allocated(error)) call run%output%write_what_is_due(run%sim, error)
+      if (.not. allocated(error)) call run%output%write_events(run%sim, run%evolution%log, error)
       if (allocated(error)) exit
       now = seconds()
-      ! However short the wall clock, each part of a run gets somewhere.
-      if (stop_requested() .or. (sim%time() > begun .and. now - started > stop_rule%wall_clock)) then
-        call write_checkpoint(command%output, settings, groups, sim, output, error)
+      ! However short the wall clock, each part of a run makes some progress.
+      if (stop_requested() .or. (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock)) then
+        call write_checkpoint(run%sim, run%output, error)
         if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
-          //written(sim%time())//", after a checkpoint: the same command with --resume goes on")
+          //written(run%sim%time())//", after a checkpoint: the same command with --resume goes on")
         exit
       end if
       if (checkpoint_requested() .or. now > next_checkpoint) then
-        call write_checkpoint(command%output, settings, groups, sim, output, error)
+        call write_checkpoint(run%sim, run%output, error)
         if (allocated(error)) exit
-        next_checkpoint = seconds() + settings%output%checkpoint_every     ! after writing, however slow the disk
+        next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow
       end if
-      call line%report(sim, stop_rule)
-      turns = adapted(turns, now - looked)
-      looked = now
+      call line%report(run%sim, run%stop_rule)
+      turns = adapted(turns, now - before)
+      before = now
     end do
     call line%clear()
   end subroutine main_loop
 
-  !> Whether the run has come to its end: by a rule, because there is nothing but rounding left to follow,
-  !> or because nothing will ever happen any more and no rule names a time to wait for.
-  pure function is_over(sim, evolution, stop_rule) result(yes)
-    type(simulation_t), intent(in) :: sim
-    class(evolution_t), intent(in) :: evolution
-    type(stop_rule_t), intent(in) :: stop_rule
+  !> Whether the run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever
+  !> happen any more and no rule names a time to wait for.
+  pure function is_over(run) result(yes)
+    type(run_t), intent(in) :: run
     logical :: yes
 
-    yes = stop_rule%met(sim) .or. stop_rule%too_cold(sim) .or. &
-      (evolution%idle .and. .not. stop_rule%limits%time < never)
+    yes = run%stop_rule%met(run%sim) .or. run%stop_rule%too_cold(run%sim) .or. &
+      (run%evolution%idle .and. .not. run%stop_rule%limits%time < never)
   end function is_over
 
-  !> The number of turns that takes about `look_around`.
+  !> The number of turns that take about `pause_interval`.
   pure function adapted(turns, elapsed) result(n)
     integer(int64), intent(in) :: turns
     real(real64), intent(in) :: elapsed               !! for these turns [s]
     integer(int64) :: n
 
     n = turns
-    if (elapsed < 0.5_real64*look_around) n = min(2*turns, 2_int64**40)
-    if (elapsed > 2*look_around) n = max(turns/2, 1_int64)
+    if (elapsed < 0.5_real64*pause_interval) n = min(2*turns, 2_int64**40)
+    if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
   end function adapted
 
-  !> Says what is legal but seldom meant.
-  subroutine warn(settings, sim)
-    type(settings_t), intent(in) :: settings
-    type(simulation_t), intent(in) :: sim
+  !> The results, as lines `key = value`.
+  function summary(run) result(text)
+    type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
 
-    text = ""
-    if (settings%run%dynamics == "steps") text = step_warning(sim, settings%run%dt)
-    if (text /= "") write (error_unit, "(a)") "warning: "//text
-    if (settings%stop%energy_fraction > 0 .and. .not. sim%start_energy > 0) write (error_unit, "(a)") &
-      "warning: nothing moves at the start: stop.energy_fraction is met at once"
-  end subroutine warn
-
-  !> What the run came to, as lines `key = value`.
-  function summary(path, sim, stop_rule, elapsed, rate) result(text)
-    character(len=*), intent(in) :: path
-    type(simulation_t), intent(in) :: sim
-    type(stop_rule_t), intent(in) :: stop_rule
-    real(real64), intent(in) :: elapsed               !! wall time of the whole run [s]
-    real(real64), intent(in) :: rate                  !! collisions per processor time of the simulation [1/s]
-    character(len=:), allocatable :: text
-    character(len=1), parameter :: eol = new_line("a")
-
-    text = "output = "//path// &
-      eol//"disks = "//written(int(sim%n_disks()))// &
-      eol//"collisions = "//written(sim%collisions)// &
-      eol//"wall_collisions = "//written(sum(sim%wall_collisions))// &
-      eol//"obstacle_collisions = "//written(sim%obstacle_collisions)// &
-      eol//"time = "//written(sim%time())// &
-      eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
-      eol//"total_energy = "//written(total_energy(sim))// &
-      eol//"dissipated_energy = "//written(sim%dissipated)// &
-      eol//"wall_time = "//written(elapsed)// &
-      eol//"collisions_per_second = "//written(rate)
-    if (stop_rule%met(sim)) return
+    associate (sim => run%sim)
+      text = "output = "//run%command%output// &
+        eol//"disks = "//written(int(sim%n_disks()))// &
+        eol//"collisions = "//written(sim%collisions)// &
+        eol//"wall_collisions = "//written(sum(sim%wall_collisions))// &
+        eol//"obstacle_collisions = "//written(sim%obstacle_collisions)// &
+        eol//"time = "//written(sim%time())// &
+        eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
+        eol//"total_energy = "//written(total_energy(sim))// &
+        eol//"dissipated_energy = "//written(sim%dissipated)// &
+        eol//"wall_time = "//written(seconds() - run%started)// &
+        eol//"collisions_per_second = "//written(run%rate)
+    end associate
+    if (run%stop_rule%met(run%sim)) return
     text = text//eol//"note = "
-    if (stop_rule%too_cold(sim)) then
-      text = text//"cooled to 1e-25 of the first temperature, and beyond that rounding rules"
+    if (run%stop_rule%too_cold(run%sim)) then
+      text = text//"cooled to 1e-25 of the first temperature, below which rounding errors dominate"
     else
       text = text//"nothing will ever happen any more"
     end if

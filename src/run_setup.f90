@@ -1,10 +1,11 @@
-!> From the command line's file to a run: reads and checks the input, builds the state, and turns names in the
+!> From the command line's file to a run: reads and checks the input, builds the state, and turns words of the
 !> input into types. The only place that knows every search and every dynamics.
 module run_setup
   use all_pairs, only: all_pairs_t
   use cell_grid, only: cell_grid_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
+  use event_log, only: event_log_t
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
   use input_fit, only: check_fit
@@ -13,7 +14,8 @@ module run_setup
   use namelist_input, only: read_settings
   use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
-  use settings, only: run_settings_t, settings_t
+  use run_input, only: run_input_t
+  use settings, only: settings_t
   use simulation_state, only: simulation_t
   use texts, only: text_t
   use time_stepped, only: time_stepped_t
@@ -21,19 +23,21 @@ module run_setup
   private
   public :: read_input, settings_from_text, new_simulation, choose_evolution
 
+  integer, parameter :: log_capacity = 4096     !! collisions listed between two writes
+
 contains
 
   !> Reads the file `path`, applies the overrides and checks everything.
-  subroutine read_input(path, overrides, settings, groups, input_text, error)
+  subroutine read_input(path, overrides, input, error)
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(settings_t), intent(out) :: settings
-    type(parameter_group_t), allocatable, intent(out) :: groups(:)  !! every value as used
-    character(len=:), allocatable, intent(out) :: input_text        !! the file as it is
+    type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
 
-    call read_text(path, input_text, error)
-    if (.not. allocated(error)) call settings_from_text(input_text, path, overrides, settings, groups, error)
+    input%overrides = overrides
+    call read_text(path, input%text, error)
+    if (.not. allocated(error)) &
+      call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
   end subroutine read_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
@@ -51,7 +55,7 @@ contains
     if (problems%count > 0) call fail(error, exit_usage, problems%report(path, overrides))
   end subroutine settings_from_text
 
-  !> The state at the start of a run, disks in an order that suits the memory.
+  !> The state at the start of a run, the disks in an order that suits the memory.
   subroutine new_simulation(settings, sim, error)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(out) :: sim
@@ -61,29 +65,30 @@ contains
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 
-  !> The dynamics that the input names, with its search and queue.
+  !> The dynamics that the input names, with its search, queue and event log.
   subroutine choose_evolution(settings, evolution)
-    type(run_settings_t), intent(in) :: settings
+    type(settings_t), intent(in) :: settings
     class(evolution_t), allocatable, intent(out) :: evolution
     type(event_driven_t), allocatable :: events
     type(time_stepped_t), allocatable :: steps
 
-    if (settings%dynamics == "steps") then
+    if (settings%run%dynamics == "steps") then
       allocate (steps)
-      steps%dt = settings%dt
-      steps%every_pair = settings%search /= "cells"
+      steps%dt = settings%run%dt
+      steps%every_pair = settings%run%search /= "cells"
       call move_alloc(steps, evolution)
     else
       allocate (events)
-      if (settings%search == "cells") then
+      if (settings%run%search == "cells") then
         allocate (cell_grid_t :: events%search)
       else
         allocate (all_pairs_t :: events%search)
-        events%search%everyone = settings%search == "rescan"
+        events%search%everyone = settings%run%search == "rescan"
       end if
-      events%windowed = settings%queue == "calendar"
+      events%windowed = settings%run%queue == "calendar"
       call move_alloc(events, evolution)
     end if
+    if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution
 
 end module run_setup

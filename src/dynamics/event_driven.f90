@@ -105,7 +105,7 @@ contains
 
     turns = limits%turns
     do while (turns > 0)
-      if (reached(self, sim, limits)) return
+      if (limits%reached(sim) .or. self%log%is_full()) return
       if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
       t_limit = min(limits%time - sim%epoch, last_time)
       pause_at = next_pause(self, sim, limits)
@@ -151,17 +151,6 @@ contains
     end do
     event = event_t(t, i, code)
   end subroutine run_events
-
-  !> Whether the run is to pause here, time aside.
-  pure function reached(self, sim, limits) result(yes)
-    class(event_driven_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    logical :: yes
-
-    yes = sim%events >= limits%events .or. sim%collisions >= limits%collisions &
-      .or. sim%dissipated >= limits%dissipated .or. self%log%is_full()
-  end function reached
 
   !> The number of events up to which nothing needs to be looked at.
   pure function next_pause(self, sim, limits) result(events)

@@ -14,13 +14,16 @@ module evolution
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! [energy]
-    integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can look around
+    integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
+  contains
+    procedure :: reached
   end type limits_t
 
   type, abstract :: evolution_t
     logical :: idle = .false.     !! nothing will ever happen again
     type(event_log_t) :: log      !! collisions to be written; the caller empties it
   contains
+    procedure :: warning
     procedure(start_evolution), deferred :: start
     procedure(advance_evolution), deferred :: advance
   end type evolution_t
@@ -42,5 +45,26 @@ module evolution
       type(error_t), allocatable, intent(out) :: error
     end subroutine advance_evolution
   end interface
+
+contains
+
+  !> Whether a count or the dissipated energy is at its limit. Time is not tested: all that happens at the very
+  !> limit of time belongs to the part before it.
+  pure function reached(self, sim) result(yes)
+    class(limits_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%events >= self%events .or. sim%collisions >= self%collisions .or. sim%dissipated >= self%dissipated
+  end function reached
+
+  !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.
+  pure function warning(self, sim) result(text)
+    class(evolution_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: text
+
+    text = ""
+  end function warning
 
 end module evolution

@@ -1,9 +1,8 @@
-!> When a run ends: the first of the rules in the input that is met; and before rounding begins to rule.
+!> When a run ends: when the first of the rules in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until they fly on side by side: what is left is the momentum that
-!> rounding gave to all of them. Long before, no digit of the temperature is true. So the run ends when
-!> the gas is that cold. It is looked for at certain numbers of events, so that the end depends on
-!> nothing but the trajectory.
+!> In a periodic box inelastic disks cool until they fly on side by side: only the momentum that rounding gave
+!> to all of them is left. Long before, no digit of the temperature is right. So the run ends when the gas is
+!> that cold. This is checked at fixed numbers of events, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use evolution, only: limits_t
@@ -13,9 +12,9 @@ module stop_rules
   public :: stop_rule_t, stop_settings_t
 
   real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
-  integer, parameter :: look_interval = 4                    !! events per disk between two looks at it
+  integer, parameter :: check_interval = 4                   !! events per disk between two checks of it
 
-  !> What is not asked for is `never` (times) or `huge` (counts); fraction 0 means no rule.
+  !> Rules that are not given are `never` (times), `huge` (counts) or 0 (fraction).
   type :: stop_settings_t
     real(real64) :: time
     integer(int64) :: collisions
@@ -28,10 +27,10 @@ module stop_rules
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    integer(int64) :: look_every = huge(0_int64)    !! events between two looks at the temperature
+    integer(int64) :: check_every = huge(0_int64)    !! events between two checks of the temperature
   contains
     procedure :: met
-    procedure :: next_look
+    procedure :: next_check
     procedure :: too_cold
     procedure :: share
   end type stop_rule_t
@@ -42,7 +41,7 @@ module stop_rules
 
 contains
 
-  !> The rules that `settings` asks for, in terms of the state they are compared with.
+  !> The rules of the input, in terms of the state they are compared with.
   pure function new_stop_rule(settings, sim) result(rule)
     type(stop_settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
@@ -57,36 +56,35 @@ contains
     if (collisions < 9.0e18_real64) rule%limits%collisions = min(rule%limits%collisions, ceiling(collisions, int64))
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
     if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. any(sim%law%restitution < 1)) &
-      rule%look_every = look_interval*int(sim%n_disks(), int64)
+      rule%check_every = check_interval*int(sim%n_disks(), int64)
   end function new_stop_rule
 
-  !> Whether the simulation has come to its end, wall clock aside.
+  !> Whether a rule is met, wall clock aside.
   pure function met(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%time() >= self%limits%time .or. sim%collisions >= self%limits%collisions &
-      .or. sim%events >= self%limits%events .or. sim%dissipated >= self%limits%dissipated
+    yes = sim%time() >= self%limits%time .or. self%limits%reached(sim)
   end function met
 
-  !> The number of events at which to pause for a look at the temperature.
-  pure function next_look(self, sim) result(events)
+  !> The number of events at which to pause and check the temperature.
+  pure function next_check(self, sim) result(events)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     integer(int64) :: events
 
-    events = self%look_every*(sim%events/self%look_every + 1)
-  end function next_look
+    events = self%check_every*(sim%events/self%check_every + 1)
+  end function next_check
 
-  !> Whether the motion relative to the common one has all but died out.
+  !> Whether the motion relative to the common motion has practically died out.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
     yes = .false.
-    if (sim%events > 0 .and. modulo(sim%events, self%look_every) == 0) &
+    if (sim%events > 0 .and. modulo(sim%events, self%check_every) == 0) &
       yes = relative_energy(sim) <= coldest*sim%start_energy
   end function too_cold
 
@@ -109,7 +107,7 @@ contains
     end do
   end function relative_energy
 
-  !> How much of the run is done, from 0 to 1, by the rule that is nearest to its end.
+  !> How much of the run is done, from 0 to 1, by the rule that is closest to being met.
   pure function share(self, sim, elapsed) result(done)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim

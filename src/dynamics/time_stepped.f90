@@ -19,7 +19,7 @@ module time_stepped
   use texts, only: written
   implicit none
   private
-  public :: time_stepped_t, step_warning
+  public :: time_stepped_t
 
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
@@ -34,6 +34,7 @@ module time_stepped
     integer(int32), allocatable, private :: outside(:)  !! (disks) those beyond a side come first
     type(pair_list_t), private :: contacts
   contains
+    procedure :: warning
     procedure :: start
     procedure :: advance
   end type time_stepped_t
@@ -61,8 +62,7 @@ contains
 
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
-      if (sim%events >= limits%events .or. sim%collisions >= limits%collisions &
-        .or. sim%dissipated >= limits%dissipated .or. is_half_full(self%log)) return
+      if (limits%reached(sim) .or. is_half_full(self%log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
@@ -142,7 +142,7 @@ contains
     logical :: yes
 
     yes = .false.
-    if (log%is_on()) yes = 2*log%n >= size(log%time)
+    if (log%is_on()) yes = 2*log%n >= size(log%record, 2)
   end function is_half_full
 
   !> Makes room in the log for more collisions.
@@ -152,12 +152,10 @@ contains
     type(event_log_t) :: larger
 
     if (.not. log%is_on()) return
-    if (log%n + n <= size(log%time)) return
+    if (log%n + n <= size(log%record, 2)) return
     larger = event_log_t(2*(log%n + n))
     larger%n = log%n
-    larger%time(:log%n) = log%time(:log%n)
-    larger%impulse(:log%n) = log%impulse(:log%n)
-    larger%pair(:, :log%n) = log%pair(:, :log%n)
+    larger%record(:, :log%n) = log%record(:, :log%n)
     log = larger
   end subroutine make_room
 
@@ -242,9 +240,9 @@ contains
   !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the
   !> speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact sinks by up to g dt**2/2 per
   !> step under gravity; the TC model prevents it.
-  pure function step_warning(sim, dt) result(text)
+  pure function warning(self, sim) result(text)
+    class(time_stepped_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: dt                  !! [time]
     character(len=:), allocatable :: text
     real(real64) :: speed, radius
     integer(int32) :: i
@@ -256,17 +254,17 @@ contains
     end do
     speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges()))
     radius = minval(sim%disk%radius)
-    if (speed*dt > longest_way*radius) then
-      text = "run.dt: at speeds up to "//about(speed)//" a disk moves by "//about(speed*dt/radius) &
+    if (speed*self%dt > longest_way*radius) then
+      text = "run.dt: at speeds up to "//about(speed)//" a disk moves by "//about(speed*self%dt/radius) &
         //" radii in a step, so that collisions are missed; better: below "//about(longest_way*radius/speed)
     end if
-    if (sim%box%falling() .and. sim%law%contact_time <= dt &
+    if (sim%box%falling() .and. sim%law%contact_time <= self%dt &
       .and. min(minval(sim%law%restitution), sim%law%wall_restitution) < 1) then
       if (text /= "") text = text//"; "
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
         //"is more than run.dt"
     end if
-  end function step_warning
+  end function warning
 
   !> A number with three significant digits.
   pure function about(number) result(text)

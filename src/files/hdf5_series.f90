@@ -1,61 +1,63 @@
-!> Datasets that are filled along their last dimension. Their storage is allocated as a whole when they are
-!> made and takes no room on the disk before it is filled; nothing but data is ever written after that, so
-!> that a kill at any moment, or a reader, meets a file in order. Small items wait in memory until they are
-!> written together: a call of the library costs as much as a hundred kilobytes.
+!> Datasets that are filled along their last dimension, sample by sample. Their storage is allocated as a
+!> whole when they are made (the disk gives room only to what is filled). After that nothing but values is
+!> written, so a reader, or a kill at any moment, finds the file in order.
 module hdf5_series
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr, c_sizeof
+  use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5kind_to_type, h5dcreate_f, h5dopen_f, &
-    h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5pclose_f, h5screate_simple_f, h5sclose_f, &
-    h5sselect_hyperslab_f, h5s_select_set_f, h5t_native_double, h5t_native_real, h5t_ieee_f32le, &
-    h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
-  use hdf5_objects, only: hdf5_file_t, prepare_dataset, prepare_links
+  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5dopen_f, &
+    h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5screate_simple_f, h5sclose_f, &
+    h5sselect_hyperslab_f, h5s_select_set_f, h5t_ieee_f32le, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
+  use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
   implicit none
   private
   public :: series_t, double_precision, single_precision, short_integer, long_integer
 
-  !> How numbers are stored.
+  !> How the values are stored.
   integer, parameter :: double_precision = 1, single_precision = 2, short_integer = 3, long_integer = 4
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
   integer(int64), parameter :: copied_at_once = 1048576     !! [bytes]
 
-  !> One series. Its name, storage and shape are given, then it is made or opened.
+  !> One series: its name, storage and shape are given, then it is made or opened.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
-    integer :: rank = 0                           !! of one item; 0: a number
-    integer :: shape(2) = 1                       !! of one item, as far as it has dimensions
-    integer(int64) :: batch = 1                   !! items that are written together
-    integer(int64) :: capacity = 0                !! items there is room for
-    integer(int64), private :: waiting = 0        !! items put but not written
-    integer(int64), private :: first_waiting = 0  !! number of the first of them
-    integer(int8), allocatable, private :: batch_of_bytes(:)    !! the waiting items, as they came
-    integer(hid_t), private :: in_memory = -1     !! HDF5 type of their values
+    integer :: rank = 0                           !! of one sample; 0: a number
+    integer :: shape(2) = 1                       !! of one sample, as far as it has dimensions
+    integer(int64) :: capacity = 0                !! samples there is room for
     integer(hid_t), private :: id = -1
   contains
     procedure :: make
     procedure :: open => open_series
-    procedure :: write_waiting
+    procedure :: write => write_samples
+    procedure :: read => read_sample
     procedure :: copy
     procedure :: close => close_series
+    procedure :: width
     procedure :: room
-    generic :: put => put_reals, put_integers, put_longs
-    procedure, private :: put_reals, put_integers, put_longs
-    procedure, private :: put_items, write_items, read_items, storage_type
+    procedure, private :: exchange
+    procedure, private :: storage_type
   end type series_t
 
 contains
 
-  !> Bytes of one item in the file.
+  !> Number of values of one sample.
+  pure function width(self)
+    class(series_t), intent(in) :: self
+    integer :: width
+
+    width = product(self%shape)
+  end function width
+
+  !> Bytes of one sample in the file.
   pure function room(self) result(bytes)
     class(series_t), intent(in) :: self
     integer(int64) :: bytes
 
-    bytes = bytes_of(self%storage)*product(int(self%shape, int64))
+    bytes = int(bytes_of(self%storage), int64)*self%width()
   end function room
 
-  !> Its HDF5 type in the file.
+  !> The HDF5 type of the values in the file.
   function storage_type(self) result(type)
     class(series_t), intent(in) :: self
     integer(hid_t) :: type, types(4)
@@ -64,40 +66,36 @@ contains
     type = types(self%storage)
   end function storage_type
 
-  !> Makes the series with room for `capacity` items.
+  !> Makes the series with room for `capacity` samples.
   subroutine make(self, file, capacity)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: capacity
-    integer(hid_t) :: space, properties, links
-    integer :: status, closed
 
-    if (allocated(file%trouble)) return
     self%capacity = capacity
-    call prepare_dataset(properties, status)
-    if (status >= 0) call prepare_links(links, status)
-    if (status >= 0) call h5screate_simple_f(self%rank + 1, &
-      int([int(self%shape(:self%rank), int64), capacity], hsize_t), space, status)
-    if (status >= 0) call h5dcreate_f(file%id, trim(self%name), self%storage_type(), space, self%id, status, &
-      properties, links)
-    call file%check(status, "write "//trim(self%name))
-    call h5sclose_f(space, closed)
-    call h5pclose_f(properties, closed)
-    call h5pclose_f(links, closed)
+    call file%make_dataset(trim(self%name), self%storage_type(), &
+      int([int(self%shape(:self%rank), int64), capacity], hsize_t), self%id)
   end subroutine make
 
-  !> Opens the series in a file that is to go on.
+  !> Opens the series in a file that has it; its samples must have the shape that is expected.
   subroutine open_series(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
+    integer(hsize_t), allocatable :: extents(:)
     integer :: status
 
-    if (allocated(file%trouble)) return
-    self%capacity = file%length(trim(self%name))/product(int(self%shape, int64))
-    call h5dopen_f(file%id, trim(self%name), self%id, status)
+    if (allocated(file%failure)) return
+    extents = file%extents(trim(self%name))
+    status = -1
+    if (size(extents) == self%rank + 1) then
+      self%capacity = extents(self%rank + 1)
+      if (all(extents(:self%rank) == self%shape(:self%rank))) &
+        call h5dopen_f(file%id, trim(self%name), self%id, status)
+    end if
     call file%check(status, "be read: "//trim(self%name))
   end subroutine open_series
 
+  !> Closes the series if it is open.
   subroutine close_series(self)
     class(series_t), intent(inout) :: self
     integer :: status
@@ -106,9 +104,62 @@ contains
     self%id = -1
   end subroutine close_series
 
-  !> Takes over the first `count` items of the same series in another file.
+  !> Writes samples, converted to what is stored: HDF5 would take ten times as long to shorten reals. A
+  !> single sample of doubles is written from where it is, as it may be large.
+  subroutine write_samples(self, file, first, values)
+    class(series_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: first           !! number of the first of these samples, from 1
+    real(real64), intent(in), target :: values(:, :)     !! (width,samples)
+    real(real64), allocatable, target :: doubles(:, :)
+    real(real32), allocatable, target :: singles(:, :)
+    integer(int32), allocatable, target :: shorts(:, :)
+    integer(int64), allocatable, target :: longs(:, :)
+    integer(hid_t) :: type
+    integer(int64) :: count
+    type(c_ptr) :: address
+
+    if (allocated(file%failure)) return
+    count = size(values, 2)
+    file%unsaved = file%unsaved + count*self%room()
+    select case (self%storage)
+    case (double_precision)
+      type = h5kind_to_type(real64, h5_real_kind)
+      address = c_loc(values(1, 1))
+      if (count > 1) then
+        doubles = values
+        address = c_loc(doubles)
+      end if
+    case (single_precision)
+      type = h5kind_to_type(real32, h5_real_kind)
+      singles = real(values, real32)
+      address = c_loc(singles)
+    case (short_integer)
+      type = h5kind_to_type(int32, h5_integer_kind)
+      shorts = int(values, int32)
+      address = c_loc(shorts)
+    case default
+      type = h5kind_to_type(int64, h5_integer_kind)
+      longs = int(values, int64)
+      address = c_loc(longs)
+    end select
+    call self%exchange(file, first, count, type, address, writing=.true.)
+  end subroutine write_samples
+
+  !> Reads one sample as doubles.
+  subroutine read_sample(self, file, number, values)
+    class(series_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64), intent(in) :: number          !! from 1
+    real(real64), intent(inout), target :: values(*)
+
+    if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name))
+    call self%exchange(file, number, 1_int64, h5kind_to_type(real64, h5_real_kind), c_loc(values), writing=.false.)
+  end subroutine read_sample
+
+  !> Copies the first `count` samples from the same series in another file.
   subroutine copy(self, file, source, source_file, count)
-    class(series_t), intent(inout) :: self
+    class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file, source_file
     class(series_t), intent(in) :: source
     integer(int64), intent(in) :: count
@@ -119,132 +170,42 @@ contains
     allocate (buffer(min(step, count)*self%room()))
     do first = 1, count, step
       n = min(step, count - first + 1)
-      call source%read_items(source_file, first, n, self%storage_type(), c_loc(buffer))
-      call self%write_items(file, first, n, self%storage_type(), c_loc(buffer))
+      file%unsaved = file%unsaved + n*self%room()
+      call source%exchange(source_file, first, n, self%storage_type(), c_loc(buffer), writing=.false.)
+      call self%exchange(file, first, n, self%storage_type(), c_loc(buffer), writing=.true.)
     end do
   end subroutine copy
 
-  subroutine put_reals(self, file, first, count, values)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first           !! number of the first of these items, from 1
-    integer(int64), intent(in) :: count           !! of items
-    real(real64), intent(in), target :: values(*)
-    real(real32), allocatable, target :: short(:)
-
-    if (self%storage == single_precision) then    ! HDF5 would take ten times as long to shorten them
-      short = real(values(:count*product(int(self%shape, int64))), real32)
-      call self%put_items(file, first, count, h5t_native_real, c_sizeof(short(1)), c_loc(short))
-    else
-      call self%put_items(file, first, count, h5t_native_double, c_sizeof(values(1)), c_loc(values))
-    end if
-  end subroutine put_reals
-
-  subroutine put_integers(self, file, first, count, values)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first, count
-    integer(int32), intent(in), target :: values(*)
-
-    call self%put_items(file, first, count, h5kind_to_type(int32, h5_integer_kind), c_sizeof(values(1)), c_loc(values))
-  end subroutine put_integers
-
-  subroutine put_longs(self, file, first, count, values)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first, count
-    integer(int64), intent(in), target :: values(*)
-
-    call self%put_items(file, first, count, h5kind_to_type(int64, h5_integer_kind), c_sizeof(values(1)), c_loc(values))
-  end subroutine put_longs
-
-  !> Lets the items wait, after those before them have been written if there is no place for all; a whole
-  !> batch is written at once.
-  subroutine put_items(self, file, first, count, in_memory, width, address)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first, count
-    integer(hid_t), intent(in) :: in_memory       !! HDF5 type of the values
-    integer(int64), intent(in) :: width           !! of a value in memory [bytes]
-    type(c_ptr), intent(in) :: address
-    integer(int8), pointer :: bytes(:)
-    integer(int64) :: n
-
-    if (count >= self%batch) then
-      call self%write_items(file, first, count, in_memory, address)
-      return
-    end if
-    if (self%waiting + count > self%batch) call self%write_waiting(file)
-    if (self%waiting == 0) self%first_waiting = first
-    n = width*product(int(self%shape, int64))
-    if (.not. allocated(self%batch_of_bytes)) allocate (self%batch_of_bytes(n*self%batch))
-    self%in_memory = in_memory
-    call c_f_pointer(address, bytes, [n*count])
-    self%batch_of_bytes(n*self%waiting + 1:n*(self%waiting + count)) = bytes
-    self%waiting = self%waiting + count
-  end subroutine put_items
-
-  !> Writes the items that wait.
-  subroutine write_waiting(self, file)
-    class(series_t), intent(inout), target :: self
-    type(hdf5_file_t), intent(inout) :: file
-
-    if (self%waiting > 0) call self%write_items(file, self%first_waiting, self%waiting, self%in_memory, &
-      c_loc(self%batch_of_bytes))
-    self%waiting = 0
-  end subroutine write_waiting
-
-  subroutine write_items(self, file, first, count, in_memory, address)
-    class(series_t), intent(inout) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first, count
-    integer(hid_t), intent(in) :: in_memory
-    type(c_ptr), intent(in) :: address
-    integer(hid_t) :: there, here
-    integer :: status, closed
-
-    if (allocated(file%trouble)) return
-    file%unsaved = file%unsaved + count*self%room()
-    call select_items(self, first, count, there, here, status)
-    if (status >= 0) call h5dwrite_f(self%id, in_memory, address, status, here, there)
-    call file%check(status, "write "//trim(self%name))
-    call h5sclose_f(there, closed)
-    call h5sclose_f(here, closed)
-  end subroutine write_items
-
-  subroutine read_items(self, file, first, count, in_memory, address)
+  !> Writes or reads some samples of the file from or to the memory at an address.
+  subroutine exchange(self, file, first, count, type, address, writing)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first, count
-    integer(hid_t), intent(in) :: in_memory
+    integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
-    type(c_ptr) :: place
-    integer(hid_t) :: there, here
-    integer :: status, closed
-
-    if (allocated(file%trouble)) return
-    place = address
-    call select_items(self, first, count, there, here, status)
-    if (status >= 0) call h5dread_f(self%id, in_memory, place, status, here, there)
-    call file%check(status, "be read: "//trim(self%name))
-    call h5sclose_f(there, closed)
-    call h5sclose_f(here, closed)
-  end subroutine read_items
-
-  !> Some items, as part of the file and of the memory.
-  subroutine select_items(self, first, count, there, here, status)
-    class(series_t), intent(in) :: self
-    integer(int64), intent(in) :: first, count
-    integer(hid_t), intent(out) :: there, here
-    integer, intent(out) :: status
+    logical, intent(in) :: writing
+    integer(hid_t) :: in_file, in_memory
     integer(hsize_t) :: start(self%rank + 1), counts(self%rank + 1)
+    type(c_ptr) :: place
+    integer :: status, closed
 
+    if (allocated(file%failure)) return
     counts = [int(self%shape(:self%rank), hsize_t), int(count, hsize_t)]
     start = 0
     start(size(start)) = first - 1
-    call h5screate_simple_f(size(counts), counts, here, status)
-    if (status >= 0) call h5dget_space_f(self%id, there, status)
-    if (status >= 0) call h5sselect_hyperslab_f(there, h5s_select_set_f, start, counts, status)
-  end subroutine select_items
+    place = address
+    call h5screate_simple_f(size(counts), counts, in_memory, status)
+    if (status >= 0) call h5dget_space_f(self%id, in_file, status)
+    if (status >= 0) call h5sselect_hyperslab_f(in_file, h5s_select_set_f, start, counts, status)
+    if (writing) then
+      if (status >= 0) call h5dwrite_f(self%id, type, place, status, in_memory, in_file)
+      call file%check(status, "write "//trim(self%name))
+    else
+      if (status >= 0) call h5dread_f(self%id, type, place, status, in_memory, in_file)
+      call file%check(status, "be read: "//trim(self%name))
+    end if
+    call h5sclose_f(in_file, closed)
+    call h5sclose_f(in_memory, closed)
+  end subroutine exchange
 
 end module hdf5_series

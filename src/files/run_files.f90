@@ -3,66 +3,37 @@ module run_files
   use system, only: remove_file
   implicit none
   private
-  public :: part_of, new_part_of, lock_of, checkpoint_of, earlier_checkpoint_of, new_checkpoint_of
-  public :: is_file, is_hdf5_file, remove_checkpoints
+  public :: run_file, is_file, is_hdf5_file, remove_checkpoints
+
+  ! What the name of a file ends with. An ending with .h5 replaces that of the output.
+  character(len=*), parameter, public :: &
+    unfinished = ".part", &                       !! the output while it is being written
+    unfinished_new = ".part_new", &               !! the same until all that is written once is in it
+    lock = ".lock", &                             !! keeps other runs from this output
+    current_checkpoint = ".chk.h5", &
+    previous_checkpoint = ".chk_prev.h5", &
+    new_checkpoint = ".chk_new.h5"                !! while it is being written
 
 contains
 
-  !> The output while it is being written.
-  pure function part_of(path) result(name)
-    character(len=*), intent(in) :: path          !! of the output
-    character(len=:), allocatable :: name
+  !> Name of a file of the run that has a certain output.
+  pure function run_file(output, ending) result(path)
+    character(len=*), intent(in) :: output        !! path of the output
+    character(len=*), intent(in) :: ending        !! one of the names above
+    character(len=:), allocatable :: path
 
-    name = path//".part"
-  end function part_of
+    path = output//ending
+    if (index(ending//"|", ".h5|") > 0 .and. index(output//"|", ".h5|") > 1) path = output(:len(output) - 3)//ending
+  end function run_file
 
-  !> The same before all that is written once is in it.
-  pure function new_part_of(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
+  !> Removes all checkpoints of an output.
+  subroutine remove_checkpoints(output)
+    character(len=*), intent(in) :: output        !! path of the output
 
-    name = path//".part_new"
-  end function new_part_of
-
-  !> The file whose lock keeps two runs from one output.
-  pure function lock_of(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
-
-    name = path//".lock"
-  end function lock_of
-
-  pure function checkpoint_of(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
-
-    name = stem_of(path)//".chk.h5"
-  end function checkpoint_of
-
-  !> The last checkpoint but one.
-  pure function earlier_checkpoint_of(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
-
-    name = stem_of(path)//".chk_prev.h5"
-  end function earlier_checkpoint_of
-
-  !> A checkpoint while it is being written.
-  pure function new_checkpoint_of(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
-
-    name = stem_of(path)//".chk_new.h5"
-  end function new_checkpoint_of
-
-  !> The path without .h5.
-  pure function stem_of(path) result(stem)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: stem
-
-    stem = path
-    if (index(path//"|", ".h5|") > 1) stem = path(:len(path) - 3)
-  end function stem_of
+    call remove_file(run_file(output, current_checkpoint))
+    call remove_file(run_file(output, previous_checkpoint))
+    call remove_file(run_file(output, new_checkpoint))
+  end subroutine remove_checkpoints
 
   !> Whether the file is in HDF5 format, by its first bytes: nothing else is ever replaced.
   function is_hdf5_file(path) result(yes)
@@ -79,19 +50,12 @@ contains
     close (unit)
   end function is_hdf5_file
 
+  !> Whether there is a file of this name.
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
 
     inquire (file=path, exist=yes)
   end function is_file
-
-  subroutine remove_checkpoints(path)
-    character(len=*), intent(in) :: path          !! of the output
-
-    call remove_file(checkpoint_of(path))
-    call remove_file(earlier_checkpoint_of(path))
-    call remove_file(new_checkpoint_of(path))
-  end subroutine remove_checkpoints
 
 end module run_files

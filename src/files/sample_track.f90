@@ -1,8 +1,11 @@
-!> Series that are filled together: frames, observables, events. A counter in the file says how many samples
-!> are complete; it is written after their data have been flushed. A reader, or a restart, goes by it.
+!> Series that are filled together: frames, observables, or events. A counter in the file says how many samples
+!> are complete; it is written after their values have been flushed, and readers and restarts go by it.
+!>
+!> A sample is one record of reals, the values of each series one after the other; integers are exact up to
+!> 2**53. Small samples are buffered: a call of HDF5 costs as much as a hundred kilobytes.
 module sample_track
   use kinds, only: int64, real64
-  use hdf5_objects, only: hdf5_file_t
+  use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: series_t
   use system, only: seconds
   use texts, only: written
@@ -10,44 +13,37 @@ module sample_track
   private
   public :: track_t
 
-  integer(int64), parameter :: batch_bytes = 262144     !! samples that wait to be written together
+  integer(int64), parameter :: batch_bytes = 262144     !! samples that are written together
   integer(int64), parameter :: most_in_batch = 512      !! samples
   integer(int64), parameter :: first_bytes = 67108864   !! room made for an unknown number of samples
   integer(int64), parameter :: fewest = 16              !! samples there is room for, however large
   integer(int64), parameter :: growth = 4               !! room is multiplied by this when it is used up
 
   type :: track_t
-    type(series_t), allocatable :: series(:)            !! step, time, values; of events values alone
-    character(len=:), allocatable :: counter            !! name of its dataset
+    type(series_t), allocatable :: series(:)            !! step and time first, if they share them; none: not in use
+    character(len=:), allocatable :: counter            !! path of its dataset
     integer(int64) :: capacity = 0                      !! samples there is room for
-    integer(int64) :: committed = 0                     !! samples that are complete in the file
-    integer(int64) :: put = 0                           !! samples handed over, be they written or not
-    real(real64) :: waiting_since = 0.0_real64          !! of the oldest sample that is not written [s]
+    integer(int64) :: appended = 0                      !! samples taken over, written or not
+    integer(int64), private :: committed = 0            !! samples that are complete in the file
+    real(real64), private :: waiting_since = 0.0_real64 !! of the oldest sample in the buffer [s]
+    real(real64), allocatable, private :: buffer(:, :)  !! (width,batch) samples that are not written
   contains
-    procedure :: is_in_use
     procedure :: make
     procedure :: resume
     procedure :: copy
     procedure :: close => close_track
-    procedure :: larger
-    procedure :: put_moment
-    procedure :: commit
-    procedure :: write_waiting
+    procedure :: enlarged
+    procedure :: append
+    procedure :: write_buffer
     procedure :: room
     procedure, private :: batch
-    procedure, private :: link_moments
+    procedure, private :: write_samples
+    procedure, private :: link_step_and_time
   end type track_t
 
 contains
 
-  pure function is_in_use(self) result(yes)
-    class(track_t), intent(in) :: self
-    logical :: yes
-
-    yes = allocated(self%series)
-  end function is_in_use
-
-  !> Bytes of one sample.
+  !> Bytes of one sample in the file.
   pure function room(self) result(bytes)
     class(track_t), intent(in) :: self
     integer(int64) :: bytes
@@ -59,7 +55,7 @@ contains
     end do
   end function room
 
-  !> Samples that wait for each other.
+  !> Number of samples that are written together.
   pure function batch(self) result(n)
     class(track_t), intent(in) :: self
     integer(int64) :: n
@@ -67,38 +63,37 @@ contains
     n = max(1_int64, min(most_in_batch, batch_bytes/self%room()))
   end function batch
 
-  !> The capacity to have next, to take `count` more samples.
-  pure function larger(self, count) result(n)
+  !> The capacity that `count` more samples need, with room for later ones if it has to grow.
+  pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
     integer(int64), intent(in) :: count
     integer(int64) :: n
 
     n = self%capacity
-    do while (n < self%put + count)
+    do while (n < self%appended + count)
       n = max(growth*n, 1_int64)
     end do
-  end function larger
+  end function enlarged
 
-  !> Makes the track in a new file, with room for `capacity` samples; 0: nobody knows how many.
+  !> Makes the track in a new file.
   subroutine make(self, file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: capacity
+    integer(int64), intent(in) :: capacity              !! samples; 0: their number is unknown
     integer :: k
 
-    if (.not. self%is_in_use()) return
+    if (.not. allocated(self%series)) return
     self%capacity = capacity
     if (capacity == 0) self%capacity = max(fewest, first_bytes/self%room())
     do k = 1, size(self%series)
-      self%series(k)%batch = self%batch()
       call self%series(k)%make(file, self%capacity)
     end do
-    call self%link_moments(file)
-    call file%put(self%counter, [integer ::], [0_int64])
+    call self%link_step_and_time(file)
+    call file%put(self%counter, scalar, [0_int64])
   end subroutine make
 
   !> Gives all elements the step and time of the first, as H5MD wants it for what is sampled together.
-  subroutine link_moments(self, file)
+  subroutine link_step_and_time(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     character(len=:), allocatable :: element
@@ -111,7 +106,7 @@ contains
       call file%link(trim(self%series(1)%name), element//"step")
       call file%link(trim(self%series(2)%name), element//"time")
     end do
-  end subroutine link_moments
+  end subroutine link_step_and_time
 
   !> Opens the track of a file and goes back to its first `count` samples.
   subroutine resume(self, file, count)
@@ -121,22 +116,21 @@ contains
     integer(int64) :: committed(1)
     integer :: k
 
-    if (.not. self%is_in_use()) return
+    if (.not. allocated(self%series)) return
     committed = 0
     call file%fetch(self%counter, 1, committed)
     if (committed(1) < count) call file%check(-1, "go on: "//self%counter//" is " &
       //written(committed(1))//", the checkpoint says "//written(count))
     do k = 1, size(self%series)
-      self%series(k)%batch = self%batch()
       call self%series(k)%open(file)
     end do
     self%capacity = self%series(1)%capacity
+    self%appended = count
     self%committed = count
-    self%put = count
     if (committed(1) /= count) call file%replace(self%counter, count)
   end subroutine resume
 
-  !> Makes the track in a new file with another capacity, with all the samples it has.
+  !> Makes the same track in a new file with another capacity, with all samples that are written.
   subroutine copy(self, file, source, source_file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file, source_file
@@ -144,10 +138,10 @@ contains
     integer(int64), intent(in) :: capacity
     integer :: k
 
-    if (.not. source%is_in_use()) return
+    if (.not. allocated(source%series)) return
     self%series = source%series
     self%counter = source%counter
-    self%put = source%put
+    self%appended = source%committed
     self%committed = source%committed
     call self%make(file, capacity)
     do k = 1, size(self%series)
@@ -156,52 +150,68 @@ contains
     call file%replace(self%counter, self%committed)
   end subroutine copy
 
+  !> Closes the series; the samples in the buffer must have been written.
   subroutine close_track(self)
     class(track_t), intent(inout) :: self
     integer :: k
 
-    if (.not. self%is_in_use()) return
+    if (.not. allocated(self%series)) return
     do k = 1, size(self%series)
       call self%series(k)%close()
     end do
   end subroutine close_track
 
-  !> Writes step and time of the sample that is being written.
-  subroutine put_moment(self, file, time)
+  !> Takes over the next samples, for which there must be room. They are written at once if they fill a batch.
+  subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    real(real64), intent(in) :: time
+    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    integer(int64) :: count, waiting
 
-    call self%series(1)%put(file, self%put + 1, 1_int64, [self%put])
-    call self%series(2)%put(file, self%put + 1, 1_int64, [time])
-  end subroutine put_moment
+    count = size(samples, 2)
+    if (self%appended - self%committed + count > self%batch()) call self%write_buffer(file, 0.0_real64)
+    if (allocated(file%failure)) return                 ! the buffer may still be full
+    waiting = self%appended - self%committed
+    self%appended = self%appended + count
+    if (count >= self%batch()) then
+      call self%write_samples(file, samples)
+    else
+      if (waiting == 0) self%waiting_since = seconds()
+      if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), self%batch()))
+      self%buffer(:, waiting + 1:waiting + count) = samples
+      if (waiting + count == self%batch()) call self%write_buffer(file, 0.0_real64)
+    end if
+  end subroutine append
 
-  !> Declares the next samples complete. They are written when a batch is full or, at the latest, when they
-  !> have waited long enough.
-  subroutine commit(self, file, count)
+  !> Writes the buffer if its oldest sample has waited for some time.
+  subroutine write_buffer(self, file, least_wait)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: count                 !! of samples
+    real(real64), intent(in) :: least_wait              !! [s]
 
-    if (self%put == self%committed) self%waiting_since = seconds()
-    self%put = self%put + count
-    if (self%put - self%committed >= self%batch()) call self%write_waiting(file)
-  end subroutine commit
+    if (self%appended == self%committed .or. allocated(file%failure)) return
+    if (seconds() - self%waiting_since < least_wait) return
+    call self%write_samples(file, self%buffer(:, :self%appended - self%committed))
+  end subroutine write_buffer
 
-  !> Writes what waits: first the data, then the counter.
-  subroutine write_waiting(self, file)
+  !> Writes samples behind those that are committed, and commits them: first the values, then the counter.
+  subroutine write_samples(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer :: k
+    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    integer(int64) :: committed
+    integer :: k, first
 
-    if (self%put == self%committed) return
+    first = 1
     do k = 1, size(self%series)
-      call self%series(k)%write_waiting(file)
+      call self%series(k)%write(file, self%committed + 1, samples(first:first + self%series(k)%width() - 1, :))
+      first = first + self%series(k)%width()
     end do
+    committed = self%committed + size(samples, 2)
     call file%flush()
-    call file%replace(self%counter, self%put)
+    call file%replace(self%counter, committed)
     call file%flush()
-    if (.not. allocated(file%trouble)) self%committed = self%put
-  end subroutine write_waiting
+    if (.not. allocated(file%failure)) self%committed = committed
+  end subroutine write_samples
 
 end module sample_track

@@ -3,7 +3,7 @@ module command_line
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
-  use hdf5_objects, only: hdf5_version
+  use hdf5_handle, only: hdf5_version
   use parameters, only: defaults_text, explain
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t

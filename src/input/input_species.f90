@@ -2,8 +2,10 @@
 module input_species
   use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
+  use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
   use input_values, only: counted
+  use observables, only: own_names
   use parameter_values, only: parameter_group_t
   use parameters, only: either, largest, row_of, smallest, table, words_of
   use settings, only: species_settings_t
@@ -12,10 +14,6 @@ module input_species
   private
   public :: take_species, check_name
 
-  !> Names that the output file uses for groups and datasets of its own.
-  character(len=*), parameter :: reserved(*) = [character(len=20) :: "all", "total_energy", &
-    "momentum", "collisions", "wall_collisions", "wall_impulse", "obstacle_collisions", "virial", &
-    "pressure", "dissipated_energy", "names", "counts"]
   character(len=*), parameter :: letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
   integer, parameter :: longest_name = 40
   integer, parameter :: most_disks = 100000000
@@ -68,7 +66,7 @@ contains
     if (verify(name, letters//"0123456789_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
       call groups(k)%complain("name", shown(name)//" is not a valid name; allowed: up to "//written(longest_name)// &
         " letters, digits, _ and -, beginning with a letter", problems)
-    else if (any(reserved == name)) then
+    else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
     j = place_of(name, groups%instance)

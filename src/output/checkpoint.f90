@@ -1,24 +1,23 @@
-!> Checkpoints: OUT.chk.h5 holds all of a simulation that the input does not say, and how far its output has
-!> come. A run that goes on from it gives the same data as one that never stopped, bit for bit.
+!> Checkpoints: OUT.chk.h5 holds what changes in a simulation, and how far its output has come. A run that goes
+!> on from it gives the same data as one that never stopped, bit for bit.
 !>
-!> A checkpoint is written under another name, read back, and renamed: at every moment there is a whole one.
-!> The file begins with a checksum over all that follows, which is verified before anything is believed.
+!> A checkpoint is written under another name, read back, and renamed, so there is a complete one at every
+!> moment. The file begins with a checksum of all that follows, which is verified before anything is read.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int32, int64, real64
-  use partners, only: n_sides
   use build_info, only: build_flags
   use cadence, only: cadence_t
-  use checksum, only: crc_of_bytes, crc_of_file, hexadecimal
   use errors, only: error_t, exit_files, exit_usage, fail
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
-  use run_files, only: checkpoint_of, earlier_checkpoint_of, is_file, new_checkpoint_of, part_of
-  use settings, only: settings_t
+  use run_files, only: current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
+  use run_input, only: run_input_t
+  use sealed_file, only: checksum, flaw_of, seal
   use simulation_state, only: simulation_t
-  use system, only: free_bytes, is_folder, last_problem, link_file, move_file, remove_file, synchronize
+  use system, only: free_bytes, last_problem, link_file, move_file, remove_file, synchronize
   use texts, only: written
   use version, only: program_version
   implicit none
@@ -26,46 +25,52 @@ module checkpoint
   public :: write_checkpoint, read_checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
-  integer, parameter :: header_length = 64
-  character(len=*), parameter :: first_words = "ricochet checkpoint"
+  character(len=*), parameter :: title = "ricochet checkpoint 2"
   character(len=*), parameter :: eol = new_line("a")
 
-  !> Variables that say how a run is done, not what: they may differ when it goes on.
+  !> Variables that change how a run is done but not its result: they may differ when it goes on.
   character(len=*), parameter :: free_to_change(5) = [character(len=26) :: "run.title = ", &
     "run.search = ", "run.queue = ", "stop.wall_clock = ", "output.checkpoint_every = "]
 
+  !> A file whose components are either written or read.
+  type :: component_file_t
+    type(hdf5_file_t) :: hdf5
+    logical :: writing = .false.
+  contains
+    generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers
+    procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers
+  end type component_file_t
+
 contains
 
-  !> Writes the checkpoint of a run; the one before is kept as OUT.chk_prev.h5.
-  subroutine write_checkpoint(path, settings, groups, sim, output, error)
-    character(len=*), intent(in) :: path        !! of the output
-    type(settings_t), intent(in) :: settings
-    type(parameter_group_t), intent(in) :: groups(:)    !! every value as used
-    type(simulation_t), intent(in) :: sim
+  !> Writes the checkpoint of a run; the previous one is kept as OUT.chk_prev.h5.
+  subroutine write_checkpoint(sim, output, error)
+    type(simulation_t), intent(inout) :: sim    !! stays as it is
     type(output_t), intent(inout) :: output
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: new, current
-    type(hdf5_file_t) :: file
+    type(component_file_t) :: file
     type(progress_t) :: progress
     logical :: done
 
-    new = new_checkpoint_of(path)
-    current = checkpoint_of(path)
+    new = run_file(output%path, new_checkpoint)
+    current = run_file(output%path, current_checkpoint)
     call output%save(progress, error)
     if (.not. allocated(error)) call check_room(current, size(sim%disk, kind=int64), error)
     if (allocated(error)) return
     call remove_file(new)
-    call file%create(new, reserved, name=current)
-    call file%put("program", program())
-    call file%put("input", identity(groups))
-    call put_state(file, sim)
-    call put_progress(file, progress)
-    call file%close()
-    call file%failure(error)
+    file%writing = .true.
+    call file%hdf5%create(new, final_path=current, reserved=reserved)
+    call file%hdf5%put("program", program())
+    call file%hdf5%put("input", fixed_input(output%input%groups))
+    call exchange_state(file, sim)
+    call exchange_progress(file, progress)
+    call file%hdf5%close()
+    call file%hdf5%report(error)
     if (.not. allocated(error)) then
-      call seal(new, done)
+      call seal(new, title, done)
       if (done) call synchronize(new, done)
-      if (done) call link_file(current, earlier_checkpoint_of(path))
+      if (done) call link_file(current, run_file(output%path, previous_checkpoint))
       if (done) call move_file(new, current, done)
       if (.not. done) call fail(error, exit_files, current//": cannot be written: "//last_problem())
     end if
@@ -85,53 +90,56 @@ contains
   end subroutine check_room
 
   !> Restores a run from its checkpoint: the simulation, and the output open and ready to go on.
-  subroutine read_checkpoint(path, settings, groups, sim, output, error)
+  subroutine read_checkpoint(path, input, sim, output, error)
     character(len=*), intent(in) :: path        !! of the output
-    type(settings_t), intent(in) :: settings
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(run_input_t), intent(in) :: input
     type(simulation_t), intent(out) :: sim
     type(output_t), intent(inout) :: output
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: current, flaw
-    type(hdf5_file_t) :: file
+    type(component_file_t) :: file
     type(progress_t) :: progress
     logical :: finished
 
-    current = checkpoint_of(path)
+    current = run_file(path, current_checkpoint)
     finished = is_file(path)
-    if (finished) finished = .not. is_file(part_of(path))
+    if (finished) finished = .not. is_file(run_file(path, unfinished))
     if (finished) then
       call fail(error, exit_files, path//": is finished; there is nothing to go on with")
     else if (.not. is_file(current)) then
-      call fail(error, exit_files, current//": there is no checkpoint to go on from; " &
-        //way_out(earlier_checkpoint_of(path)))
+      call fail(error, exit_files, current//": there is no checkpoint to go on from; "//advice(path))
     else
-      flaw = flaw_of(current)
-      if (flaw /= "") call fail(error, exit_usage, current//": "//flaw//"; "//way_out(earlier_checkpoint_of(path)))
+      flaw = flaw_of(current, title)
+      if (flaw /= "") call fail(error, exit_usage, current//": "//flaw//"; "//advice(path))
     end if
     if (allocated(error)) return
-    call file%open(current, writable=.false.)
-    call check_origin(file, groups, error)
+    call file%hdf5%open(current, writable=.false.)
+    call check_origin(file%hdf5, input%groups, error)
     if (.not. allocated(error)) then
-      call describe_system(settings, sim)
-      call fetch_state(file, sim)
-      call fetch_progress(file, progress)
+      call describe_system(input%settings, sim)
+      call exchange_state(file, sim)
+      progress = progress_t(input%settings%output)
+      call exchange_progress(file, progress)
     end if
-    call file%close()
-    if (.not. allocated(error)) call file%failure(error)
-    if (.not. allocated(error)) call output%resume(path, settings, sim, progress, error)
+    call file%hdf5%close()
+    if (.not. allocated(error)) call file%hdf5%report(error)
+    if (.not. allocated(error)) call output%resume(path, input, sim, progress, error)
   end subroutine read_checkpoint
 
-  !> What to do without a checkpoint, by whether the one before is whole.
-  function way_out(earlier) result(advice)
-    character(len=*), intent(in) :: earlier
+  !> What to do without the checkpoint of an output, by whether the previous one is good.
+  function advice(path)
+    character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
 
-    advice = "the one before is whole: give "//earlier//" its name to go on from there"
-    if (flaw_of(earlier) /= "") advice = "--force instead of --resume starts over"
-  end function way_out
+    advice = run_file(path, previous_checkpoint)
+    if (flaw_of(advice, title) == "") then
+      advice = "the previous one is good: give "//advice//" its name to go on from there"
+    else
+      advice = "--force instead of --resume starts over"
+    end if
+  end function advice
 
-  !> What makes two builds give different bits: the version, and arithmetic that is not by the book.
+  !> The program, with what makes two builds give different bits: the version, and arithmetic that is not exact.
   pure function program() result(text)
     character(len=:), allocatable :: text
 
@@ -140,8 +148,8 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> The input as it was used, less what is free to change: one variable to a line.
-  pure function identity(groups) result(text)
+  !> The input as it was used, without what is free to change: one variable to a line.
+  pure function fixed_input(groups) result(text)
     type(parameter_group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
     integer :: k, g, first, length
@@ -159,10 +167,10 @@ contains
         if (size(groups(g)%values(k)%reals) <= 100) cycle      ! in the text with all digits
         text = text//"checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = " &
-          //hexadecimal(crc_of_bytes(transfer(groups(g)%values(k)%reals, [0_int8])))//eol
+          //checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol
       end do
     end do
-  end function identity
+  end function fixed_input
 
   !> Refuses the checkpoint of another program or another input.
   subroutine check_origin(file, groups, error)
@@ -172,14 +180,14 @@ contains
     character(len=:), allocatable :: there, here, variable
 
     call file%fetch_text("program", there)
-    if (there /= program() .and. .not. allocated(file%trouble)) then
+    if (there /= program() .and. .not. allocated(file%failure)) then
       call fail(error, exit_usage, file%path//": was written by "//there//", this is "//program())
       return
     end if
     call file%fetch_text("input", there)
-    if (allocated(file%trouble)) return
+    if (allocated(file%failure)) return
     there = there//eol
-    here = identity(groups)
+    here = fixed_input(groups)
     do while (there /= "" .or. here /= "")
       variable = there(:index(there//eol, eol) - 1)
       if (here(:index(here//eol, eol) - 1) /= variable) then
@@ -192,204 +200,124 @@ contains
     end do
   end subroutine check_origin
 
-  !> Writes the state. Names and units as in `simulation_state` and `disks`.
-  subroutine put_state(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
-
-    call file%put("reals", [5 + n_sides], [sim%epoch, sim%now, sim%virial, sim%dissipated, &
-      sim%start_energy, sim%wall_impulse])
-    call file%put("counts", [4 + n_sides], [sim%next_epoch, sim%events, sim%collisions, &
-      sim%obstacle_collisions, sim%wall_collisions])
-    associate (n => size(sim%disk))
-      call file%put("disks/x1", [n], sim%disk%x(1))
-      call file%put("disks/x2", [n], sim%disk%x(2))
-      call file%put("disks/v1", [n], sim%disk%v(1))
-      call file%put("disks/v2", [n], sim%disk%v(2))
-      call file%put("disks/clock", [n], sim%disk%clock)
-      call file%put("disks/species", [n], sim%tag%species)
-      call file%put("disks/id", [n], sim%tag%id)
-      call file%put("disks/collisions", [n], sim%tag%collisions)
-      call file%put("disks/image1", [n], sim%tag%image(1))
-      call file%put("disks/image2", [n], sim%tag%image(2))
-    end associate
-  end subroutine put_state
-
-  !> Reads it back, into a simulation that knows its box and species.
-  subroutine fetch_state(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
+  !> Writes or reads what changes in a simulation. When read it must know its box and species.
+  subroutine exchange_state(file, sim)
+    type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: reals(5 + n_sides)
-    integer(int64) :: counts(4 + n_sides)
-
-    reals = 0
-    counts = 0
-    call file%fetch("reals", size(reals), reals)
-    call file%fetch("counts", size(counts), counts)
-    sim%epoch = reals(1)
-    sim%now = reals(2)
-    sim%virial = reals(3)
-    sim%dissipated = reals(4)
-    sim%start_energy = reals(5)
-    sim%wall_impulse = reals(6:)
-    sim%next_epoch = counts(1)
-    sim%events = counts(2)
-    sim%collisions = counts(3)
-    sim%obstacle_collisions = counts(4)
-    sim%wall_collisions = counts(5:)
-    call fetch_disks(file, sim)
-  end subroutine fetch_state
-
-  subroutine fetch_disks(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(inout) :: sim
-    real(real64), allocatable :: reals(:)
-    integer(int32), allocatable :: numbers(:)
     integer :: n
 
+    call file%exchange("epoch", sim%epoch)
+    call file%exchange("now", sim%now)
+    call file%exchange("next_epoch", sim%next_epoch)
+    call file%exchange("events", sim%events)
+    call file%exchange("collisions", sim%collisions)
+    call file%exchange("wall_collisions", sim%wall_collisions)
+    call file%exchange("obstacle_collisions", sim%obstacle_collisions)
+    call file%exchange("wall_impulse", sim%wall_impulse)
+    call file%exchange("virial", sim%virial)
+    call file%exchange("dissipated", sim%dissipated)
+    call file%exchange("start_energy", sim%start_energy)
     n = sum(sim%species%count)
-    allocate (sim%disk(n), sim%tag(n))
-    allocate (reals(n), numbers(n))
-    reals = 0
-    numbers = 1
-    call file%fetch("disks/x1", n, reals)
-    sim%disk%x(1) = reals
-    call file%fetch("disks/x2", n, reals)
-    sim%disk%x(2) = reals
-    call file%fetch("disks/v1", n, reals)
-    sim%disk%v(1) = reals
-    call file%fetch("disks/v2", n, reals)
-    sim%disk%v(2) = reals
-    call file%fetch("disks/clock", n, reals)
-    sim%disk%clock = reals
-    call file%fetch("disks/species", n, numbers)
-    sim%tag%species = numbers
-    sim%disk%radius = sim%species(numbers)%radius
-    call file%fetch("disks/id", n, numbers)
-    sim%tag%id = numbers
-    call file%fetch("disks/collisions", n, numbers)
-    sim%tag%collisions = numbers
-    call file%fetch("disks/image1", n, numbers)
-    sim%tag%image(1) = numbers
-    call file%fetch("disks/image2", n, numbers)
-    sim%tag%image(2) = numbers
-  end subroutine fetch_disks
+    if (.not. allocated(sim%disk)) allocate (sim%disk(n), sim%tag(n))
+    call file%exchange("disks/x1", sim%disk%x(1))
+    call file%exchange("disks/x2", sim%disk%x(2))
+    call file%exchange("disks/v1", sim%disk%v(1))
+    call file%exchange("disks/v2", sim%disk%v(2))
+    call file%exchange("disks/clock", sim%disk%clock)
+    call file%exchange("disks/species", sim%tag%species)
+    call file%exchange("disks/id", sim%tag%id)
+    call file%exchange("disks/collisions", sim%tag%collisions)
+    call file%exchange("disks/image1", sim%tag%image(1))
+    call file%exchange("disks/image2", sim%tag%image(2))
+    if (.not. file%writing) sim%disk%radius = sim%species(sim%tag%species)%radius
+  end subroutine exchange_state
 
-  subroutine put_progress(file, progress)
-    type(hdf5_file_t), intent(inout) :: file
-    type(progress_t), intent(in) :: progress
+  !> Writes or reads how far the output has come.
+  subroutine exchange_progress(file, progress)
+    type(component_file_t), intent(inout) :: file
+    type(progress_t), intent(inout) :: progress
 
-    call put_cadence("frames", progress%frames)
-    call put_cadence("observables", progress%observables)
-    call file%put("events", [1], [progress%events])
-    call file%put("seconds", [1], [progress%spent])
+    call exchange_cadence(file, "frames", progress%frames)
+    call exchange_cadence(file, "observables", progress%observables)
+    call file%exchange("progress/events", progress%events)
+    call file%exchange("progress/spent", progress%spent)
+  end subroutine exchange_progress
 
-  contains
+  !> Writes or reads how far a cadence has come; its steps are part of the input.
+  subroutine exchange_cadence(file, name, cadence)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(cadence_t), intent(inout) :: cadence
 
-    subroutine put_cadence(name, cadence)
-      character(len=*), intent(in) :: name
-      type(cadence_t), intent(in) :: cadence
+    call file%exchange("progress/"//name//"/count", cadence%count)
+    call file%exchange("progress/"//name//"/multiple", cadence%multiple)
+    call file%exchange("progress/"//name//"/next_collisions", cadence%next_collisions)
+    call file%exchange("progress/"//name//"/next_events", cadence%next_events)
+    call file%exchange("progress/"//name//"/last_events", cadence%last_events)
+    call file%exchange("progress/"//name//"/last_time", cadence%last_time)
+  end subroutine exchange_cadence
 
-      call file%put(name//"/counts", [5], [cadence%count, cadence%multiple, &
-        cadence%next_collisions, cadence%next_events, cadence%last_events])
-      call file%put(name//"/last_time", [1], [cadence%last_time])
-    end subroutine put_cadence
+  !> Writes or reads a real.
+  subroutine exchange_real(self, name, value)
+    class(component_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(real64), intent(inout) :: value
+    real(real64) :: buffer(1)
 
-  end subroutine put_progress
+    buffer = value
+    call self%exchange(name, buffer)
+    value = buffer(1)
+  end subroutine exchange_real
 
-  subroutine fetch_progress(file, progress)
-    type(hdf5_file_t), intent(inout) :: file
-    type(progress_t), intent(out) :: progress
-    integer(int64) :: counts(1)
-    real(real64) :: reals(1)
+  !> Writes or reads an array of reals.
+  subroutine exchange_reals(self, name, values)
+    class(component_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(real64), intent(inout) :: values(:)
+    real(real64), allocatable :: buffer(:)
 
-    counts = 0
-    reals = 0
-    call fetch_cadence("frames", progress%frames)
-    call fetch_cadence("observables", progress%observables)
-    call file%fetch("events", 1, counts)
-    call file%fetch("seconds", 1, reals)
-    progress%events = counts(1)
-    progress%spent = reals(1)
+    allocate (buffer, source=values)
+    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
+    values = buffer
+  end subroutine exchange_reals
 
-  contains
+  !> Writes or reads an integer of 64 bits.
+  subroutine exchange_long(self, name, value)
+    class(component_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(int64), intent(inout) :: value
+    integer(int64) :: buffer(1)
 
-    !> The steps of the cadence come from the input, in `resume`.
-    subroutine fetch_cadence(name, cadence)
-      character(len=*), intent(in) :: name
-      type(cadence_t), intent(inout) :: cadence
-      integer(int64) :: numbers(5)
-      real(real64) :: moment(1)
+    buffer = value
+    call self%exchange(name, buffer)
+    value = buffer(1)
+  end subroutine exchange_long
 
-      numbers = 0
-      moment = 0
-      call file%fetch(name//"/counts", 5, numbers)
-      call file%fetch(name//"/last_time", 1, moment)
-      cadence%count = numbers(1)
-      cadence%multiple = numbers(2)
-      cadence%next_collisions = numbers(3)
-      cadence%next_events = numbers(4)
-      cadence%last_events = numbers(5)
-      cadence%last_time = moment(1)
-    end subroutine fetch_cadence
+  !> Writes or reads an array of integers of 64 bits.
+  subroutine exchange_longs(self, name, values)
+    class(component_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(int64), intent(inout) :: values(:)
+    integer(int64), allocatable :: buffer(:)
 
-  end subroutine fetch_progress
+    allocate (buffer, source=values)
+    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
+    values = buffer
+  end subroutine exchange_longs
 
-  !> Writes the checksum of a closed file into its reserved bytes, and reads all back: a full disk shows
-  !> nowhere else.
-  subroutine seal(path, done)
-    character(len=*), intent(in) :: path
-    logical, intent(out) :: done
-    character(len=header_length) :: header
-    integer :: unit, status
+  !> Writes or reads an array of integers of 32 bits.
+  subroutine exchange_integers(self, name, values)
+    class(component_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(int32), intent(inout) :: values(:)
+    integer(int32), allocatable :: buffer(:)
 
-    header = header_of(path)
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="readwrite", status="old", iostat=status)
-    done = status == 0
-    if (.not. done) return
-    write (unit, pos=1, iostat=status) header
-    done = status == 0
-    close (unit, iostat=status)
-    done = done .and. status == 0
-    if (done) done = flaw_of(path) == ""
-  end subroutine seal
-
-  !> Why a file cannot be believed; nothing if its checksum is right.
-  function flaw_of(path) result(flaw)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: flaw
-    character(len=header_length) :: header
-    integer(int64) :: bytes
-    integer :: unit, status
-
-    flaw = "cannot be read"
-    if (is_folder(path)) flaw = "is a folder"
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=status)
-    if (status /= 0) return
-    inquire (unit, size=bytes)
-    header = ""
-    read (unit, iostat=status) header(:max(0_int64, min(bytes, len(header, int64))))
-    close (unit)
-    if (status /= 0) return
-    flaw = ""
-    if (bytes == 0) then
-      flaw = "is empty"
-    else if (header(:len(first_words)) /= first_words) then
-      flaw = "is no checkpoint, or is damaged: it does not begin like one"
-    else if (header /= header_of(path)) then
-      flaw = "is damaged or cut short: its checksum is wrong"
-    end if
-  end function flaw_of
-
-  !> The first bytes of a checkpoint, by what follows them.
-  function header_of(path) result(header)
-    character(len=*), intent(in) :: path
-    character(len=header_length) :: header
-    integer(int64) :: crc
-
-    call crc_of_file(path, header_length + 1_int64, crc)
-    header = first_words//", CRC-64 of the rest: "//hexadecimal(crc)
-    header(header_length:) = eol
-  end function header_of
+    allocate (buffer, source=values)
+    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
+    values = buffer
+  end subroutine exchange_integers
 
 end module checkpoint

@@ -1,4 +1,4 @@
-!> Tells how far a run is: a line that renews itself on a terminal, else one now and then.
+!> Shows how far a run is: on a terminal a line that is updated in place, elsewhere a line every half minute.
 module progress_line
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int64, never, real64
@@ -19,11 +19,12 @@ module progress_line
     logical :: quiet = .false.
     logical :: terminal = .false.
     real(real64) :: pause = file_pause             !! between reports [s]
-    real(real64) :: started = 0.0_real64           !! where the wall clock began [s]
+    real(real64) :: started = 0.0_real64           !! when the program started [s]
     real(real64) :: next_report = 0.0_real64       !! [s]
     integer :: n = 0                               !! reports so far
-    real(real64) :: clock(0:window - 1) = 0.0_real64       !! of the last reports [s]
-    real(real64) :: share(0:window - 1) = 0.0_real64       !! of the run done at those
+    ! At the last reports
+    real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
+    real(real64) :: share(0:window - 1) = 0.0_real64       !! of the run that was done
     integer(int64) :: collisions(0:window - 1) = 0_int64
   contains
     procedure :: start
@@ -33,11 +34,12 @@ module progress_line
 
 contains
 
+  !> Prepares for a run, or for the next part of one.
   subroutine start(self, sim, stop_rule, started, quiet)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
-    real(real64), intent(in) :: started            !! when the program did [s]
+    real(real64), intent(in) :: started            !! when the program started [s]
     logical, intent(in) :: quiet
 
     self%quiet = quiet
@@ -78,7 +80,7 @@ contains
     flush (error_unit)
   end subroutine report
 
-  !> Wipes the line from the terminal, so that what follows stands alone.
+  !> Erases the line on the terminal, so that what follows stands alone.
   subroutine clear(self)
     class(progress_line_t), intent(in) :: self
 
@@ -86,7 +88,7 @@ contains
     flush (error_unit)
   end subroutine clear
 
-  !> Keeps the present moment for rates over the last reports.
+  !> Records the present state, for rates over the last reports.
   subroutine remember(self, sim, stop_rule)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim

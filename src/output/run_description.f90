@@ -1,16 +1,18 @@
-!> What an output file says once: who made it, the box, the disks, every parameter, and where it comes from.
+!> What an output file holds once: its format and author, the box, the disks, every parameter, its provenance.
 module run_description
   use, intrinsic :: iso_fortran_env, only: compiler_version
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, real64
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
-  use hdf5_objects, only: hdf5_file_t, hdf5_version
+  use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
+    parameters_group, provenance, species_counts, species_names
+  use hdf5_handle, only: hdf5_version
+  use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, parameter_value_t, range_of
   use parameters, only: is_repeated, obstacle_groups, table
-  use settings, only: settings_t
+  use run_input, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: host_name
-  use texts, only: text_t
   use version, only: program_version
   implicit none
   private
@@ -20,31 +22,29 @@ module run_description
 
 contains
 
-  !> Writes all that is known at the start.
-  subroutine describe_run(file, settings, groups, input_text, overrides, sim)
+  !> Writes everything, with placeholders for what is known only at the end.
+  subroutine describe_run(file, input, sim)
     type(hdf5_file_t), intent(inout) :: file
-    type(settings_t), intent(in) :: settings
-    type(parameter_group_t), intent(in) :: groups(:)
-    character(len=*), intent(in) :: input_text
-    type(text_t), intent(in) :: overrides(:)
+    type(run_input_t), intent(in) :: input
     type(simulation_t), intent(in) :: sim
     integer :: k, range(2)
 
     call describe_format(file)
     call describe_box(file, sim%box)
     call describe_disks(file, sim)
-    call describe_input(file, groups, input_text, overrides)
+    call describe_input(file, input)
     call describe_species(file, sim)
     call describe_populations(file, sim)
     do k = 1, size(obstacle_groups)
-      range = range_of(groups, obstacle_groups(k:k))
-      call describe_table(file, groups(range(1):range(2)))
+      range = range_of(input%groups, obstacle_groups(k:k))
+      call describe_table(file, input%groups(range(1):range(2)))
     end do
-    call file%put("parameters/seed", [integer ::], [settings%run%seed])
+    call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
     call describe_origin(file)
-    call describe_cost(file, 0.0_real64, 0.0_real64)     ! so that nothing is added at the end
+    call describe_cost(file, 0.0_real64, 0.0_real64)
   end subroutine describe_run
 
+  !> Format, author and creator, as H5MD requires.
   subroutine describe_format(file)
     type(hdf5_file_t), intent(inout) :: file
 
@@ -58,7 +58,7 @@ contains
     call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
   end subroutine describe_format
 
-  !> Who runs the program, as far as the system tells.
+  !> Who runs the program, according to the environment.
   function author() result(name)
     character(len=:), allocatable :: name
     integer :: length
@@ -69,20 +69,21 @@ contains
     if (name == "") name = "unknown"
   end function author
 
+  !> Sides and boundaries of the box.
   subroutine describe_box(file, box)
     type(hdf5_file_t), intent(inout) :: file
     type(box_t), intent(in) :: box
     character(len=8) :: boundary(2)
 
     boundary = merge("periodic", "none    ", box%periodic)
-    call file%make_group("particles/disks/box")
-    call file%put("particles/disks/box@dimension", [integer ::], [2_int32])
-    call file%put("particles/disks/box@boundary", boundary)
-    call file%put("particles/disks/box/edges", [2], box%edges())
-    call file%put("particles/disks/box/lower", [2], box%lower)
+    call file%make_group(box_group)
+    call file%put(box_group//"@dimension", scalar, [2_int32])
+    call file%put(box_group//"@boundary", boundary)
+    call file%put(box_group//"/edges", [2], box%edges())
+    call file%put(box_group//"/lower", [2], box%lower)
   end subroutine describe_box
 
-  !> What belongs to a disk for good, in file order.
+  !> What never changes of the disks, in the order of the input.
   subroutine describe_disks(file, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
@@ -91,37 +92,37 @@ contains
 
     allocate (numbers(sim%n_disks()))
     numbers = [(i, i=1, sim%n_disks())]
-    call file%put("particles/disks/id", [size(numbers)], numbers)
+    call file%put(disk_id, [size(numbers)], numbers)
     numbers(sim%tag%id) = sim%tag%species
-    call file%put("particles/disks/species", [size(numbers)], numbers)
-    call file%put("particles/disks/mass", [size(numbers)], sim%species(numbers)%mass)
-    call file%put("particles/disks/radius", [size(numbers)], sim%species(numbers)%radius)
+    call file%put(disk_species, [size(numbers)], numbers)
+    call file%put(disk_mass, [size(numbers)], sim%species(numbers)%mass)
+    call file%put(disk_radius, [size(numbers)], sim%species(numbers)%radius)
   end subroutine describe_disks
 
   !> The input as it was given, and every variable as it was used.
-  subroutine describe_input(file, groups, input_text, overrides)
+  subroutine describe_input(file, input)
     type(hdf5_file_t), intent(inout) :: file
-    type(parameter_group_t), intent(in) :: groups(:)
-    character(len=*), intent(in) :: input_text
-    type(text_t), intent(in) :: overrides(:)
+    type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: group, list
     integer :: g, k
 
-    do g = 1, size(groups)
-      if (any(obstacle_groups == groups(g)%name)) cycle     ! one table for each name, below
-      group = "parameters/"//trim(groups(g)%name)
-      if (is_repeated(groups(g)%name)) group = group//"/"//trim(groups(g)%instance)
-      call file%make_group(group)
-      do k = 1, size(groups(g)%values)
-        call describe_value(file, group, groups(g)%values(k))
-      end do
+    do g = 1, size(input%groups)
+      associate (own => input%groups(g))
+        if (any(obstacle_groups == own%name)) cycle     ! one table for each name
+        group = parameters_group//trim(own%name)
+        if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
+        call file%make_group(group)
+        do k = 1, size(own%values)
+          call describe_value(file, group, own%values(k))
+        end do
+      end associate
     end do
-    call file%put("parameters/input", input_text)
+    call file%put(parameters_group//"input", input%text)
     list = ""
-    do k = 1, size(overrides)
-      list = list//overrides(k)%text//new_line("a")
+    do k = 1, size(input%overrides)
+      list = list//input%overrides(k)%text//new_line("a")
     end do
-    call file%put("parameters/overrides", list)
+    call file%put(parameters_group//"overrides", list)
   end subroutine describe_input
 
   !> One variable; nothing if it has no value.
@@ -133,7 +134,7 @@ contains
     character(len=:), allocatable :: name
 
     name = group//"@"//trim(value%name)
-    extents = [integer ::]
+    extents = scalar
     if (.not. value%is_set()) return
     select case (value%kind)
     case ("real")
@@ -154,6 +155,7 @@ contains
     end select
   end subroutine describe_value
 
+  !> Names and numbers of disks of the species.
   subroutine describe_species(file, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
@@ -163,11 +165,11 @@ contains
     do k = 1, size(names)
       names(k) = sim%species(k)%name
     end do
-    call file%put("parameters/species/names", names)
-    call file%put("parameters/species/counts", [size(names)], int(sim%species%count, int32))
+    call file%put(species_names, names)
+    call file%put(species_counts, [size(names)], int(sim%species%count, int32))
   end subroutine describe_species
 
-  !> What the thermodynamics module of H5MD wants beside the observables of a group.
+  !> What the thermodynamics module of H5MD requires beside the observables of a group.
   subroutine describe_populations(file, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
@@ -176,13 +178,13 @@ contains
     integer :: s
 
     do s = 0, size(sim%species)
-      group = "observables/all"
+      group = observables_group//all_disks
       n = sim%n_disks()
-      if (s > 0) group = "observables/"//sim%species(s)%name
+      if (s > 0) group = observables_group//sim%species(s)%name
       if (s > 0) n = sim%species(s)%count
       call file%make_group(group)
-      call file%put(group//"@dimension", [integer ::], [2_int32])
-      call file%put(group//"/particle_number", [integer ::], [n])
+      call file%put(group//"@dimension", scalar, [2_int32])
+      call file%put(group//"/particle_number", scalar, [n])
     end do
   end subroutine describe_populations
 
@@ -200,7 +202,7 @@ contains
     n = size(groups)
     do k = 1, size(groups(1)%values)
       associate (row => table(groups(1)%values(k)%row))
-        path = "parameters/"//trim(row%group)//"/"
+        path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
         if (row%kind == "text") then
           do g = 1, n
@@ -217,26 +219,27 @@ contains
     end do
   end subroutine describe_table
 
+  !> The build and the machine that a file comes from.
   subroutine describe_origin(file)
     type(hdf5_file_t), intent(inout) :: file
 
-    call file%make_group("provenance")
-    call file%put("provenance@program_version", program_version)
-    call file%put("provenance@git_commit", git_commit)
-    call file%put("provenance@compiler", compiler_version())
-    call file%put("provenance@flags", build_flags)
-    call file%put("provenance@hdf5_version", hdf5_version())
-    call file%put("provenance@host", host_name())
+    call file%make_group(provenance)
+    call file%put(provenance//"@program_version", program_version)
+    call file%put(provenance//"@git_commit", git_commit)
+    call file%put(provenance//"@compiler", compiler_version())
+    call file%put(provenance//"@flags", build_flags)
+    call file%put(provenance//"@hdf5_version", hdf5_version())
+    call file%put(provenance//"@host", host_name())
   end subroutine describe_origin
 
-  !> Writes, or writes anew, what is known at the end only.
+  !> Writes, or overwrites, what is known only at the end.
   subroutine describe_cost(file, wall_seconds, rate)
     type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
     real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
 
-    call file%put("provenance@wall_time", [integer ::], [wall_seconds])
-    call file%put("provenance@collisions_per_second", [integer ::], [rate])
+    call file%put(provenance//"@wall_time", scalar, [wall_seconds])
+    call file%put(provenance//"@collisions_per_second", scalar, [rate])
   end subroutine describe_cost
 
 end module run_description

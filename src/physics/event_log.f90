@@ -1,17 +1,16 @@
-!> A list of collisions that waits to be written: the dynamics fills it, the output empties it.
+!> Collisions that have not been written yet: the dynamics appends them, the output empties the list.
 module event_log
   use kinds, only: int32, real64
   implicit none
   private
   public :: event_log_t
 
-  !> The dynamics must pause when the log is full. A log without room asks for nothing: nobody listens.
+  !> A log without records is switched off. The dynamics must pause when it is full.
   type :: event_log_t
     integer :: n = 0                              !! collisions in the list
-    real(real64), allocatable :: time(:)          !! since the start of the run [time]
-    real(real64), allocatable :: impulse(:)       !! |change of momentum| [mass length/time]
-    integer(int32), allocatable :: pair(:, :)     !! (2,:) ids in file order; instead of the second: 0, -1,
-                                                  !! -2, -3 left, right, bottom, top side, -4, ... obstacles
+    !> (4,:) Time since the start of the run, ids i and j in the order of the input, and |change of momentum|
+    !> [mass length/time]. Instead of j: 0, -1, -2, -3 the left, right, bottom, top side, -4, ... obstacles.
+    real(real64), allocatable :: record(:, :)
   contains
     procedure :: is_on
     procedure :: is_full
@@ -25,11 +24,12 @@ module event_log
 
 contains
 
+  !> An empty log that is switched on.
   pure function new_event_log(capacity) result(log)
     integer, intent(in) :: capacity
     type(event_log_t) :: log
 
-    allocate (log%time(capacity), log%impulse(capacity), log%pair(2, capacity))
+    allocate (log%record(4, capacity))
   end function new_event_log
 
   !> Whether collisions are to be listed.
@@ -37,17 +37,19 @@ contains
     class(event_log_t), intent(in) :: self
     logical :: yes
 
-    yes = allocated(self%time)
+    yes = allocated(self%record)
   end function is_on
 
+  !> Whether there is no room for another collision.
   pure function is_full(self) result(yes)
     class(event_log_t), intent(in) :: self
     logical :: yes
 
     yes = .false.
-    if (self%is_on()) yes = self%n >= size(self%time)
+    if (self%is_on()) yes = self%n >= size(self%record, 2)
   end function is_full
 
+  !> Lists a collision; there must be room.
   pure subroutine append(self, time, i, j, impulse)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: time
@@ -55,11 +57,10 @@ contains
     real(real64), intent(in) :: impulse
 
     self%n = self%n + 1
-    self%time(self%n) = time
-    self%pair(:, self%n) = [i, j]
-    self%impulse(self%n) = impulse
+    self%record(:, self%n) = [time, real(i, real64), real(j, real64), impulse]
   end subroutine append
 
+  !> Empties the list.
   pure subroutine clear(self)
     class(event_log_t), intent(inout) :: self
 

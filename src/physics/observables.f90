@@ -3,20 +3,28 @@
 module observables
   use kinds, only: int32, pi, real64
   use box_geometry, only: free_area
-  use disks, only: species_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: observable_t, observable_list, observed_values, total_energy
+  public :: observable_list_t, observed, own_names, total_energy
+
+  integer, parameter :: most_components = 4
 
   !> One observable, scalar or vector.
   type :: observable_t
     character(len=64) :: name = ""                !! below /observables
-    integer :: width = 1                          !! number of components
+    integer :: width = 0                          !! number of components
     logical :: is_count = .false.                 !! a whole number
+    real(real64) :: value(most_components) = 0.0_real64    !! now; counts are exact up to 2**53
   end type observable_t
 
-  integer, parameter :: n_means = 4               !! per species: K, U, |v|, kT
+  type :: observable_list_t
+    integer :: n = 0
+    type(observable_t), allocatable :: row(:)     !! the first n count
+  contains
+    procedure :: add
+    procedure :: values
+  end type observable_list_t
 
   !> Sums over the disks of a species, or of all.
   type :: sums_t
@@ -30,44 +38,98 @@ module observables
 
 contains
 
-  !> All observables, in the order of `observed_values`.
-  pure function observable_list(species) result(list)
-    type(species_t), intent(in) :: species(:)
-    type(observable_t), allocatable :: list(:)
-    integer :: s
-
-    list = means_of("all")
-    do s = 1, size(species)
-      list = [list, means_of(species(s)%name)]
-    end do
-    list = [list, observable_t("total_energy"), observable_t("momentum", 2), &
-      observable_t("pressure"), observable_t("virial"), observable_t("dissipated_energy"), &
-      observable_t("collisions", 1, .true.), observable_t("wall_collisions", 4, .true.), &
-      observable_t("wall_impulse", 4), observable_t("obstacle_collisions", 1, .true.)]
-  end function observable_list
-
-  !> The means over a species.
-  pure function means_of(group) result(list)
-    character(len=*), intent(in) :: group
-    type(observable_t) :: list(n_means)
-
-    list = [observable_t(group//"/kinetic_energy"), observable_t(group//"/potential_energy"), &
-      observable_t(group//"/mean_speed"), observable_t(group//"/temperature")]
-  end function means_of
-
-  !> Their values now, vectors flattened; counts as reals, exact up to 2**53.
-  pure function observed_values(sim) result(values)
+  !> All observables with their values now. A new one is one more line here.
+  pure function observed(sim) result(list)
     type(simulation_t), intent(in) :: sim
-    real(real64), allocatable :: values(:)
+    type(observable_list_t) :: list
     type(sums_t) :: sums(0:size(sim%species))     ! 0: all
     integer :: s
 
     call add_up(sim, sums)
-    values = [(means(sums(s)), s=0, size(sim%species))]
-    values = [values, sums(0)%kinetic + sums(0)%potential, sums(0)%momentum, &
-      pressure(sim, sums(0)%kinetic), sim%virial, sim%dissipated, real(sim%collisions, real64), &
-      real(sim%wall_collisions, real64), sim%wall_impulse, real(sim%obstacle_collisions, real64)]
-  end function observed_values
+    call add_means(list, "all", sums(0))
+    do s = 1, size(sim%species)
+      call add_means(list, sim%species(s)%name, sums(s))
+    end do
+    call list%add("total_energy", [sums(0)%kinetic + sums(0)%potential])
+    call list%add("momentum", sums(0)%momentum)
+    call list%add("pressure", [pressure(sim, sums(0)%kinetic)])
+    call list%add("virial", [sim%virial])
+    call list%add("dissipated_energy", [sim%dissipated])
+    call list%add("collisions", real([sim%collisions], real64), is_count=.true.)
+    call list%add("wall_collisions", real(sim%wall_collisions, real64), is_count=.true.)
+    call list%add("wall_impulse", sim%wall_impulse)
+    call list%add("obstacle_collisions", real([sim%obstacle_collisions], real64), is_count=.true.)
+  end function observed
+
+  !> Means over a species, per disk. The temperature is kT in two dimensions: the kinetic energy relative to the
+  !> common motion.
+  pure subroutine add_means(list, group, sums)
+    type(observable_list_t), intent(inout) :: list
+    character(len=*), intent(in) :: group         !! name of the species
+    type(sums_t), intent(in) :: sums
+    real(real64) :: n, drift
+
+    n = max(sums%n, 1.0_real64)
+    drift = 0
+    if (sums%n > 0) drift = 0.5_real64*dot_product(sums%momentum, sums%momentum)/sums%mass
+    call list%add(group//"/kinetic_energy", [sums%kinetic/n])
+    call list%add(group//"/potential_energy", [sums%potential/n])
+    call list%add(group//"/mean_speed", [sums%speed/n])
+    call list%add(group//"/temperature", [max(sums%kinetic - drift, 0.0_real64)/n])
+  end subroutine add_means
+
+  !> Adds an observable, with one or more components.
+  pure subroutine add(self, name, value, is_count)
+    class(observable_list_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(real64), intent(in) :: value(:)
+    logical, intent(in), optional :: is_count
+    type(observable_t), allocatable :: larger(:)
+
+    if (.not. allocated(self%row)) allocate (self%row(32))
+    if (self%n == size(self%row)) then
+      allocate (larger(2*self%n))
+      larger(:self%n) = self%row
+      call move_alloc(larger, self%row)
+    end if
+    self%n = self%n + 1
+    associate (row => self%row(self%n))
+      row%name = name
+      row%width = size(value)
+      row%value(:size(value)) = value
+      if (present(is_count)) row%is_count = is_count
+    end associate
+  end subroutine add
+
+  !> All components one after the other.
+  pure function values(self)
+    class(observable_list_t), intent(in) :: self
+    real(real64) :: values(sum(self%row(:self%n)%width))
+    integer :: k, last
+
+    last = 0
+    do k = 1, self%n
+      associate (row => self%row(k))
+        values(last + 1:last + row%width) = row%value(:row%width)
+        last = last + row%width
+      end associate
+    end do
+  end function values
+
+  !> Names below /observables that no species may have.
+  pure function own_names() result(names)
+    character(len=64), allocatable :: names(:)
+    type(simulation_t) :: empty
+    type(observable_list_t) :: list
+    integer :: k
+
+    allocate (empty%species(0), empty%disk(0), empty%tag(0))
+    list = observed(empty)
+    names = list%row(:list%n)%name
+    do k = 1, list%n
+      names(k) = names(k)(:index(names(k)//"/", "/") - 1)
+    end do
+  end function own_names
 
   !> Kinetic and potential energy of all disks.
   pure function total_energy(sim) result(energy)
@@ -112,18 +174,6 @@ contains
       end associate
     end do
   end subroutine add_up
-
-  !> Kinetic and potential energy and speed per disk, and the temperature kT in two dimensions: the
-  !> kinetic energy per disk relative to the common motion.
-  pure function means(sums)
-    type(sums_t), intent(in) :: sums
-    real(real64) :: means(n_means), common
-
-    means = 0
-    if (.not. sums%n > 0) return
-    common = 0.5_real64*dot_product(sums%momentum, sums%momentum)/sums%mass
-    means = [sums%kinetic, sums%potential, sums%speed, max(sums%kinetic - common, 0.0_real64)]/sums%n
-  end function means
 
   !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t): K now, W the sum of impulse times
   !> distance over the pair collisions since the start.

@@ -2,14 +2,14 @@
 module last_frame
   use kinds, only: int32, int64, real64
   use errors, only: error_t, exit_usage, fail
-  use hdf5_items, only: fetch_item, fetch_texts
+  use h5md_layout, only: disk_species, frame_counter, position, species_names, value_of, velocity
   use hdf5_objects, only: hdf5_file_t
+  use hdf5_series, only: series_t
   use texts, only: joined, written
   implicit none
   private
   public :: read_last_frame
 
-  character(len=*), parameter :: disks = "particles/disks/"
   integer, parameter :: name_length = 64
 
 contains
@@ -29,13 +29,17 @@ contains
     integer :: k
 
     call file%open(path, .false.)
-    call fetch_texts(file, "parameters/species/names", name_length, names)
-    allocate (species(max(0_int64, file%length(disks//"species"))))
-    call file%fetch(disks//"species", size(species), species)
+    call file%fetch_texts(species_names, name_length, names)
+    allocate (species(max(0_int64, file%length(disk_species))))
+    call file%fetch(disk_species, size(species), species)
     chosen = pack([(k, k=1, size(species))], species == findloc(names, name, dim=1))
-    if (size(chosen) == count) call read_columns(file, size(species), chosen, n_columns, table)
+    if (size(chosen) == count) then
+      allocate (table(n_columns, count))
+      call read_vectors(file, position//value_of, size(species), chosen, table(1:2, :))
+      if (n_columns == 4) call read_vectors(file, velocity//value_of, size(species), chosen, table(3:4, :))
+    end if
     call file%close()
-    call file%failure(error)
+    call file%report(error)
     if (allocated(error)) return
     if (all(names /= name)) then
       call fail(error, exit_usage, path//": has no species """//name//"""; its species: "//joined(names, ", "))
@@ -45,27 +49,25 @@ contains
     end if
   end subroutine read_last_frame
 
-  subroutine read_columns(file, n, chosen, n_columns, table)
+  !> Reads a vector of each chosen disk from the last frame.
+  subroutine read_vectors(file, name, n, chosen, vectors)
     type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
     integer, intent(in) :: n                                !! disks in the file
     integer, intent(in) :: chosen(:)
-    integer, intent(in) :: n_columns
-    real(real64), allocatable, intent(out) :: table(:, :)
-    real(real64), allocatable :: vectors(:)
+    real(real64), intent(inout) :: vectors(:, :)            !! (2,chosen)
+    type(series_t) :: series
     integer(int64) :: frames(1)
+    real(real64), allocatable :: frame(:, :)
 
     frames = 0
-    allocate (table(n_columns, size(chosen)), vectors(2*n))
-    call file%fetch(disks//"committed", 1, frames)
-    call fetch_item(file, disks//"position/value", frames(1), 2*n, vectors)
-    if (allocated(file%trouble)) return
-    table(1, :) = vectors(2*chosen - 1)
-    table(2, :) = vectors(2*chosen)
-    if (n_columns == 2) return
-    call fetch_item(file, disks//"velocity/value", frames(1), 2*n, vectors)
-    if (allocated(file%trouble)) return
-    table(3, :) = vectors(2*chosen - 1)
-    table(4, :) = vectors(2*chosen)
-  end subroutine read_columns
+    allocate (frame(2, n))
+    call file%fetch(frame_counter, 1, frames)
+    series = series_t(name, rank=2, shape=[2, n])
+    call series%open(file)
+    call series%read(file, frames(1), frame)
+    call series%close()
+    if (.not. allocated(file%failure)) vectors = frame(:, chosen)
+  end subroutine read_vectors
 
 end module last_frame

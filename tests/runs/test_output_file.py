@@ -8,7 +8,16 @@ import h5py
 import numpy as np
 import pytest
 
-from whole_runs import FILES, FINISHED, MIXTURE, contents, differences, one_line, write_input
+from whole_runs import (
+    FILES,
+    FINISHED,
+    MIXTURE,
+    USAGE,
+    contents,
+    differences,
+    one_line,
+    write_input,
+)
 
 GRAVITY = """&box upper = 2, 3  boundary = 'periodic', 'wall'  gravity = 0, -2 /
 &species name = 'gas' count = 50 radius = 0.03 mass = 2 velocities = 'uniform' speed = 1 /
@@ -299,7 +308,7 @@ def test_folders_are_made_and_nothing_is_left_beside_the_result(ricochet, tmp_pa
     input_file = write_input(tmp_path)
     run = ricochet(input_file, "-o", "some/where/gas.h5")
     assert run.returncode == FINISHED
-    assert one_line(run) == "note: some/where/ was not there: it is made for the output"
+    assert one_line(run) == "note: folder some/where/ has been created for the output"
     run = ricochet(input_file, "-o", "some/where/gas.h5", "--force")
     assert (run.returncode, run.stderr) == (FINISHED, "")
     assert [path.name for path in (tmp_path / "some/where").iterdir()] == ["gas.h5"]
@@ -335,7 +344,7 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
         ("file/gas.h5", "cannot make its folder"),
         ("/proc/gas.h5", "cannot be created"),
         ("/proc/some/where/gas.h5", "cannot make its folder"),
-        ("/dev/null", "is there already"),
+        ("/dev/null", "exists already"),
     ]:
         run = ricochet(input_file, "-o", place)
         assert run.returncode == FILES
@@ -346,3 +355,27 @@ def test_an_output_beyond_the_disk_is_refused_before_the_run(ricochet, tmp_path)
     run = ricochet(write_input(tmp_path), "-o", "gas.h5", "--set", "output.frames_every_time=4e-9")
     assert run.returncode == FILES
     assert "are free" in one_line(run) and list(tmp_path.glob("gas.h5*")) == []
+
+
+def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path):
+    """Nothing that stands beside the groups of species, as found in a file."""
+    file = ran(MIXTURE)
+    used = {*file["observables"], *file["parameters/species"]} - {"light", "heavy"}
+    assert {"all", "committed", "momentum", "names", "counts"} < used
+    for name in used:
+        write_input(tmp_path, MIXTURE.replace("heavy", name))
+        run = ricochet("gas.nml", "-o", "other.h5")
+        assert run.returncode == USAGE
+        assert "species.name" in one_line(run) and f'"{name}"' in run.stderr
+    assert not list(tmp_path.glob("other*"))
+
+
+def test_a_file_that_was_rebuilt_lacks_nothing(ran, tmp_path):
+    """One with room for just its samples is not; with another stop rule their number is unknown."""
+    planned = ["--set", "output.event_log=.false."]
+    ran(GRAVITY, *planned, name="planned").close()
+    ran(GRAVITY, *planned, "--set", "stop.collisions=1000000000", name="rebuilt").close()
+    assert differences(tmp_path / "planned.h5", tmp_path / "rebuilt.h5") == [
+        "/parameters/overrides",
+        "/parameters/stop@collisions",
+    ]

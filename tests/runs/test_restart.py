@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -223,11 +224,12 @@ def test_what_is_no_checkpoint_is_called_what_it_is(ricochet, tmp_path, stopped)
     whole = path.read_bytes()
     for content, flaw in [
         (b"", "is empty"),
-        (b"ricochet", "is no checkpoint"),
+        (b"ricochet", "is damaged, of another version, or not a checkpoint"),
         (whole[:40], "is damaged or cut short"),
         (whole[:-1], "is damaged or cut short"),
-        (b"notes\n" * 100, "is no checkpoint"),
-        ((tmp_path / "gas.h5.part").read_bytes(), "is no checkpoint"),
+        (b"ricochet checkpoint, CRC-64 of the rest: ".ljust(64), "is damaged, of another version"),
+        (b"notes\n" * 100, "is damaged, of another version, or not a checkpoint"),
+        ((tmp_path / "gas.h5.part").read_bytes(), "is damaged, of another version"),
     ]:
         path.write_bytes(content)
         run = ricochet(*stopped, "--resume")
@@ -289,16 +291,7 @@ def write_short_run(folder) -> list[str]:
 
 
 def seal(path):
-    """Renews the checksum of a checkpoint: CRC-64 (ECMA-182, reflected) over all but the header."""
-    table = []
-    for byte in range(256):
-        remainder = byte
-        for _ in range(8):
-            remainder = remainder >> 1 ^ (0xC96C5795D7870F42 if remainder & 1 else 0)
-        table.append(remainder)
-    data, crc = path.read_bytes(), 0xFFFFFFFFFFFFFFFF
-    for byte in data[64:]:
-        crc = table[(crc ^ byte) & 255] ^ crc >> 8
-    crc ^= 0xFFFFFFFFFFFFFFFF
-    header = f"ricochet checkpoint, CRC-64 of the rest: {crc:016X}".ljust(63) + "\n"
-    path.write_bytes(header.encode() + data[64:])
+    """Renews the checksum of a checkpoint: CRC-32 over all but the header."""
+    data = path.read_bytes()
+    header = f"ricochet checkpoint 2, CRC-32 of the rest: {zlib.crc32(data[64:]):08X}".ljust(63)
+    path.write_bytes(header.encode() + b"\n" + data[64:])

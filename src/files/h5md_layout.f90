@@ -1,0 +1,42 @@
+!> The layout of an output file: H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). All paths in it are here.
+module h5md_layout
+  implicit none
+  private
+
+  ! Groups
+  character(len=*), parameter, public :: &
+    disks_group = "particles/disks/", &
+    observables_group = "observables/", &
+    events_group = "events/", &
+    parameters_group = "parameters/", &
+    provenance = "provenance", &
+    box_group = disks_group//"box", &
+    all_disks = "all"                             !! the group of means over all disks in `observables_group`
+
+  ! Datasets
+  character(len=*), parameter, public :: &
+    disk_id = disks_group//"id", &
+    disk_species = disks_group//"species", &
+    disk_mass = disks_group//"mass", &
+    disk_radius = disks_group//"radius", &
+    species_names = parameters_group//"species/names", &
+    species_counts = parameters_group//"species/counts"
+
+  ! Elements: groups of step, time, value
+  character(len=*), parameter, public :: &
+    position = disks_group//"position", &
+    velocity = disks_group//"velocity", &
+    disk_collisions = disks_group//"collisions", &
+    image = disks_group//"image", &
+    step_of = "/step", time_of = "/time", value_of = "/value"
+
+  ! Counters of complete samples
+  character(len=*), parameter, public :: &
+    frame_counter = disks_group//"committed", &
+    sample_counter = observables_group//"committed", &
+    event_counter = events_group//"committed"
+
+  !> What stands beside groups that have the name of a species, besides observables.
+  character(len=*), parameter, public :: beside_species(3) = [character(len=9) :: "committed", "names", "counts"]
+
+end module h5md_layout

@@ -1,0 +1,173 @@
+!> An HDF5 file that is open: created, opened, renamed, flushed and closed.
+!>
+!> The first call that fails is remembered, and nothing is done after it. So a writer need not test every
+!> call: `report` says at the end whether all went well.
+module hdf5_handle
+  use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
+    h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
+    h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
+    h5pset_sieve_buf_size_f, h5pset_userblock_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
+    h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
+    h5f_acc_rdwr_f, h5f_scope_global_f
+  use errors, only: error_t, exit_files, fail
+  use kinds, only: int64
+  use system, only: free_bytes, last_problem, move_file, obstacle_to_opening
+  use texts, only: written
+  implicit none
+  private
+  public :: hdf5_handle_t, hdf5_version
+
+  integer(size_t), parameter :: sieve = 4096      !! size of the buffer that small writes share [bytes]
+
+  type :: hdf5_handle_t
+    character(len=:), allocatable :: path
+    character(len=:), allocatable :: final_path   !! the path once it is complete, which messages name
+    character(len=:), allocatable :: failure      !! what could not be done first, after "cannot "
+    integer(hid_t) :: id = -1
+    integer(hid_t) :: links = -1                  !! properties of links: they make the groups on their path
+    integer(hid_t) :: storage = -1                !! properties of datasets: see `prepare`
+    integer(int64) :: unsaved = 0                 !! written since the last flush [bytes]
+  contains
+    procedure :: create
+    procedure :: open => open_file
+    procedure :: rename => rename_file
+    procedure :: flush => flush_file
+    procedure :: close => close_file
+    procedure :: check
+    procedure :: report
+  end type hdf5_handle_t
+
+contains
+
+  !> Remembers what could not be done if `status` says so and it is the first time.
+  subroutine check(self, status, action)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer, intent(in) :: status                 !! of an HDF5 call; negative: it failed
+    character(len=*), intent(in) :: action        !! what it was to do, in words that follow "cannot "
+
+    if (status < 0 .and. .not. allocated(self%failure)) self%failure = action
+  end subroutine check
+
+  !> The failure, if there was one, as an error: the file, what could not be done, the space on its disk.
+  subroutine report(self, error)
+    class(hdf5_handle_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+
+    if (.not. allocated(self%failure)) return
+    if (self%unsaved > 0) then
+      call fail(error, exit_files, self%final_path//": cannot "//self%failure//": "//written(self%unsaved) &
+        //" bytes needed, "//written(free_bytes(self%path))//" bytes free")
+    else
+      call fail(error, exit_files, self%final_path//": cannot "//self%failure)
+    end if
+  end subroutine report
+
+  !> The version of the HDF5 library, for the provenance.
+  function hdf5_version() result(text)
+    character(len=:), allocatable :: text
+    integer :: major, minor, release, status
+
+    call h5get_libversion_f(major, minor, release, status)
+    text = written(major)//"."//written(minor)//"."//written(release)
+  end function hdf5_version
+
+  !> Starts the library, silent on errors, and sets its properties. No file locks: they keep readers out, and a
+  !> reader's lock could stop a run. No exit handler: files are closed by then, or could not be (disk full), and
+  !> it would crash. Storage of datasets is allocated at once, never filled, and has no time stamps, so that the
+  !> same run gives the same bytes.
+  subroutine prepare(self, access, status)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer(hid_t), intent(out) :: access         !! properties of access to the file
+    integer, intent(out) :: status
+
+    call h5dont_atexit_f(status)
+    call h5open_f(status)
+    if (status >= 0) call h5eset_auto_f(0, status)
+    if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
+    if (status >= 0) call h5pset_file_locking_f(access, .false., .true., status)
+    if (status >= 0) call h5pset_sieve_buf_size_f(access, sieve, status)
+    if (status >= 0) call h5pcreate_f(h5p_link_create_f, self%links, status)
+    if (status >= 0) call h5pset_create_inter_group_f(self%links, 1, status)
+    if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, self%storage, status)
+    if (status >= 0) call h5pset_alloc_time_f(self%storage, h5d_alloc_time_early_f, status)
+    if (status >= 0) call h5pset_fill_time_f(self%storage, h5d_fill_time_never_f, status)
+    if (status >= 0) call h5pset_obj_track_times_f(self%storage, .false., status)
+  end subroutine prepare
+
+  !> Creates a file; it must not exist.
+  subroutine create(self, path, final_path, reserved)
+    class(hdf5_handle_t), intent(out) :: self
+    character(len=*), intent(in) :: path
+    character(len=*), intent(in), optional :: final_path    !! default: path
+    integer, intent(in), optional :: reserved     !! bytes left to the caller at its beginning: 512 or more
+    integer(hid_t) :: access, creation
+    integer :: status, closed
+
+    self%path = path
+    self%final_path = path
+    if (present(final_path)) self%final_path = final_path
+    call prepare(self, access, status)
+    if (status >= 0) call h5pcreate_f(h5p_file_create_f, creation, status)
+    if (status >= 0 .and. present(reserved)) call h5pset_userblock_f(creation, int(reserved, hsize_t), status)
+    if (status >= 0) call h5fcreate_f(path, h5f_acc_excl_f, self%id, status, creation, access)
+    call self%check(status, "be created: "//last_problem())
+    call h5pclose_f(creation, closed)
+    call h5pclose_f(access, closed)
+  end subroutine create
+
+  !> Opens a file for reading, or for writing as well.
+  subroutine open_file(self, path, writable)
+    class(hdf5_handle_t), intent(out) :: self
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: writable
+    character(len=:), allocatable :: reason
+    integer(hid_t) :: access
+    integer :: status, closed
+
+    self%path = path
+    self%final_path = path
+    reason = obstacle_to_opening(path, writable)
+    if (reason == "") reason = "it is damaged, or not an HDF5 file"
+    call prepare(self, access, status)
+    if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
+    call self%check(status, "be "//trim(merge("written", "read   ", writable))//": "//reason)
+    call h5pclose_f(access, closed)
+  end subroutine open_file
+
+  !> Gives the open file its final path, in place of the file that has it.
+  subroutine rename_file(self)
+    class(hdf5_handle_t), intent(inout) :: self
+    logical :: moved
+
+    if (allocated(self%failure)) return
+    call move_file(self%path, self%final_path, moved)
+    if (.not. moved) call self%check(-1, "be renamed: "//last_problem())
+    if (moved) self%path = self%final_path
+  end subroutine rename_file
+
+  !> Hands all that was written to the operating system: then it survives a kill of the program.
+  subroutine flush_file(self)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer :: status
+
+    if (allocated(self%failure)) return
+    call h5fflush_f(self%id, h5f_scope_global_f, status)
+    call self%check(status, "be written")
+    if (status >= 0) self%unsaved = 0
+  end subroutine flush_file
+
+  !> Closes the file if it is open; its failure, if any, can still be reported.
+  subroutine close_file(self)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer :: status
+
+    if (self%id < 0) return
+    call self%flush()
+    call h5pclose_f(self%links, status)
+    call h5pclose_f(self%storage, status)
+    call h5fclose_f(self%id, status)
+    call self%check(status, "be closed")
+    self%id = -1
+  end subroutine close_file
+
+end module hdf5_handle
