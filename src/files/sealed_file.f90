@@ -29,7 +29,7 @@ contains
     integer(int8), intent(in) :: bytes(:)
     character(len=8) :: text
 
-    text = hexadecimal(crc32(0_c_long, bytes, size(bytes, kind=c_int)))
+    write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
   end function checksum
 
   !> Writes the first line of a file, over bytes left free for it, and reads all back: only this reveals a full disk.
@@ -95,16 +95,8 @@ contains
       if (status == 0) crc = crc32(crc, bytes, int(length, c_int))
     end do
     close (unit)
-    required = title//", CRC-32 of the rest: "//hexadecimal(crc)
+    write (required, "(a,z8.8)") title//", CRC-32 of the rest: ", crc
     required(header_length:) = new_line("a")
   end subroutine read_file
-
-  !> The eight digits of a checksum.
-  pure function hexadecimal(crc) result(text)
-    integer(c_long), intent(in) :: crc
-    character(len=8) :: text
-
-    write (text, "(z8.8)") crc
-  end function hexadecimal
 
 end module sealed_file

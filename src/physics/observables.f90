@@ -125,9 +125,11 @@ contains
 
     allocate (empty%species(0), empty%disk(0), empty%tag(0))
     list = observed(empty)
-    names = list%row(:list%n)%name
+    allocate (names(list%n))
     do k = 1, list%n
-      names(k) = names(k)(:index(names(k)//"/", "/") - 1)
+      associate (name => list%row(k)%name)
+        names(k) = name(:index(name//"/", "/") - 1)
+      end associate
     end do
   end function own_names
 
