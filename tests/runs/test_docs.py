@@ -3,11 +3,14 @@
 import importlib.util
 import os
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
 import tomllib
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from synthetic_run import ROOT, write_run
@@ -80,7 +83,7 @@ def test_modules_that_keep_a_promise_exist():
 def test_scripts_and_inputs_that_are_named_exist(page):
     folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
     named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", page.read_text())
-    mine = {"runs/mine.nml"}
+    mine = {"runs/mine.nml", *re.findall(r"`(src/\S+)`, a new file", page.read_text())}
     missing = [name for name in named if not (ROOT / name).exists()]
     assert [name for name in missing if name not in mine and name == name.lower()] == []
 
@@ -173,3 +176,68 @@ def test_completion_knows_options_variables_values_and_files(program):
     assert named == ["species.projectile.velocities=", "species.projectile.velocity="]
     placement = ["--set", "species.bed.placement", "="]
     assert completed(program, "input/crater.nml", *placement, "d") == ["dense"]
+
+
+def code_after(text: str, start: int) -> tuple[str, int]:
+    """The indented block that begins at or after a place in a page, without the indent; its end."""
+    lines, block, place = text[start:].splitlines(keepends=True), [], start
+    for line in lines:
+        if block and line.strip() and not line.startswith("    "):
+            break
+        if block or line.startswith("    "):
+            block.append(line[4:] or "\n")
+        place += len(line)
+    return "".join(block).rstrip("\n") + "\n", place
+
+
+def replace_lines(text: str, old: str, new: str) -> str:
+    """The text with some whole lines, found by all but their indent, replaced once."""
+    pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old.splitlines())
+    (found,) = re.finditer(pattern, text, re.MULTILINE)
+    lines = [found[1] + line if line.strip() else line for line in new.splitlines(keepends=True)]
+    return text[: found.start()] + "".join(lines) + text[found.end() :]
+
+
+def carry_out_recipes(page: str, root: Path) -> int:
+    """Makes the changes to src/ that a page describes: a new file, `after` and `change`."""
+    path = r"[Ii]n\s+`(src/[\w/]+\.f90)`"
+    for found in re.finditer(r"`(src/[\w/]+\.f90)`, a new file:", page):
+        (root / found[1]).write_text(code_after(page, found.end())[0])
+    steps = list(re.finditer(rf"{path}, (after|change)\n", page))
+    for found in steps:
+        anchor, place = code_after(page, found.end())
+        code, _ = code_after(page, place)
+        file = root / found[1]
+        new = anchor + code if found[2] == "after" else code
+        file.write_text(replace_lines(file.read_text(), anchor, new))
+    return len(steps)
+
+
+def test_the_recipes_of_the_page_on_extending_work(tmp_path):
+    for name in ("src", "Makefile", "tests"):
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
+    steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)
+    assert steps >= 14
+    build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    made = subprocess.run(build, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert made.returncode == 0, made.stdout + made.stderr
+    (tmp_path / "all.nml").write_text(
+        """&box upper = 2, 1 / &run dynamics = 'ideal' /
+        &block name = 'brick' centre = 1, 0.5 sides = 0.5, 0.5 /
+        &species count = 50 radius = 0.02 speed = 1 region = 0, 0.7, 0, 1 /
+        &contact wall_rule = 'rough' wall_restitution = 1 / &stop time = 3 /
+        &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
+    )
+    run = [tmp_path / "build" / "ricochet", "all.nml", "-o", "all.h5", "--quiet"]
+    subprocess.run(run, cwd=tmp_path, check=True)
+    with h5py.File(tmp_path / "all.h5") as file:
+        fastest = file["observables/largest_speed/value"][:]
+        outside = np.abs(file["particles/disks/position/value"][:] - (1, 0.5)) - 0.25
+        assert file["observables/collisions/value"][-1] == 0
+        assert file["observables/obstacle_collisions/value"][-1] > 10
+        assert file["parameters/block/sides"][:].tolist() == [[0.5, 0.5]]
+    assert np.hypot(*np.moveaxis(np.maximum(outside, 0), -1, 0)).min() > 0.02 - 1e-9
+    assert fastest[0] == pytest.approx(1) and (np.diff(fastest) <= 1e-15).all()
+    assert fastest[-1] < 1  # rough walls take the tangential velocity
