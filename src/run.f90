@@ -16,7 +16,7 @@ module run
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
+  use system, only: checkpoint_requests, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
   use texts, only: written
   use time_stepped, only: step_warning
   implicit none
@@ -94,10 +94,12 @@ contains
     type(progress_line_t) :: line
     type(limits_t) :: limits
     integer(int64) :: turns
+    integer :: requests_served
     real(real64) :: now, looked, next_checkpoint      ! [s]
     real(real64) :: begun                             ! by the clock of the simulation [time]
 
     turns = 1
+    requests_served = 0
     begun = sim%time()
     looked = seconds()
     next_checkpoint = looked + settings%output%checkpoint_every
@@ -121,7 +123,8 @@ contains
           //written(sim%time())//", after a checkpoint: the same command with --resume goes on")
         exit
       end if
-      if (checkpoint_requested() .or. now > next_checkpoint) then
+      if (checkpoint_requests() > requests_served .or. now > next_checkpoint) then
+        requests_served = checkpoint_requests()
         call write_checkpoint(command%output, settings, groups, sim, output, error)
         if (allocated(error)) exit
         next_checkpoint = seconds() + settings%output%checkpoint_every     ! after writing, however slow the disk

@@ -19,7 +19,7 @@ module hdf5_objects
     h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
   use errors, only: error_t, exit_files, fail
   use kinds, only: int32, int64, real64
-  use system, only: free_bytes, last_problem, move_file, obstacle_to_opening
+  use system, only: free_bytes, last_problem, move_file, opening_problem
   use texts, only: written
   implicit none
   private
@@ -133,7 +133,7 @@ contains
 
     self%path = path
     self%name = path
-    reason = obstacle_to_opening(path, writable)
+    reason = opening_problem(path, writable)
     if (reason == "") reason = "it is damaged, or no HDF5 file"
     call prepare_access(access, status)
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
