@@ -108,7 +108,7 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     )
     lines = translated(tmp_path, text).splitlines()
     assert lines[3] == "use systems, only: carry_on => run ! user@host"
-    assert "(e_ => ('a, @b('), a_ => (name))" in lines[6]
+    assert "(e_ => (('a, @b(')), a_ => ((name)))" in lines[6]
     assert "message='x=1, ''y'''" in lines[6]
 
 
