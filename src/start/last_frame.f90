@@ -32,7 +32,7 @@ contains
     call fetch_texts(file, "parameters/species/names", name_length, names)
     allocate (species(max(0_int64, file%length(disks//"species"))))
     call file%fetch(disks//"species", size(species), species)
-    chosen = pack([(k, k=1, size(species))], species == findloc(names, name, dim=1))
+    allocate (chosen, source=pack([(k, k=1, size(species))], species == findloc(names, name, dim=1)))
     if (size(chosen) == count) call read_columns(file, size(species), chosen, n_columns, table)
     call file%close()
     call file%failure(error)
