@@ -2,14 +2,13 @@
 #
 #   BUILD=folder      where everything built goes; other flags need another folder
 #   DEBUG=1           all run-time checks, no optimisation, in build/debug
-#   ARCH=x86-64-v3    code for other machines, such as a cluster; default: this one
+#   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
-#   HINTS=            without hints about memory (src/base/memory_hints.c)
+#   HINTS=            no hints about memory (src/base/memory_hints.c)
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
 #   V=1               shows the commands
 #
 # Modules and their order are derived from the files in src/: file name = module name.
-
 MAKEFLAGS += --no-print-directory
 comma := ,
 BUILD ?= build$(if $(DEBUG),/debug)
@@ -44,7 +43,7 @@ PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
 
 sources := $(wildcard src/*.f90 src/*/*.f90)
-vpath %.f90 $(sort $(dir $(sources)))
+vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
 modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
@@ -55,19 +54,10 @@ pfunit_mk := $(if $(PFUNIT_DIR),$(firstword $(wildcard $(PFUNIT_DIR)/include/PFU
 suites := tests/unit
 unit_build := DEBUG=1 OPT=-O1 BUILD=$(BUILD)/tests
 T := $(BUILD)/$(if $(PFUNIT_DIR),pfunit,substitute)
-ifneq ($(PFUNIT_DIR),)
 -include $(pfunit_mk)
-runner := pFUnit $(PFUNIT_VERSION)
-translate = log=$$($(PYTHON) $(PFUNIT_BIN_DIR)/funitproc $< $@ 2>&1) || { echo "$$log"; false; }
-driver := $(PFUNIT_INCLUDE_DIR)/driver.F90
-test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"'
-test_libs = $(PFUNIT_LIBRARIES)
-else
-runner := the substitute for pFUnit
-translate = $(PYTHON) tests/support/translate_pf.py $< $@
-driver := tests/support/driver.F90
-test_flags = -cpp
-endif
+translator := $(if $(PFUNIT_DIR),$(PFUNIT_BIN_DIR)/funitproc,tests/support/translate_pf.py)
+driver := $(or $(PFUNIT_INCLUDE_DIR),tests/support)/driver.F90
+test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"' -I$(BUILD) -J$(T)
 tests = $(filter-out $(if $(HINTS),,%/test_memory_hints.pf),$(wildcard $(suites)/test_*.pf))
 shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
 test_objects = $(tests:$(suites)/%.pf=$(T)/%.o)
@@ -80,8 +70,8 @@ targets := all demo figures test unit-tests check bench bench-check sanitize lin
 .PHONY: $(targets) FORCE
 
 # --- What is built, by a `make` whose goals are files in $(BUILD) ---------------------------------------------
-
 ifneq ($(filter $(BUILD)/%,$(MAKECMDGOALS)),)
+$(shell mkdir -p $(T))
 -include $(BUILD)/hints.mk $(BUILD)/deps.mk
 
 $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
@@ -103,66 +93,44 @@ $(BUILD)/%_c.o: %.c $(BUILD)/flags
 # A file that is rewritten only when its text changes, so that what depends on it stays.
 keep = cat > $@.$$$$; if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
-$(BUILD)/flags: FORCE | $(BUILD)
-	@echo '$(FC) $(flags) $(hints)' | { $(keep); }
+$(BUILD)/flags: FORCE
+	@echo '$(FC) $(flags) $(hints) $(PFUNIT_DIR)' | { $(keep); }
 
-commit = $(shell git describe --always --abbrev=12 --exclude='*' 2>/dev/null || echo unknown)
-changed = $(if $(shell git status --porcelain -- src Makefile 2>/dev/null),+changes)
-$(BUILD)/build_info.f90: FORCE | $(BUILD)
-	@{ echo '!> Where this program comes from. Written by the Makefile.'; \
-	  echo 'module build_info'; \
-	  echo '  implicit none'; \
-	  echo '  private'; \
-	  echo '  public :: git_commit, build_flags'; \
-	  echo "  character(len=*), parameter :: git_commit = '$(commit)$(changed)'"; \
-	  echo "  character(len=*), parameter :: build_flags = '$(firstword $(flags))' &"; \
-	  for flag in $(wordlist 2,$(words $(flags)),$(flags)); do echo "    // ' $$flag' &"; done; \
-	  echo "    // ''"; \
-	  echo 'end module build_info'; } | { $(keep); }
+$(BUILD)/build_info.f90: FORCE
+	@.ci/build_info $(flags) | { $(keep); }
 
-$(BUILD)/build_info.o: $(BUILD)/build_info.f90 $(BUILD)/flags
-	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
-
-$(BUILD)/deps.mk: FORCE | $(BUILD)
+$(BUILD)/deps.mk: FORCE
 	@awk -v build='$(BUILD)' -v tests='$(T)' -f .ci/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
 
 # Whether compiler, linker and system know what the hints are made of.
-$(BUILD)/hints.mk: src/base/memory_hints.c | $(BUILD)
+$(BUILD)/hints.mk: src/base/memory_hints.c
 	@echo 'int main(void) { return 0; }' > $@.c; \
 	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c -Wl,--wrap=malloc -o $@.out 2>/dev/null; \
 	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
 
 $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects)
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(test_flags) -I$(T) -J$(T) -o $@ $< $(filter %.o,$^) $(test_libs) $(hints) $(hdf5_libs)
+	$(Q)$(FC) $(flags) $(test_flags) -o $@ $< $(filter %.o,$^) $(PFUNIT_LIBRARIES) $(hints) $(hdf5_libs)
 
-$(T)/test_%.F90: $(suites)/test_%.pf tests/support/translate_pf.py $(T)/runner
-	$(Q)$(translate)
+$(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
+	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
 
 $(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags
 	@echo "compile $(<:$(T)/%.F90=$(suites)/%.pf)"
-	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -I$(BUILD) -J$(T) -c -o $@ $<
+	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -c -o $@ $<
 
-$(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags | $(T)
+$(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags
 	@echo "compile $<"
 	$(Q)$(FC) $(flags) $(hdf5_flags) -I$(BUILD) -J$(T) -c -o $@ $<
 
-$(T)/tests.inc: FORCE | $(T)
+$(T)/tests.inc: FORCE
 	@printf 'ADD_TEST_SUITE(%s_suite)\n' $(basename $(notdir $(tests))) | { $(keep); }
 
-$(T)/runner: FORCE | $(T)
-	@echo '$(runner) $(PFUNIT_DIR)' | { $(keep); }
-
-$(BUILD) $(T):
-	@mkdir -p $@
-
-.PHONY: $(BUILD)/test_support $(BUILD)/without_hdf5
-$(BUILD)/test_support: $(shared_objects)
+.PHONY: $(BUILD)/without_hdf5
 $(BUILD)/without_hdf5: $(without_hdf5)
 endif
 
 # --- What people call ----------------------------------------------------------------------------------------
-
 venv := .venv/bin/python
 jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
@@ -176,7 +144,8 @@ all:  ## builds the program (default)
 unit-tests:
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
 	@+$(build) $(BUILD)/unit_tests
-	@tests/support/run_unit_tests.sh "$(runner)" $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
+	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
+	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@.ci/set-up demo
@@ -187,8 +156,7 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement
 	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
 	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
-	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
-	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
+	@echo 'In runs/demo: crater.png; crater.html, a film for the browser; speeds.png and gas.png; the data (crater.h5, gas.h5).'
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo
@@ -216,33 +184,36 @@ bench-check:  ## counts instructions per collision against what is promised
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
 
-# What the sanitizers watch: the unit tests, runs that write, stop and resume, damaged input. In unit tests leaks
-# do not count: gfortran 12 never frees the array constructors of obstacles that they are full of.
-watched := $(patsubst %,tests/runs/test_%.py,output_file restart)
+# Unit tests, runs that write, stop and resume, damaged input. Leaks do not count in unit tests: gfortran 12 never
+# frees array constructors of obstacles, which they are full of.
 sanitized := $(BUILD)/sanitized
-
 sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
-	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q $(watched)
+	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q tests/runs/test_output_file.py tests/runs/test_restart.py
 	@$(venv) tests/runs/fuzz_input.py --count 500 --program $(sanitized)/ricochet
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 
 lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint
-	@$(MAKE) $(jobs) --keep-going --output-sync lint-compiler lint-fortran lint-python lint-shell lint-design
+	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
-.PHONY: lint-compiler lint-fortran lint-python lint-shell lint-design
+lints := lint-compiler lint-flang lint-fortran lint-python lint-shell lint-design
 lint-compiler:
-	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
+	@$(MAKE) BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
+	  $(BUILD)/lint/ricochet $(patsubst tests/support/%.f90,$(BUILD)/lint/substitute/%.o,$(wildcard tests/support/*.f90))
+# A second opinion on all that needs no HDF5, whose modules are those of one compiler.
+flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
+lint-flang:
+	@$(if $(flang),$(MAKE) BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5)
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 lint-shell:
-	@shellcheck --format gcc .ci/run .ci/set-up $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
+	@shellcheck --format gcc .ci/run .ci/set-up .ci/build_info $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 lint-design:
 	@$(venv) tests/support/check_style.py
 

@@ -1,9 +1,10 @@
 # Who uses whom, for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, and the list of objects that need no HDF5.
-# usage: awk -v build=FOLDER -v tests=FOLDER -f .ci/modules.awk FILE...      objects of tests/ go to the second folder
+# Objects of src/ go to one folder, all others to another.
+# usage: awk -v build=FOLDER -v tests=FOLDER -f .ci/modules.awk FILE...
 FNR == 1 {
   me = FILENAME
   gsub(/.*\/|\.[a-z0-9]*$/, "", me)
-  home[me] = (FILENAME ~ /^tests\// ? tests : build) "/" me
+  home[me] = (FILENAME ~ /^src\// ? build : tests) "/" me
 }
 tolower($1) == "use" {
   sub(/,.*/, "", $2)

@@ -8,12 +8,12 @@ module memory_hints
 
   !> Starts to load the cache line of a variable without waiting for it, as a read would.
   interface prefetch
-    subroutine prefetch_integer(item) bind(c, name="prefetch_line")
+    subroutine prefetch_integer(item) bind(C)
       import :: c_int32_t
       integer(c_int32_t), intent(in) :: item
     end subroutine prefetch_integer
 
-    subroutine prefetch_real(item) bind(c, name="prefetch_line")
+    subroutine prefetch_real(item) bind(C)
       import :: c_double
       real(c_double), intent(in) :: item
     end subroutine prefetch_real

@@ -125,7 +125,7 @@ def test_a_slow_reader_behind_a_non_blocking_pipe_gets_all_of_a_text(program):
     process = subprocess.Popen([program, "--print-defaults"], stdout=inlet, stderr=subprocess.PIPE)
     os.close(inlet)
     time.sleep(0.1)
-    with open(outlet, "rb") as reader:
+    with os.fdopen(outlet, "rb") as reader:
         assert reader.read() == expected
     assert process.wait(timeout=10) == FINISHED, process.stderr.read()
 

@@ -134,6 +134,23 @@ def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict)
     assert subprocess.run(command, capture_output=True).returncode == verdict
 
 
+@pytest.mark.parametrize(
+    ("work", "verdict", "message"),
+    [("sleep 2", 0, ""), ("while :; do :; done", 152, "stopped after 1 s of processor time")],
+    ids=["waiting", "busy"],
+)
+def test_a_unit_run_is_stopped_by_processor_time_not_by_the_clock(tmp_path, work, verdict, message):
+    program = tmp_path / "unit_tests"
+    program.write_text(f"#!/bin/sh\n{work}\necho ' OK'\necho ' (1 test)'\n")
+    program.chmod(0o755)
+    suite = tmp_path / "test_it.pf"
+    suite.write_text("  @test\n")
+    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suite]
+    limited = {**os.environ, "LIMIT": "1"}
+    run = subprocess.run(command, capture_output=True, text=True, env=limited, timeout=60)
+    assert run.returncode == verdict and message in run.stderr
+
+
 MODULE = """!> A module. It says: use nothing, private, get_it.
 module upper
   use lower, only: value
