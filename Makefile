@@ -206,7 +206,7 @@ lint-compiler:
 # A second opinion on all that needs no HDF5, whose modules are those of one compiler.
 flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
 lint-flang:
-	@$(if $(flang),$(MAKE) BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5)
+	@$(if $(flang),$(MAKE) BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
