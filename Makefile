@@ -201,12 +201,12 @@ lint:  ## warnings, style, and the rules of the design
 
 lints := lint-compiler lint-flang lint-fortran lint-python lint-shell lint-design
 lint-compiler:
-	@$(MAKE) BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
+	@$(MAKE) -s BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
 	  $(BUILD)/lint/ricochet $(patsubst tests/support/%.f90,$(BUILD)/lint/substitute/%.o,$(wildcard tests/support/*.f90))
 # A second opinion on all that needs no HDF5, whose modules are those of one compiler.
 flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
 lint-flang:
-	@$(if $(flang),$(MAKE) BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
+	@$(if $(flang),$(MAKE) -s BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
