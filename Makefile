@@ -57,7 +57,7 @@ T := $(BUILD)/$(if $(PFUNIT_DIR),pfunit,substitute)
 -include $(pfunit_mk)
 translator := $(if $(PFUNIT_DIR),$(PFUNIT_BIN_DIR)/funitproc,tests/support/translate_pf.py)
 driver := $(or $(PFUNIT_INCLUDE_DIR),tests/support)/driver.F90
-test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"' -I$(BUILD) -J$(T)
+test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"' -I$(T) -J$(T) -I$(BUILD)
 tests = $(filter-out $(if $(HINTS),,%/test_memory_hints.pf),$(wildcard $(suites)/test_*.pf))
 shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
 test_objects = $(tests:$(suites)/%.pf=$(T)/%.o)
@@ -121,7 +121,7 @@ $(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags
 
 $(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) $(flags) $(hdf5_flags) -I$(BUILD) -J$(T) -c -o $@ $<
+	$(Q)$(FC) $(flags) $(hdf5_flags) -I$(T) -J$(T) -I$(BUILD) -c -o $@ $<
 
 $(T)/tests.inc: FORCE
 	@printf 'ADD_TEST_SUITE(%s_suite)\n' $(basename $(notdir $(tests))) | { $(keep); }
