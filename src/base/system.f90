@@ -62,6 +62,7 @@ module system
       integer(c_int) :: requests
     end function checkpoint_requests
 
+    ! The calls of system_calls.c, which says more.
     function c_print(bytes, count) bind(C, name="system_print") result(status)
       import :: c_char, c_int, c_size_t
       character(kind=c_char), intent(in) :: bytes(*)
