@@ -112,6 +112,17 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     assert "message='x=1, ''y'''" in lines[6]
 
 
+def judged(tmp_path: Path, script: str, suite: str, **variables) -> subprocess.CompletedProcess:
+    """The verdict on a stand-in for the program with the unit tests."""
+    program = tmp_path / "unit_tests"
+    program.write_text(f"#!/bin/sh\n{script}")
+    program.chmod(0o755)
+    (tmp_path / "test_it.pf").write_text(suite)
+    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, tmp_path / "test_it.pf"]
+    environment = {**os.environ, **variables}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+
+
 @pytest.mark.parametrize(
     ("output", "status", "verdict"),
     [
@@ -125,13 +136,9 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     ],
 )
 def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict):
-    program = tmp_path / "unit_tests"
-    program.write_text(f"#!/bin/sh\ncat <<'E'\n{output}\nE\nexit {status}\n")
-    program.chmod(0o755)
-    suites = tmp_path / "test_it.pf"
-    suites.write_text("  @test\n  !@test\n  @Test\n  ! about @test\n")
-    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suites]
-    assert subprocess.run(command, capture_output=True).returncode == verdict
+    script = f"cat <<'E'\n{output}\nE\nexit {status}\n"
+    run = judged(tmp_path, script, "  @test\n  !@test\n  @Test\n  ! about @test\n")
+    assert run.returncode == verdict
 
 
 @pytest.mark.parametrize(
@@ -140,14 +147,7 @@ def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict)
     ids=["waiting", "busy"],
 )
 def test_a_unit_run_is_stopped_by_processor_time_not_by_the_clock(tmp_path, work, verdict, message):
-    program = tmp_path / "unit_tests"
-    program.write_text(f"#!/bin/sh\n{work}\necho ' OK'\necho ' (1 test)'\n")
-    program.chmod(0o755)
-    suite = tmp_path / "test_it.pf"
-    suite.write_text("  @test\n")
-    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suite]
-    limited = {**os.environ, "LIMIT": "1"}
-    run = subprocess.run(command, capture_output=True, text=True, env=limited, timeout=60)
+    run = judged(tmp_path, f"{work}\necho ' OK'\necho ' (1 test)'\n", "  @test\n", LIMIT="1")
     assert run.returncode == verdict and message in run.stderr
 
 
