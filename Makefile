@@ -1,25 +1,18 @@
 # Ricochet. `make` builds the program, `make help` lists everything.
 #
-#   BUILD=folder      where all that is made goes; other flags want another folder
+#   BUILD=folder      where everything built goes; other flags need another folder
 #   DEBUG=1           all run-time checks, no optimisation, in build/debug
 #   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
-#   PFUNIT_DIR=folder an installed pFUnit; else unit tests run on a substitute
+#   HINTS=            no hints about memory (src/base/memory_hints.c)
+#   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
 #   V=1               shows the commands
 #
 # Modules and their order are derived from the files in src/: file name = module name.
-
 MAKEFLAGS += --no-print-directory
 comma := ,
 BUILD ?= build$(if $(DEBUG),/debug)
-$(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder may hold no space))
-ARCH ?= native
-OPT ?= $(if $(DEBUG),-O0 -Wno-maybe-uninitialized,-O2 -march=$(ARCH) $(hot) -fno-backtrace)
-# For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
-hot := -flto -flto-partition=none -finline-limit=600 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
-  --param=ipa-cp-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
-CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
-FFLAGS ?= -std=f2008 -g -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument $(OPT)
+$(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder name may not contain spaces))
 
 # HDF5's own wrapper knows the compiler, the folders and the libraries.
 H5FC ?= h5fc
@@ -29,19 +22,46 @@ FC = $(or $(firstword $(hdf5)),$(error No $(H5FC): gfortran or HDF5 for Fortran 
 endif
 hdf5_flags := $(filter -I%,$(hdf5))
 hdf5_libs := $(filter-out -I%,$(wordlist 2,$(words $(hdf5)),$(hdf5)))
-# Arrays on cache lines: see src/base/memory_hints.c.
-libraries = -Wl,--wrap=malloc $(hdf5_libs)
+
+# Most flags are gfortran's; another compiler gets plain optimisation, and FFLAGS.
+gnu = $(eval gnu := $(findstring GNU Fortran,$(shell $(FC) --version 2>/dev/null)))$(gnu)
+ARCH ?= native
+OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),-march=$(ARCH) $(hot) -fno-backtrace))
+# For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
+hot := -flto -flto-partition=none -finline-limit=600 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
+  --param=ipa-cp-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
+CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
+FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
-flags = $(FFLAGS) $(CHECKS) -ffp-contract=off -ffpe-summary=none
+flags = $(FFLAGS) -ffp-contract=off $(if $(gnu),$(CHECKS) -ffpe-summary=none)
+# gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
+c_compiler = $(if $(gnu),$(FC),$(CC))
+c_flags = -Wall -Wextra $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
+hints = $(if $(HINTS),-Wl$(comma)--wrap=malloc)
 
 PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
 
 sources := $(wildcard src/*.f90 src/*/*.f90)
-vpath %.f90 $(sort $(dir $(sources)))
+vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
 modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
-objects := $(modules:%=$(BUILD)/%.o) $(BUILD)/memory_hints_c.o
+objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
+
+# Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
+PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
+pfunit_mk := $(if $(PFUNIT_DIR),$(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk)))
+suites := tests/unit
+unit_build := DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=$(BUILD)/tests
+T := $(BUILD)/$(if $(PFUNIT_DIR),pfunit,substitute)
+-include $(pfunit_mk)
+translator := $(if $(PFUNIT_DIR),$(PFUNIT_BIN_DIR)/funitproc,tests/support/translate_pf.py)
+driver := $(or $(PFUNIT_INCLUDE_DIR),tests/support)/driver.F90
+test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"' -I$(T) -J$(T) -I$(BUILD)
+tests = $(filter-out $(if $(HINTS),,%/test_memory_hints.pf),$(wildcard $(suites)/test_*.pf))
+shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
+test_objects = $(tests:$(suites)/%.pf=$(T)/%.o)
+shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 
 .DELETE_ON_ERROR:
 .SUFFIXES:
@@ -49,110 +69,83 @@ objects := $(modules:%=$(BUILD)/%.o) $(BUILD)/memory_hints_c.o
 targets := all demo figures test unit-tests check bench bench-check sanitize lint coverage docs set-up clean distclean help
 .PHONY: $(targets) FORCE
 
-all: $(BUILD)/ricochet  ## builds the program (default)
+# --- What is built, by a `make` whose goals are files in $(BUILD) ---------------------------------------------
+ifneq ($(filter $(BUILD)/%,$(MAKECMDGOALS)),)
+$(shell mkdir -p $(T))
+-include $(BUILD)/hints.mk $(BUILD)/deps.mk
 
 $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(libraries)
+	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(hints) $(hdf5_libs)
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
 	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
-# The one thing that Fortran cannot say, by the same driver; link-time optimisation makes it an instruction.
 $(BUILD)/%_c.o: %.c $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) -Wall -Wextra $(filter -O% -g -march=% -flto% -Werror,$(flags)) -c -o $@ $<
+	$(Q)$(c_compiler) $(c_flags) $(if $(HINTS),-DMEMORY_HINTS) -c -o $@ $<
 
-$(BUILD)/build_info.o: $(BUILD)/build_info.f90 $(BUILD)/flags
-	$(Q)$(FC) $(flags) -J$(BUILD) -c -o $@ $<
+# The compiler leaves an interface untouched that has not changed: then nothing that uses it is compiled again.
+%.mod: %.o
+	@:
 
-# A file that is rewritten only when its text changes, so that what hangs on it stays.
-keep = cat > $@.new; if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+# A file that is rewritten only when its text changes, so that what depends on it stays.
+keep = cat > $@.$$$$; if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
-$(BUILD)/flags: FORCE | $(BUILD)
-	@echo '$(FC) $(flags)' | { $(keep); }
+$(BUILD)/flags: FORCE
+	@echo '$(FC) $(flags) $(hints) $(PFUNIT_DIR)' | { $(keep); }
 
-commit = $(shell git describe --always --abbrev=12 --exclude='*' 2>/dev/null || echo unknown)
-changed = $(if $(shell git status --porcelain -- src Makefile 2>/dev/null),+changes)
-$(BUILD)/build_info.f90: FORCE | $(BUILD)
-	@{ echo '!> Where this program comes from. Written by the Makefile.'; \
-	  echo 'module build_info'; \
-	  echo '  implicit none'; \
-	  echo '  private'; \
-	  echo '  public :: git_commit, build_flags'; \
-	  echo "  character(len=*), parameter :: git_commit = '$(commit)$(changed)'"; \
-	  echo "  character(len=*), parameter :: build_flags = '$(firstword $(flags))' &"; \
-	  for flag in $(wordlist 2,$(words $(flags)),$(flags)); do echo "    // ' $$flag' &"; done; \
-	  echo "    // ''"; \
-	  echo 'end module build_info'; } | { $(keep); }
+$(BUILD)/build_info.f90: FORCE
+	@.ci/build_info $(flags) | { $(keep); }
 
-PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
+$(BUILD)/deps.mk: FORCE
+	@awk -v build='$(BUILD)' -v tests='$(T)' -f .ci/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
 
-# What tests share, among it the substitute for pFUnit, which pFUnit itself replaces.
-suites := tests/unit
-tests := $(wildcard $(suites)/test_*.pf)
-shared := $(filter-out $(if $(PFUNIT_DIR),%/funit.f90),$(wildcard tests/support/*.f90))
-test_objects := $(tests:$(suites)/%.pf=$(BUILD)/%.o)
-shared_objects := $(shared:tests/support/%.f90=$(BUILD)/%.o)
+# Whether compiler, linker and system know what the hints are made of.
+$(BUILD)/hints.mk: src/base/memory_hints.c
+	@echo 'int main(void) { return 0; }' > $@.c; \
+	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c -Wl,--wrap=malloc -o $@.out 2>/dev/null; \
+	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
 
-# Who uses whom: `x.o: y.o` for every `use y` in x.f90 or x.pf.
-$(BUILD)/deps.mk: FORCE | $(BUILD)
-	@awk -v build='$(BUILD)' -v known='$(modules) $(basename $(notdir $(shared)))' 'BEGIN { split(known, list); for (i in list) own[list[i]] } \
-	  FNR == 1 { me = FILENAME; sub(/.*\//, "", me); sub(/\.[a-z0-9]*$$/, "", me) } \
-	  tolower($$1) == "use" { sub(/,.*/, "", $$2); if ($$2 in own && $$2 != me) print build "/" me ".o: " build "/" $$2 ".o" }' \
-	  $(sources) $(tests) $(shared) /dev/null | sort -u | { $(keep); }
-
-$(BUILD):
-	@mkdir -p $@
-
-ifneq ($(filter-out help clean distclean set-up,$(or $(MAKECMDGOALS),all)),)
--include $(BUILD)/deps.mk
-endif
-
-# --- Unit tests: the same .pf files under pFUnit or the substitute, always with all checks on -----------------
-
-unit_build := DEBUG=1 OPT=-O1 BUILD=$(BUILD)/$(if $(PFUNIT_DIR),pfunit,tests)
-
-ifneq ($(PFUNIT_DIR),)
-include $(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk) $(PFUNIT_DIR)/PFUNIT.mk)
-runner := pFUnit $(PFUNIT_VERSION)
-translate = log=$$($(PYTHON) $(PFUNIT_BIN_DIR)/funitproc $< $@ 2>&1) || { echo "$$log"; false; }
-driver := $(PFUNIT_INCLUDE_DIR)/driver.F90
-test_flags = -cpp $(PFUNIT_EXTRA_FFLAGS) -D_TEST_SUITES='"tests.inc"'
-test_libs = $(PFUNIT_LIBRARIES)
-else
-runner := the substitute for pFUnit
-translate = $(PYTHON) tests/support/translate_pf.py $< $@
-driver := tests/support/driver.F90
-test_flags = -cpp -I$(BUILD)
-endif
-
-unit-tests: $(BUILD)/unit_tests
-	@tests/support/run_unit_tests.sh "$(runner)" $< $(tests)
-
-$(BUILD)/unit_tests: $(driver) $(BUILD)/tests.inc $(test_objects) $(shared_objects) $(objects)
+$(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects)
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(test_flags) -J$(BUILD) -o $@ $< $(filter %.o,$^) $(test_libs) $(libraries)
+	$(Q)$(FC) $(flags) $(test_flags) -o $@ $< $(filter %.o,$^) $(PFUNIT_LIBRARIES) $(hints) $(hdf5_libs)
 
-$(BUILD)/test_%.F90: $(suites)/test_%.pf tests/support/translate_pf.py
-	$(Q)$(translate)
+$(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
+	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
 
-$(test_objects): $(BUILD)/%.o: $(BUILD)/%.F90 $(BUILD)/flags
-	@echo "compile $(<:$(BUILD)/%.F90=$(suites)/%.pf)"
-	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+$(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags
+	@echo "compile $(<:$(T)/%.F90=$(suites)/%.pf)"
+	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -c -o $@ $<
 
-$(shared_objects): $(BUILD)/%.o: tests/support/%.f90 $(BUILD)/flags
+$(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+	$(Q)$(FC) $(flags) $(hdf5_flags) -I$(T) -J$(T) -I$(BUILD) -c -o $@ $<
 
-$(BUILD)/tests.inc: FORCE | $(BUILD)
+$(T)/tests.inc: FORCE
 	@printf 'ADD_TEST_SUITE(%s_suite)\n' $(basename $(notdir $(tests))) | { $(keep); }
 
-# --- What people call ----------------------------------------------------------------------------------------
+.PHONY: $(BUILD)/without_hdf5
+$(BUILD)/without_hdf5: $(without_hdf5)
+endif
 
+# --- What people call ----------------------------------------------------------------------------------------
 venv := .venv/bin/python
 jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
+
+# One `make` at a time works in a folder; a second one waits, and then finds everything done.
+build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write to $(BUILD); BUILD=folder takes another' >&2; exit 2; }; \
+  $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE)
+
+all:  ## builds the program (default)
+	@+$(build) $(BUILD)/ricochet
+
+unit-tests:
+	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
+	@+$(build) $(BUILD)/unit_tests
+	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
+	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@.ci/set-up demo
@@ -163,8 +156,7 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement
 	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
 	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
-	@echo 'In runs/demo: the crater (crater.png) and a film of it to play with (open crater.html in a browser),'
-	@echo 'the speeds of the gas (speeds.png), its last state (gas.png); the data are in crater.h5 and gas.h5.'
+	@echo 'In runs/demo: crater.png; crater.html, a film for the browser; speeds.png and gas.png; the data (crater.h5, gas.h5).'
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo
@@ -192,33 +184,36 @@ bench-check:  ## counts instructions per collision against what is promised
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
 
-# What the sanitizers watch: the unit tests, runs that write, stop and resume, damaged input. In unit tests leaks
-# do not count: gfortran 12 never frees the array constructors of obstacles that they are full of.
-watched := $(patsubst %,tests/runs/test_%.py,output_file restart)
+# Unit tests, runs that write, stop and resume, damaged input. Leaks do not count in unit tests: gfortran 12 never
+# frees array constructors of obstacles, which they are full of.
 sanitized := $(BUILD)/sanitized
-
 sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
-	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q $(watched)
+	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q tests/runs/test_output_file.py tests/runs/test_restart.py
 	@$(venv) tests/runs/fuzz_input.py --count 500 --program $(sanitized)/ricochet
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 
 lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint
-	@$(MAKE) $(jobs) --keep-going --output-sync lint-compiler lint-fortran lint-python lint-shell lint-design
+	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
-.PHONY: lint-compiler lint-fortran lint-python lint-shell lint-design
+lints := lint-compiler lint-flang lint-fortran lint-python lint-shell lint-design
 lint-compiler:
-	@$(MAKE) BUILD=$(BUILD)/lint OPT='-O2 -pedantic -Wimplicit-interface -Werror' all
+	@$(MAKE) -s BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
+	  $(BUILD)/lint/ricochet $(patsubst tests/support/%.f90,$(BUILD)/lint/substitute/%.o,$(wildcard tests/support/*.f90))
+# A second opinion on all that needs no HDF5, whose modules are those of one compiler.
+flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
+lint-flang:
+	@$(if $(flang),$(MAKE) -s BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
 lint-fortran:
 	@$(venv) -m fortitude --quiet check --output-format concise src $(wildcard tests/support/*.f90)
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 lint-shell:
-	@shellcheck --format gcc .ci/run .ci/set-up $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
+	@shellcheck --format gcc .ci/run .ci/set-up .ci/build_info $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 lint-design:
 	@$(venv) tests/support/check_style.py
 

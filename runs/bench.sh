@@ -178,13 +178,13 @@ ensemble() {
 instructions() {
   local short long='' length
   gas "$1" "$2"
-  for length in 40000 90000; do
+  for length in 40000 140000; do
     run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
     run "gas_$1_$2" "$length" --set "$(samples "$1")" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
     short=$long
     long=$(awk '/Collected/ { print $4 }' "$work/count")
   done
-  echo $(((long - short) / 50000))
+  echo $(((long - short) / 100000))
 }
 
 check() {
@@ -194,8 +194,9 @@ check() {
     printf 'packing %s: %s instructions per collision, at most %s\n' "$packing" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
   done <<'LIMITS'
-0.5 1600
-0.7 1700
+0.5 2180
+0.7 2190
+0.1 3290
 LIMITS
   return $verdict
 }

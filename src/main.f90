@@ -4,7 +4,7 @@ program main
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
   use run, only: perform_run
-  use system, only: fill_standard_streams, leave
+  use system, only: end_program, fill_standard_streams
   implicit none
   call serve()
 
@@ -31,7 +31,7 @@ contains
       if (error%message /= "") write (error_unit, "(a)") error%message
       code = error%code
     end if
-    call leave(code)
+    call end_program(code)
   end subroutine serve
 
 end program main

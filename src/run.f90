@@ -14,7 +14,7 @@ module run
   use run_setup, only: choose_evolution, new_simulation, read_input
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requested, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
+  use system, only: checkpoint_requests, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
   use texts, only: written
   implicit none
   private
@@ -116,10 +116,12 @@ contains
     type(progress_line_t) :: line
     type(limits_t) :: limits
     integer(int64) :: turns
+    integer :: requests_served
     real(real64) :: now, before, next_checkpoint      ! [s]
     real(real64) :: first_time                        ! of the simulation [time]
 
     turns = 1
+    requests_served = 0
     first_time = run%sim%time()
     before = seconds()
     next_checkpoint = before + run%input%settings%output%checkpoint_every
@@ -141,7 +143,8 @@ contains
           //written(run%sim%time())//", after a checkpoint: the same command with --resume goes on")
         exit
       end if
-      if (checkpoint_requested() .or. now > next_checkpoint) then
+      if (checkpoint_requests() > requests_served .or. now > next_checkpoint) then
+        requests_served = checkpoint_requests()
         call write_checkpoint(run%sim, run%output, error)
         if (allocated(error)) exit
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow

@@ -1,11 +1,11 @@
-!> Number kinds and the time that never comes. Every other module builds on this one.
+!> Kinds of numbers, and the time of an event that never happens. Every other module builds on this one.
 module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
   private
   public :: int16, int32, int64, real64, never, pi
 
-  !> The time of an event that does not happen. Finite, so that sums and products with it stay finite.
+  !> Later than any event. Finite, so that sums and products with it are finite too.
   real(real64), parameter :: never = 1.0e150_real64
   real(real64), parameter :: pi = 3.14159265358979323846264338327950288_real64
 end module kinds

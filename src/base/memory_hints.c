@@ -1,15 +1,18 @@
-/* Hints about memory, for which Fortran has no words. They change nothing but the time that a run takes. */
+/* Hints about memory that Fortran cannot express. They change nothing but the time that a run takes. Everything here
+   depends on the compiler, the linker and the system; without MEMORY_HINTS (see HINTS in the Makefile) nothing is left. */
 #include <stdint.h>
+
+#ifdef MEMORY_HINTS
 #include <stdlib.h>
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
 
-void prefetch_line(const void *address) { __builtin_prefetch(address); }
+#define PREFETCH(address) __builtin_prefetch(address)
 
-/* Large arrays begin with a cache line, so that each record of the size of a line lies on one only. Larger ones lie on
-   huge pages, if the system has some to spare: the processor knows by heart where few pages are, but not hundreds of
-   thousands. The linker leads all that asks for memory here (--wrap=malloc), as `allocate` has no words for that. */
+/* Large arrays start on a cache line, so that a record as long as a line lies in one. Larger ones lie on huge pages, if
+   the system has any to spare: the TLB covers few pages. The linker redirects malloc here (--wrap=malloc) because
+   `allocate` offers no control over alignment or page size. */
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
@@ -22,3 +25,11 @@ __attribute__((used)) void *__wrap_malloc(size_t bytes)
 #endif
     return memory;
 }
+
+#else
+#define PREFETCH(address) ((void)(address))
+#endif
+
+void prefetch_integer(const int32_t *item) { PREFETCH(item); }
+
+void prefetch_real(const double *item) { PREFETCH(item); }

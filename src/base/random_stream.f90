@@ -1,9 +1,9 @@
 !> Reproducible random numbers: xoshiro256** (Blackman and Vigna, ACM Trans. Math. Softw. 47, 36
-!> (2021)), seeded through SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), so that neighbouring
-!> seeds give unrelated streams. A stream is a value: a copy goes on like the original.
+!> (2021)), seeded by SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), so that consecutive seeds give
+!> unrelated streams. A stream is a value: a copy continues with the same numbers as the original.
 !>
-!> Both generators calculate modulo 2**64. Fortran has no unsigned integers and forbids overflow of
-!> the signed ones, hence the sums in two halves.
+!> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is
+!> not allowed, so sums are formed in two halves.
 module random_stream
   use kinds, only: int32, int64, real64
   implicit none
@@ -13,8 +13,9 @@ module random_stream
   integer(int64), parameter :: lower_half = int(z"FFFFFFFF", int64)
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 
+  !> The state of a generator.
   type :: random_stream_t
-    integer(int64) :: word(4) = 0_int64         !! the state, not all zero once seeded
+    integer(int64) :: word(4) = 0_int64         !! not all zero once seeded
   contains
     procedure :: seed
     procedure :: draw_word
@@ -26,12 +27,12 @@ module random_stream
 
 contains
 
-  !> Starts the stream that belongs to a seed and a key. Streams with different keys are
-  !> independent: what one purpose draws never shifts what another one gets.
+  !> Starts the stream of a seed and a key. Streams with different keys are independent, so that drawing
+  !> more numbers for one purpose never changes the numbers for another.
   pure subroutine seed(self, number, key)
     class(random_stream_t), intent(inout) :: self
-    integer(int64), intent(in) :: number        !! the user's seed, any value
-    integer, intent(in) :: key(:)               !! what the stream is for; may be empty
+    integer(int64), intent(in) :: number        !! the user's seed; any value
+    integer, intent(in) :: key(:)               !! the purpose of the stream; may be empty
     integer(int64) :: state, word
     integer :: k
 
@@ -64,7 +65,7 @@ contains
     end associate
   end subroutine draw_word
 
-  !> A number uniform in [0, 1): a multiple of 2**-53 from the upper 53 bits.
+  !> A uniform number in [0, 1): the upper 53 bits as a multiple of 2**-53.
   pure subroutine draw_uniform(self, u)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: u
@@ -74,7 +75,7 @@ contains
     u = real(ishft(word, -11), real64)*unit_53
   end subroutine draw_uniform
 
-  !> One of 1, 2, ..., n.
+  !> A uniform integer from 1 to n.
   pure subroutine draw_index(self, n, k)
     class(random_stream_t), intent(inout) :: self
     integer(int32), intent(in) :: n             !! > 0
@@ -85,8 +86,8 @@ contains
     k = 1 + int(n*u, int32)
   end subroutine draw_index
 
-  !> A unit vector of random direction: a point of the disk, normalised. No sine or cosine, whose
-  !> last bits depend on the mathematical library.
+  !> A unit vector of random direction: a random point of the unit disk, normalised. Sine and cosine are
+  !> avoided because their last bits depend on the mathematical library.
   pure subroutine draw_direction(self, e)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: e(2)
@@ -97,8 +98,8 @@ contains
   end subroutine draw_direction
 
   !> Two independent normal deviates of mean 0 and variance 1, by the polar method (Marsaglia and
-  !> Bray, SIAM Rev. 6, 260 (1964)). It takes a logarithm: the last bit may depend on the
-  !> mathematical library.
+  !> Bray, SIAM Rev. 6, 260 (1964)). The last bit may depend on the mathematical library, through the
+  !> logarithm.
   pure subroutine draw_normals(self, z)
     class(random_stream_t), intent(inout) :: self
     real(real64), intent(out) :: z(2)
@@ -108,7 +109,7 @@ contains
     z = z*sqrt(-2*log(s)/s)
   end subroutine draw_normals
 
-  !> A point uniform in the unit disk without its centre, and its squared distance from there.
+  !> A uniform point of the unit disk, other than its centre, and its squared distance from the centre.
   pure subroutine draw_in_disk(stream, point, s)
     class(random_stream_t), intent(inout) :: stream
     real(real64), intent(out) :: point(2), s
@@ -146,7 +147,7 @@ contains
     c = ior(ishft(high, 32), iand(low, lower_half))
   end function wrapped_sum
 
-  !> a*b modulo 2**64 by written multiplication in binary: slow, but only seeding needs it.
+  !> a*b modulo 2**64 by binary long multiplication: slow, but only seeding needs it.
   pure function wrapped_product(a, b) result(c)
     integer(int64), intent(in) :: a, b
     integer(int64) :: c

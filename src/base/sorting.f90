@@ -1,4 +1,4 @@
-!> Sorting by counting.
+!> Sorting by counting, for items with small integer keys such as cell numbers.
 module sorting
   use kinds, only: int32
   implicit none
@@ -7,12 +7,12 @@ module sorting
 
 contains
 
-  !> Where each item goes when items are sorted by small whole keys; equal keys keep their order.
+  !> Where each item goes so that the keys ascend; items with equal keys keep their order.
   pure subroutine sort_by_count(key, n_keys, first, place)
-    integer(int32), intent(in) :: key(:)                  !! from 1 to n_keys
+    integer(int32), intent(in) :: key(:)                  !! (n) from 1 to n_keys
     integer(int32), intent(in) :: n_keys
-    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) place of the first item of each key
-    integer(int32), intent(out) :: place(:)               !! of each item
+    integer(int32), allocatable, intent(out) :: first(:)  !! (n_keys+1) place of the first item of each key; n+1
+    integer(int32), intent(out) :: place(:)               !! (n) of each item
     integer(int32) :: k
 
     allocate (first(n_keys + 1))
@@ -28,7 +28,8 @@ contains
       place(k) = first(key(k))
       first(key(k)) = first(key(k)) + 1
     end do
-    first = eoshift(first, -1, 1_int32)        ! each key has moved to the next one's first
+    ! Each entry has moved on to the first item of the next key.
+    first = eoshift(first, -1, boundary=1_int32)
   end subroutine sort_by_count
 
 end module sorting

@@ -1,4 +1,4 @@
-!> Short texts: lists of them, numbers as text, and the known word nearest to a misspelt one.
+!> Short texts: lists of them, numbers as text, and the known word closest to a misspelt one.
 module texts
   use, intrinsic :: ieee_arithmetic, only: ieee_is_normal
   use kinds, only: int64, real64
@@ -6,7 +6,7 @@ module texts
   private
   public :: text_t, written, written_exactly, lower_case, shown, joined, place_of, nearest_word, suggestion
 
-  !> A text of its own length, as an element of a list.
+  !> An element of a list of texts, each with its own length.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
@@ -21,6 +21,7 @@ module texts
 
 contains
 
+  !> A default integer in digits.
   pure function written_integer(number) result(text)
     integer, intent(in) :: number
     character(len=:), allocatable :: text
@@ -28,6 +29,7 @@ contains
     text = written_long_integer(int(number, int64))
   end function written_integer
 
+  !> A 64-bit integer in digits.
   pure function written_long_integer(number) result(text)
     integer(int64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -37,7 +39,7 @@ contains
     text = trim(buffer)
   end function written_long_integer
 
-  !> Without trailing zeros; with an exponent only where it helps.
+  !> A real number without trailing zeros, and with an exponent only where that is shorter.
   pure recursive function written_real(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -57,7 +59,7 @@ contains
     end if
   end function written_real
 
-  !> With as many digits as it takes to read the same number back.
+  !> A real number with as many digits as are needed to read the same number back.
   pure function written_exactly(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
@@ -71,7 +73,7 @@ contains
     text = trim(adjustl(buffer))
   end function written_exactly
 
-  !> ASCII letters in lower case; every other byte as it is.
+  !> The text with ASCII letters in lower case; other bytes are unchanged.
   pure function lower_case(text) result(lower)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: lower
@@ -84,7 +86,7 @@ contains
     end do
   end function lower_case
 
-  !> Foreign text fit for a message: in quotes, cut when long, control characters as `?`.
+  !> Text from a user or a file, made fit for a message: quoted, cut if long, control characters as `?`.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -93,7 +95,7 @@ contains
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
-      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! not inside a UTF-8 character
+      if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! never cut inside a UTF-8 character
       last = last - 1
     end do
     quoted = text(:last)
@@ -118,7 +120,7 @@ contains
     end do
   end function joined
 
-  !> Place of the first of the words that is this one; 0 if none is.
+  !> The position of a word in a list; 0 if it is not there.
   pure function place_of(word, words) result(place)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: words(:)
@@ -130,7 +132,7 @@ contains
     place = 0
   end function place_of
 
-  !> What to say after an unknown word: the known one that was probably meant, or all of them.
+  !> Advice after an unknown word: the known word that was probably meant, or all known words.
   pure function suggestion(word, known) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -144,8 +146,8 @@ contains
     end if
   end function suggestion
 
-  !> The known word that `word` was probably meant to be: it begins so, or up to a third of the
-  !> letters differ. Empty if there is none.
+  !> The known word that was probably meant: one that starts with `word`, or differs from it in at most a third of the
+  !> letters. Empty if there is none.
   pure function nearest_word(word, known) result(nearest)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
@@ -169,7 +171,7 @@ contains
     end do
   end function nearest_word
 
-  !> Insertions, deletions, changes and swaps of neighbours that turn `a` into `b`
+  !> How many insertions, deletions, substitutions and swaps of adjacent letters turn `a` into `b`
   !> (Damerau 1964, optimal string alignment).
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b

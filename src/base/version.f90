@@ -1,4 +1,4 @@
-!> The version of the program, as `--version` and the output files name it.
+!> The version of the program, for `--version` and output files.
 module version
   implicit none
   private

@@ -11,7 +11,7 @@ module hdf5_handle
     h5f_acc_rdwr_f, h5f_scope_global_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
-  use system, only: free_bytes, last_problem, move_file, obstacle_to_opening
+  use system, only: free_bytes, last_problem, move_file, opening_problem
   use texts, only: written
   implicit none
   private
@@ -126,7 +126,7 @@ contains
 
     self%path = path
     self%final_path = path
-    reason = obstacle_to_opening(path, writable)
+    reason = opening_problem(path, writable)
     if (reason == "") reason = "it is damaged, or not an HDF5 file"
     call prepare(self, access, status)
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)

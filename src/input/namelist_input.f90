@@ -300,7 +300,7 @@ contains
     of_group = reading%groups(:reading%count)%name == group
     matches = of_group .and. (instance == "" .or. reading%groups(:reading%count)%instance == instance)
     found = 0
-    names = pack(reading%groups(:reading%count)%instance, of_group)
+    allocate (names, source=pack(reading%groups(:reading%count)%instance, of_group))
     if (count(matches) == 1) then
       found = findloc(matches, .true., dim=1)
     else if (size(names) == 0) then

@@ -35,13 +35,14 @@ contains
     real(real64), allocatable, intent(out) :: x(:, :)   !! (2,n) species by species [length]
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim
-    type(event_driven_t) :: evolution
+    type(event_driven_t), allocatable :: evolution
     real(real64) :: lack, lack_before
     integer(int32) :: i
     integer :: jump
 
     call scatter(box, species, stream, sim, error)
     if (allocated(error)) return
+    allocate (evolution)
     allocate (cell_grid_t :: evolution%search)
     lack_before = 1
     jump = 0

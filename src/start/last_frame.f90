@@ -32,7 +32,7 @@ contains
     call file%fetch_texts(species_names, name_length, names)
     allocate (species(max(0_int64, file%length(disk_species))))
     call file%fetch(disk_species, size(species), species)
-    chosen = pack([(k, k=1, size(species))], species == findloc(names, name, dim=1))
+    allocate (chosen, source=pack([(k, k=1, size(species))], species == findloc(names, name, dim=1)))
     if (size(chosen) == count) then
       allocate (table(n_columns, count))
       call read_vectors(file, position//value_of, size(species), chosen, table(1:2, :))

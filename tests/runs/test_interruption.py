@@ -1,5 +1,6 @@
 """What a kill, a signal, a full disk, a twin or a curious reader can do to a run: nothing."""
 
+import fcntl
 import os
 import pty
 import random
@@ -112,6 +113,21 @@ def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path
     finally:
         process.kill()
         process.wait()
+
+
+def test_a_slow_reader_behind_a_non_blocking_pipe_gets_all_of_a_text(program):
+    """Such a pipe refuses what does not fit at the moment."""
+    expected = subprocess.run([program, "--print-defaults"], capture_output=True, check=True).stdout
+    outlet, inlet = os.pipe()
+    fcntl.fcntl(inlet, fcntl.F_SETPIPE_SZ, 4096)
+    os.set_blocking(inlet, False)
+    assert len(expected) > 4096
+    process = subprocess.Popen([program, "--print-defaults"], stdout=inlet, stderr=subprocess.PIPE)
+    os.close(inlet)
+    time.sleep(0.1)
+    with os.fdopen(outlet, "rb") as reader:
+        assert reader.read() == expected
+    assert process.wait(timeout=10) == FINISHED, process.stderr.read()
 
 
 def test_progress_stays_on_one_line_of_a_narrow_terminal(program, tmp_path):

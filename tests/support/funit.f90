@@ -39,6 +39,12 @@ module funit
     module procedure width_real32, width_real64
   end interface pf_width
 
+  abstract interface
+    !> A test or fixture.
+    subroutine test_body()
+    end subroutine test_body
+  end interface
+
   !> A condition: a scalar or a vector.
   interface pf_holds
     module procedure holds_scalar, holds_vector
@@ -77,8 +83,8 @@ contains
   !> One test between the file's `@before` and `@after`; the latter runs also after a failure.
   subroutine pf_run(name, test, before, after)
     character(len=*), intent(in) :: name      !! suite.test
-    procedure() :: test
-    procedure(), optional :: before, after
+    procedure(test_body) :: test
+    procedure(test_body), optional :: before, after
     if (index(name, filter) == 0) return
     tests = tests + 1
     failed = .false.

@@ -108,8 +108,19 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     )
     lines = translated(tmp_path, text).splitlines()
     assert lines[3] == "use systems, only: carry_on => run ! user@host"
-    assert "(e_ => ('a, @b('), a_ => (name))" in lines[6]
+    assert "(e_ => (('a, @b(')), a_ => ((name)))" in lines[6]
     assert "message='x=1, ''y'''" in lines[6]
+
+
+def judged(tmp_path: Path, script: str, suite: str, **variables) -> subprocess.CompletedProcess:
+    """The verdict on a stand-in for the program with the unit tests."""
+    program = tmp_path / "unit_tests"
+    program.write_text(f"#!/bin/sh\n{script}")
+    program.chmod(0o755)
+    (tmp_path / "test_it.pf").write_text(suite)
+    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, tmp_path / "test_it.pf"]
+    environment = {**os.environ, **variables}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
 
 
 @pytest.mark.parametrize(
@@ -125,13 +136,19 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     ],
 )
 def test_a_unit_run_counts_only_when_complete(tmp_path, output, status, verdict):
-    program = tmp_path / "unit_tests"
-    program.write_text(f"#!/bin/sh\ncat <<'E'\n{output}\nE\nexit {status}\n")
-    program.chmod(0o755)
-    suites = tmp_path / "test_it.pf"
-    suites.write_text("  @test\n  !@test\n  @Test\n  ! about @test\n")
-    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, suites]
-    assert subprocess.run(command, capture_output=True).returncode == verdict
+    script = f"cat <<'E'\n{output}\nE\nexit {status}\n"
+    run = judged(tmp_path, script, "  @test\n  !@test\n  @Test\n  ! about @test\n")
+    assert run.returncode == verdict
+
+
+@pytest.mark.parametrize(
+    ("work", "verdict", "message"),
+    [("sleep 2", 0, ""), ("while :; do :; done", 152, "stopped after 1 s of processor time")],
+    ids=["waiting", "busy"],
+)
+def test_a_unit_run_is_stopped_by_processor_time_not_by_the_clock(tmp_path, work, verdict, message):
+    run = judged(tmp_path, f"{work}\necho ' OK'\necho ' (1 test)'\n", "  @test\n", LIMIT="1")
+    assert run.returncode == verdict and message in run.stderr
 
 
 MODULE = """!> A module. It says: use nothing, private, get_it.

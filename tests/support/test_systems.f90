@@ -335,9 +335,10 @@ contains
   pure function separation(box, a, b) result(dx)
     type(box_t), intent(in) :: box
     real(dp), intent(in) :: a(2), b(2)
-    real(dp) :: dx(2)
+    real(dp) :: dx(2), edges(2)
+    edges = box%edges()
     dx = b - a
-    dx = dx - merge(box%edges()*anint(dx/box%edges()), 0.0_dp, box%periodic)
+    dx = dx - merge(edges*anint(dx/edges), 0.0_dp, box%periodic)
   end function separation
 
   !> When two disks touch, by the textbook formula.

@@ -111,8 +111,9 @@ def assertion(name: str, arguments: str, place: str) -> str:
     if kind in table:
         expect_count(values, 2)
         good, shown = (part.format(**keywords) for part in table[kind])
+        # Double brackets: of a text in single ones gfortran 14 says that its size is too large.
         check = (
-            f"associate (e_ => ({values[0]}), a_ => ({values[1]})); "
+            f"associate (e_ => (({values[0]})), a_ => (({values[1]}))); "
             "if (.not. pf_conform(shape(e_), shape(a_))) then; "
             f"call pf_fail({place}, 'Assert{name} failed: the shapes differ'{message}); "
             f"else if (.not. all([{good}])) then; "
