@@ -1,7 +1,7 @@
 !> What is measured of a simulation besides the frames: means over the disks, totals, and the counts and sums
 !> that the collisions have gathered.
 module observables
-  use kinds, only: int32, pi, real64
+  use kinds, only: int32, real64
   use box_geometry, only: free_area
   use simulation_state, only: simulation_t
   implicit none

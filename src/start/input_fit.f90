@@ -1,7 +1,7 @@
 !> Whether the system of an input fits together: obstacles and regions in the box, disks in their regions,
 !> and explicit disks beside each other. What is wrong is reported with the line of the input.
 module input_fit
-  use kinds, only: int32, pi, real64
+  use kinds, only: pi, real64
   use box_geometry, only: box_t, obstacle_t
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text

@@ -158,8 +158,11 @@ module upper
   implicit none
   private
 contains
+  !> Twice.
   pure real(real64) function twice(x)
-    twice = 2*x
+    integer, intent(in) :: x
+
+    twice = 2*x*value
   end function twice
 end module upper
 """
@@ -195,10 +198,15 @@ def test_a_module_in_order_has_no_style_problem(tmp_path):
         ("lower, only: value", "lower", 3, "without only"),
         ("  private\n", "  public\n", 1, "no private"),
         ("module upper", "module uppermost", 1, "instead of upper"),
-        ("    twice = 2*x\n", "    twice = 2*x\n" * 61, 8, "longer than 62 lines"),
-        ("function twice", "function get_twice", 8, "says nothing"),
+        ("    twice = 2*x*value\n", "    twice = 2*x*value\n" * 59, 9, "longer than 60 lines"),
+        ("function twice", "function get_twice", 9, "says nothing"),
+        ("  !> Twice.\n", "", 8, "no !> before it"),
+        ("twice(x)", "twice(x, a, b, c, d, e, f, g)", 9, "8 arguments"),
+        ("in) :: x\n\n", "in) :: x\n", 11, "no blank line before the body"),
+        ("2*x*value", "2*x", 3, "value is imported, not used"),
+        ("  private\n", "  private\n  public :: twice\n", 7, "nobody uses twice"),
         ("contains\n", "#include 'x'\ncontains\n", 7, "preprocessor"),
-        ("contains\n", "contains\n" + "! a line\n" * 520, 531, "more than 530 lines"),
+        ("contains\n", "contains\n" + "! a line\n" * 387, 401, "more than 400 lines"),
         ("It says:", "It says: '/ho" "me/me'", 1, "path of one machine"),
     ],
 )
