@@ -218,7 +218,7 @@ def carry_out_recipes(page: str, root: Path) -> int:
 
 
 def test_the_recipes_of_the_page_on_extending_work(tmp_path):
-    for name in ("src", "Makefile", "tests"):
+    for name in ("src", "Makefile", "tests", ".ci"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
     steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)

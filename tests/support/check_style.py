@@ -143,7 +143,7 @@ def heading_problems(path: Path, text: str) -> Iterator[Problem]:
 
 
 def name_problems(root: Path, paths: list[Path]) -> Iterator[Problem]:
-    """Names that a module imports and does not use, or offers and nobody uses; types may be offered."""
+    """Names that a module imports and does not use, or offers and nobody uses, types aside."""
     tests = [*(root / "tests").rglob("*.pf"), *(root / "tests").rglob("*.f90")]
     uses = re.compile(r"use(?:, *intrinsic *::)? *(\w+) *, *only *: *(.*)")
     wanted = set()
