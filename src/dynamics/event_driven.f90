@@ -64,7 +64,7 @@ contains
     if (sim%next_epoch == 0) sim%next_epoch = events_per_epoch(sim)
   end subroutine start
 
-  !> Builds search and queue anew from the state.
+  !> Rebuilds search and queue from the state.
   subroutine rebuild(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -50,7 +50,7 @@ module event_queue
 
 contains
 
-  !> Files the events of all disks anew.
+  !> Files the events of all disks again.
   subroutine fill(self, disk, tag, now, windowed)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(:)
@@ -362,8 +362,8 @@ contains
     call hand_over(self, disk)
   end subroutine take_from_heap
 
-  !> Files the events of the next span into their buckets or, if windows have turned out far too narrow or too wide, all
-  !> events anew.
+  !> Files the events of the next span into their buckets. If windows have turned out far too narrow or too wide, it
+  !> files all events again.
   subroutine open_next_span(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
@@ -384,7 +384,7 @@ contains
   end subroutine open_next_span
 
   !> Whether windows turned out far too narrow or too wide since the last filling, which must be so long ago that
-  !> filing all disks anew pays.
+  !> filing all disks again pays.
   pure function ill_fitting(self) result(yes)
     class(event_queue_t), intent(in) :: self
     logical :: yes

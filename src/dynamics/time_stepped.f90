@@ -225,7 +225,7 @@ contains
       call collide(sim, i, code, sim%now, self%log)
   end subroutine meet_wall
 
-  !> Lets the disks i < j, which overlap, collide if they approach.
+  !> Collides the disks i < j, which overlap, if they approach.
   subroutine meet_disk(self, sim, i, j)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

@@ -1,5 +1,5 @@
 !> Search without cells: every other disk is a candidate. O(N) per prediction; with `everyone` set all
-!> predictions are made anew after each event, O(N**2), which is the first textbook method.
+!> predictions are repeated after each event, O(N**2), which is the first textbook method.
 module all_pairs
   use kinds, only: int32
   use box_geometry, only: next_obstacle, next_side

@@ -27,7 +27,7 @@ module cell_grid
     private
     integer(int32) :: n(2) = 0                     !! columns, rows
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
-    logical :: roomy = .false.                     !! cells overlap: a disk that collides chooses its cell anew
+    logical :: roomy = .false.                     !! cells overlap: a disk that collides chooses its cell again
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
     type(cell_contents_t) :: cells                 !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
@@ -88,7 +88,7 @@ contains
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Registers a big disk anew. The cells that it leaves and those that it reaches change their marks.
+  !> Updates the registration of a big disk. The cells that it leaves and those that it reaches change their marks.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -132,7 +132,7 @@ contains
     call self%predict(sim, i)
   end subroutine cross
 
-  !> Chooses the cell of disk i anew after a collision.
+  !> Chooses the cell of disk i again after a collision.
   subroutine choose_cell(self, disk, tag, i)
     class(cell_grid_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk

@@ -25,7 +25,7 @@ module neighbour_search
   end type prospect_t
 
   type, abstract :: neighbour_search_t
-    logical :: everyone = .false.    !! predict all disks anew after each event, not just those involved
+    logical :: everyone = .false.    !! predict all disks again after each event, not just those involved
   contains
     procedure(build_search), deferred :: build
     procedure(predict_event), deferred :: predict
