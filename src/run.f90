@@ -5,6 +5,7 @@ module run
   use command_line, only: command_t
   use errors, only: error_t, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
+  use initial_state, only: describe_system
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
@@ -50,6 +51,7 @@ contains
     if (allocated(error)) return
     call choose_evolution(run%input%settings, run%evolution)
     if (command%resume) then
+      call describe_system(run%input%settings, run%sim)
       call read_checkpoint(command%output, run%input, run%sim, run%output, error)
     else
       call begin(run, error)

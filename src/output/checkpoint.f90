@@ -10,7 +10,6 @@ module checkpoint
   use cadence, only: cadence_t
   use errors, only: error_t, exit_files, exit_usage, fail
   use hdf5_objects, only: hdf5_file_t
-  use initial_state, only: describe_system
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
   use run_files, only: current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
@@ -93,7 +92,7 @@ contains
   subroutine read_checkpoint(path, input, sim, output, error)
     character(len=*), intent(in) :: path        !! of the output
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(out) :: sim
+    type(simulation_t), intent(inout) :: sim    !! in: with the box, law and species of the input
     type(output_t), intent(inout) :: output
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: current, flaw
@@ -116,7 +115,6 @@ contains
     call file%hdf5%open(current, writable=.false.)
     call check_origin(file%hdf5, input%groups, error)
     if (.not. allocated(error)) then
-      call describe_system(input%settings, sim)
       call exchange_state(file, sim)
       progress = progress_t(input%settings%output)
       call exchange_progress(file, progress)
