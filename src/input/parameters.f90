@@ -42,8 +42,8 @@ module parameters
     character(len=80) :: help
     type(range_t) :: range = anything        !! of numbers
     character(len=16) :: unit = ""
-    character(len=48) :: choices = ""        !! of texts, separated by blanks; none: free text
-    character(len=32) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
+    character(len=100) :: choices = ""        !! of texts, separated by blanks; none: free text
+    character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
   end type parameter_t
 
   ! status     value                           line in the reference file
