@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from synthetic_run import ROOT, write_run
 
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("*/README.md")])
+PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")
+PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
 PROMISES = ROOT / "docs" / "reliability.md"
 INVARIANTS = ROOT / "docs" / "architecture.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
@@ -29,11 +30,19 @@ def test_the_input_page_is_current(program):
     assert (ROOT / "docs" / "input.md").read_text() == module.page(program), message
 
 
+def sections_of(page):
+    """The headings of a page as links name them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
+    return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)\s]+)\)", page.read_text())
-    local = [link.split("#")[0] for link in links if not link.startswith(ELSEWHERE)]
-    assert [link for link in local if not (page.parent / link).exists()] == []
+    local = [link.partition("#") for link in links if not link.startswith(ELSEWHERE)]
+    assert [name for name, _, _ in local if not (page.parent / name).exists()] == []
+    sections = [(page.parent / name, section) for name, _, section in local if section]
+    assert [section for path, section in sections if section not in sections_of(path)] == []
 
 
 def test_the_readme_leads_to_every_page():
@@ -72,6 +81,13 @@ def test_procedures_that_the_page_where_names_exist():
         if f" {name}(" not in (ROOT / "src" / file).read_text():
             missing.append(f"{file}: {name}")
     assert missing == []
+
+
+@pytest.mark.parametrize("folder", sorted(p.parent.name for p in ROOT.glob("src/*/README.md")))
+def test_every_module_is_introduced_in_its_folder(folder):
+    page = (ROOT / "src" / folder / "README.md").read_text()
+    modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
+    assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
 
 
 def test_modules_that_keep_a_promise_exist():

@@ -28,6 +28,7 @@ equation, KR Kolafa and Rottner (2006).
 | P12 | billiards: a round container, Sinai's, a light disk around a heavy one |
 | P13 | symmetries: conservation, reversal, boosts, scaling, no overlaps |
 | P14 | velocity correlations and diffusion |
+| W1 | straight walls: a right-angled wedge under gravity, against two bouncing balls |
 
 """
 
