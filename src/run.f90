@@ -75,7 +75,7 @@ contains
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": fine; "//written(int(run%sim%n_disks()))//" disks", error)
+        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks", error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
@@ -142,7 +142,7 @@ contains
       if (stop_requested() .or. (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock)) then
         call write_checkpoint(run%sim, run%output, error)
         if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
-          //written(run%sim%time())//", after a checkpoint: the same command with --resume goes on")
+          //written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
         exit
       end if
       if (checkpoint_requests() > requests_served .or. now > next_checkpoint) then
@@ -202,7 +202,7 @@ contains
     if (run%stop_rule%too_cold(run%sim)) then
       text = text//"cooled to 1e-25 of the first temperature, below which rounding errors dominate"
     else
-      text = text//"nothing will ever happen any more"
+      text = text//"no further events are possible"
     end if
     text = text//": the run ended before its stop rule was met"
   end function summary

@@ -32,7 +32,7 @@ module event_driven
     class(neighbour_search_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not the heap alone
-    ! A collapse is an endless series of events in no time.
+    ! A collapse is an endless series of events during which time does not advance.
     real(real64), private :: blink = 0.0_real64    !! in which nothing moves visibly [time]
     real(real64), private :: last_check = 0.0_real64  !! when it was last looked for [time]
     integer(int64), private :: next_check = 0        !! number of events at which to look again
@@ -152,7 +152,7 @@ contains
     event = event_t(t, i, code)
   end subroutine run_events
 
-  !> The number of events up to which nothing needs to be looked at.
+  !> The event count before which no check is due.
   pure function next_pause(self, sim, limits) result(events)
     class(event_driven_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
@@ -242,7 +242,7 @@ contains
     if (event%partner <= 0 .and. sim%box%falling()) remedy = "; a disk that starts at rest on a wall never leaves it: " &
       //"start it higher, or take run.dynamics = 'steps'"
     if (sim%now - self%last_check < self%blink) call fail(error, exit_broken, &
-      "inelastic collapse, the clock stands still: "//encounter_text(sim, event%disk, event%partner) &
+      "inelastic collapse, time no longer advances: "//encounter_text(sim, event%disk, event%partner) &
       //"; set contact.contact_time (TC model), well below the mean time between collisions, or raise " &
       //trim(merge("contact.restitution     ", "contact.wall_restitution", event%partner > 0))//remedy)
     self%next_check = sim%events + check_interval(sim)

@@ -1,8 +1,8 @@
 !> When a run ends: when the first of the rules in the input is met, or when rounding errors dominate.
 !>
-!> In a periodic box inelastic disks cool until they fly on side by side: only the momentum that rounding gave
-!> to all of them is left. Long before, no digit of the temperature is right. So the run ends when the gas is
-!> that cold. This is checked at fixed numbers of events, so that the end depends on the trajectory alone.
+!> In a periodic box inelastic disks cool until they all drift together, with only the common momentum that rounding
+!> left. The temperature has lost all its digits long before that, so the run ends when the gas is that cold. This
+!> is checked at fixed numbers of events, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use evolution, only: limits_t
@@ -88,7 +88,7 @@ contains
       yes = relative_energy(sim) <= coldest*sim%start_energy
   end function too_cold
 
-  !> Kinetic energy relative to the common motion. Two passes: a difference of sums would be rounded.
+  !> Kinetic energy relative to the common motion. Two passes, because the difference of two large sums would lose digits.
   pure function relative_energy(sim) result(energy)
     type(simulation_t), intent(in) :: sim
     real(real64) :: energy                          !! [energy]

@@ -104,7 +104,7 @@ contains
     finished = is_file(path)
     if (finished) finished = .not. is_file(run_file(path, unfinished))
     if (finished) then
-      call fail(error, exit_files, path//": is finished; there is nothing to go on with")
+      call fail(error, exit_files, path//": is a finished run; there is nothing to resume")
     else if (.not. is_file(current)) then
       call fail(error, exit_files, current//": there is no checkpoint to go on from; "//advice(path))
     else

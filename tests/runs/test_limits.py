@@ -110,7 +110,7 @@ def test_a_run_in_which_nothing_moves_any_more_ends(ricochet, tmp_path, rule, se
     )
     run = ricochet("pair.nml", "-o", "pair.h5", timeout=30)
     assert run.returncode == 0, run.stderr
-    assert ("note = nothing will ever happen any more" in run.stdout) == (rule != "time=50")
+    assert ("note = no further events are possible" in run.stdout) == (rule != "time=50")
     with h5py.File(tmp_path / "pair.h5") as file:
         disks = file["particles/disks"]
         assert disks["position/time"][-1] == (50 if rule == "time=50" else 0.125)
