@@ -142,7 +142,7 @@ module parameters
     parameter_t("stop", "collisions_per_disk", "real", 1, "optional", "20", &
       "end when 2 collisions/N reaches this", not_negative), &
     parameter_t("stop", "events", "integer", 1, "optional", "100000", &
-      "end after this many collisions of any kind: pair, side, obstacle", not_negative), &
+      "end after this many collisions of any kind: pair, side, obstacle, wall", not_negative), &
     parameter_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
       "end when collisions have left this fraction of the kinetic energy", energy_left), &
     parameter_t("stop", "wall_clock", "real", 1, "optional", "3600", &

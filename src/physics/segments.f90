@@ -176,8 +176,18 @@ contains
     problem = ""
     slack = spare**2*max(abs(lower), abs(upper))
     if (.not. self%length > 0) problem = "to: is the same point as from"
-    if (any(self%middle - abs(self%half) < lower - slack .or. self%middle + abs(self%half) > upper + slack)) &
-      problem = "from: both ends must lie in the box"
+    if (outside(self%middle + self%half)) problem = "to: lies outside the box"
+    if (outside(self%middle - self%half)) problem = "from: lies outside the box"
+
+  contains
+
+    !> Whether an end is not in the box.
+    pure function outside(point) result(yes)
+      real(real64), intent(in) :: point(2)
+      logical :: yes
+
+      yes = any(point < lower - slack .or. point > upper + slack)
+    end function outside
   end function misfit
 
 end module segments

@@ -314,7 +314,7 @@ def test_ten_thousand_damaged_files_never_harm(program):
         ("from = 0, 0 to = 1, 0.5", ""),
         ("from = 0.2, 0.2", "wall.to: is missing"),
         ("from = 0.2, 0.2 to = 0.2, 0.2", "wall.to: is the same point as from"),
-        ("from = 0.2, 0.2 to = 1.2, 0.2", "wall.from: both ends must lie in the box"),
+        ("from = 0.2, 0.2 to = 1.2, 0.2", "wall.to: lies outside the box"),
         ("from = 0.2, 0.2 to = 0.4, 0.2 radius = 1", "wall.radius: unknown variable"),
         ("name = 'gas wall' from = 0, 0 to = 1, 0.5", "wall.name: "),
         ("from = 0.2, 0.5 to = 0.8, 0.5", "species.position: disk 1 at"),
