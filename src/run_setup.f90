@@ -23,7 +23,7 @@ module run_setup
   private
   public :: read_input, settings_from_text, new_simulation, choose_evolution
 
-  integer, parameter :: log_capacity = 4096     !! collisions listed between two writes
+  integer, parameter :: log_capacity = 8192     !! collisions, twice what is written at once
 
 contains
 

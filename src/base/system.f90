@@ -34,7 +34,7 @@ module system
       logical(c_bool) :: yes
     end function question
 
-    !> A call on a file; 0 for success.
+    !> A call on a file, or on a text to be written; 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
@@ -63,13 +63,6 @@ module system
     end function checkpoint_requests
 
     ! The calls of system_calls.c, which says more.
-    function c_print(bytes, count) bind(C, name="system_print") result(status)
-      import :: c_char, c_int, c_size_t
-      character(kind=c_char), intent(in) :: bytes(*)
-      integer(c_size_t), value :: count
-      integer(c_int) :: status
-    end function c_print
-
     subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
       import :: c_char, c_size_t
       character(kind=c_char), intent(out) :: text(*)
@@ -117,6 +110,7 @@ module system
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
   procedure(path_call), bind(C, name="system_lock") :: c_lock   !! returns a descriptor, -1 (taken), -2 (no locks)
+  procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
   procedure(naming_call), bind(C, name="rename") :: c_rename
   procedure(naming_call), bind(C, name="link") :: c_link
@@ -128,7 +122,7 @@ contains
     character(len=*), intent(in) :: text               !! without the last line end
     type(error_t), allocatable, intent(out) :: error
 
-    if (c_print(text//new_line("a"), len(text, c_size_t) + 1_c_size_t) /= 0) &
+    if (c_print(text//new_line("a")//c_null_char) /= 0) &
       call fail(error, exit_files, "standard output: cannot be written: "//last_problem())
   end subroutine print_text
 

@@ -72,8 +72,9 @@ void system_fill_standard_streams(void)
 bool system_talks_to_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 
 /* Writes all bytes, also to a pipe that takes only some at a time. */
-int system_print(const char *bytes, size_t count)
+int system_print(const char *bytes)
 {
+    size_t count = strlen(bytes);
     while (count > 0) {
         const ssize_t written = write(STDOUT_FILENO, bytes, count);
         if (written >= 0) {

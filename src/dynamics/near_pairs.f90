@@ -329,19 +329,13 @@ contains
   subroutine sort_pairs(pair, n_disks)
     type(pair_t), intent(inout) :: pair(:)
     integer(int32), intent(in) :: n_disks
-    type(pair_t), allocatable :: copy(:)
     integer(int32), allocatable :: first(:), place(:)
-    integer :: k
 
-    allocate (copy(size(pair)), place(size(pair)))
+    allocate (place(size(pair)))
     call sort_by_count(pair%partner, n_disks, first, place)
-    do k = 1, size(pair)
-      copy(place(k)) = pair(k)
-    end do
-    call sort_by_count(copy%i, n_disks, first, place)
-    do k = 1, size(pair)
-      pair(place(k)) = copy(k)
-    end do
+    pair(place) = pair
+    call sort_by_count(pair%i, n_disks, first, place)
+    pair(place) = pair
   end subroutine sort_pairs
 
 end module near_pairs

@@ -1,7 +1,6 @@
 !> Disks that are neighbours in space become neighbours in memory.
 module renumbering
   use kinds, only: int32, real64
-  use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
   implicit none
@@ -28,31 +27,8 @@ contains
       cell(i) = 1 + tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
     end do
     call sort_by_count(cell, product(n), first, place)
-    call permute(sim%disk, sim%tag, place)
+    sim%disk(place) = sim%disk
+    sim%tag(place) = sim%tag
   end subroutine renumber
-
-  !> Moves the i-th disk to place(i), in place along the cycles; `place` is used up.
-  pure subroutine permute(disk, tag, place)
-    type(disk_t), intent(inout) :: disk(:)
-    type(tag_t), intent(inout) :: tag(:)
-    integer(int32), intent(inout) :: place(:)
-    type(disk_t) :: moved_disk
-    type(tag_t) :: moved_tag
-    integer(int32) :: i, to
-
-    do i = 1, size(place, kind=int32)
-      do while (place(i) /= i)
-        to = place(i)
-        moved_disk = disk(to)
-        moved_tag = tag(to)
-        disk(to) = disk(i)
-        tag(to) = tag(i)
-        disk(i) = moved_disk
-        tag(i) = moved_tag
-        place(i) = place(to)
-        place(to) = to
-      end do
-    end do
-  end subroutine permute
 
 end module renumbering

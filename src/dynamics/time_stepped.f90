@@ -9,7 +9,6 @@ module time_stepped
   use disks, only: disk_t
   use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
-  use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
   use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
@@ -62,7 +61,7 @@ contains
 
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
-      if (limits%reached(sim) .or. is_half_full(self%log)) return
+      if (limits%reached(sim) .or. self%log%is_full()) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
@@ -109,7 +108,6 @@ contains
     integer :: k
 
     call fly(sim%disk, sim%box, sim%now, self%x, self%outside, n_outside)
-    call make_room(self%log, n_sides*n_outside)
     do k = 1, n_outside
       i = self%outside(k)
       if (any(self%x(:, i) /= self%x(:, i))) then
@@ -123,7 +121,6 @@ contains
     else
       call self%near%find_contacts(sim, self%x, self%dt, self%contacts)
     end if
-    call make_room(self%log, self%contacts%n)
     do k = 1, self%contacts%n
       associate (p => self%contacts%pair(k))
         if (p%partner > 0) then
@@ -134,30 +131,6 @@ contains
       end associate
     end do
   end subroutine take_step
-
-  !> A step is never split: the log must have room for all its collisions. So it is emptied when it is half full, and
-  !> grows only if one step needs more than the other half.
-  pure function is_half_full(log) result(yes)
-    type(event_log_t), intent(in) :: log
-    logical :: yes
-
-    yes = .false.
-    if (log%is_on()) yes = 2*log%n >= size(log%record, 2)
-  end function is_half_full
-
-  !> Makes room in the log for more collisions.
-  pure subroutine make_room(log, n)
-    type(event_log_t), intent(inout) :: log
-    integer, intent(in) :: n                        !! collisions that may come
-    type(event_log_t) :: larger
-
-    if (.not. log%is_on()) return
-    if (log%n + n <= size(log%record, 2)) return
-    larger = event_log_t(2*(log%n + n))
-    larger%n = log%n
-    larger%record(:, :log%n) = log%record(:, :log%n)
-    log = larger
-  end subroutine make_room
 
   !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN).
   pure subroutine fly(disk, box, t, x, outside, n)

@@ -214,18 +214,23 @@ contains
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
-    integer :: exponent, status
-    logical :: is_zero, sound
+    integer :: mark, exponent, status
 
     value = 0
     problem = "is not a number"
     if (len(word) > longest) problem = "is too long for a number"
     if (len(word) > longest .or. len(word) == 0) return
-    call dissect(word, is_zero, exponent, sound)
-    if (.not. sound) return
+    mark = scan(lower_case(word)//"e", "ed")
+    if (.not. is_decimal(word(:mark - 1))) return
+    exponent = 0
+    if (mark <= len(word)) then
+      if (.not. is_whole(word(mark + 1:))) return
+      exponent = huge(exponent)
+      if (len(word) - mark <= 5) read (word(mark + 1:), *) exponent
+    end if
     problem = ""
-    if (is_zero) return
-    if (abs(exponent) <= 101) then
+    if (scan(word(:mark - 1), "123456789") == 0) return
+    if (abs(exponent) <= 200) then                 ! neither overflows nor underflows, so short a word
       read (word, "(f60.0)", iostat=status) value
       if (status == 0 .and. abs(value) >= smallest .and. abs(value) <= largest) return
     end if
@@ -233,36 +238,18 @@ contains
     problem = "is out of range (sizes from 1e-100 to 1e100)"
   end subroutine read_real
 
-  !> Checks the syntax of a number and finds the power of ten of its first digit that is not 0.
-  pure subroutine dissect(word, is_zero, exponent, sound)
+  !> Digits with an optional sign and at most one point.
+  pure function is_decimal(word)
     character(len=*), intent(in) :: word
-    logical, intent(out) :: is_zero
-    integer, intent(out) :: exponent
-    logical, intent(out) :: sound                  !! it is a number
-    integer :: first, last, point, leading
+    logical :: is_decimal
+    character(len=len(word)) :: whole
+    integer :: point
 
-    sound = .false.
-    is_zero = .true.
-    exponent = 0
-    first = 1
-    if (scan(word(1:1), "+-") == 1) first = 2
-    last = scan(lower_case(word), "ed") - 1
-    if (last < 0) last = len(word)
-    point = index(word(:last), ".")
-    if (verify(word(first:last), digits//".") > 0) return
-    if (scan(word(first:last), digits) == 0) return
-    if (index(word(:last), ".", back=.true.) /= point) return
-    if (point == 0) point = last + 1
-    if (last < len(word)) then
-      if (.not. is_whole(word(last + 2:))) return
-      exponent = merge(-1000, 1000, word(last + 2:last + 2) == "-")
-      if (len(word) - last <= 6) read (word(last + 2:), *) exponent
-    end if
-    sound = .true.
-    leading = first - 1 + scan(word(first:last), "123456789")
-    is_zero = leading == first - 1
-    exponent = exponent + point - leading - merge(1, 0, leading < point)
-  end subroutine dissect
+    whole = word
+    point = index(word, ".")
+    if (point > 0) whole(point:point) = "0"
+    is_decimal = scan(word, digits) > 0 .and. is_whole(whole)
+  end function is_decimal
 
   !> Accepts what Fortran accepts; `value` is `.true.` or `.false.`
   pure subroutine read_logical(word, value, problem)

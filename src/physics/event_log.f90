@@ -5,7 +5,7 @@ module event_log
   private
   public :: event_log_t
 
-  !> A log without records is switched off. The dynamics must pause when it is full.
+  !> A log without records is switched off. The dynamics should pause when it is full.
   type :: event_log_t
     integer :: n = 0                              !! collisions in the list
     !> (4,:) Time since the start of the run, ids i and j in the order of the input, and |change of momentum|
@@ -40,22 +40,28 @@ contains
     yes = allocated(self%record)
   end function is_on
 
-  !> Whether there is no room for another collision.
+  !> Whether it is time to empty the list. Half of it is kept free for a time step, which is never split.
   pure function is_full(self) result(yes)
     class(event_log_t), intent(in) :: self
     logical :: yes
 
     yes = .false.
-    if (self%is_on()) yes = self%n >= size(self%record, 2)
+    if (self%is_on()) yes = 2*self%n >= size(self%record, 2)
   end function is_full
 
-  !> Lists a collision; there must be room.
+  !> Lists a collision. The list grows only if one time step needs more than the free half.
   pure subroutine append(self, time, i, j, impulse)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: time
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: impulse
+    real(real64), allocatable :: longer(:, :)
 
+    if (self%n == size(self%record, 2)) then
+      allocate (longer(4, 2*self%n))
+      longer(:, :self%n) = self%record
+      call move_alloc(longer, self%record)
+    end if
     self%n = self%n + 1
     self%record(:, self%n) = [time, real(i, real64), real(j, real64), impulse]
   end subroutine append

@@ -66,7 +66,7 @@ contains
     type(cell_faces_t), intent(in) :: faces
     type(entries_t) :: entries
     integer(int32), allocatable :: place(:)
-    integer(int32) :: m, k, image_x, image_y, reach(2)
+    integer(int32) :: m, image_x, image_y, reach(2)
 
     if (allocated(self%first)) deallocate (self%first, self%list)
     if (box%n_obstacles() == 0) return
@@ -84,9 +84,7 @@ contains
     end do
     allocate (place(entries%n), self%list(entries%n))
     call sort_by_count(entries%cell(:entries%n), product(n), self%first, place)
-    do k = 1, entries%n
-      self%list(place(k)) = entries%obstacle(k)
-    end do
+    self%list(place) = entries%obstacle(:entries%n)
   end subroutine renew
 
   !> Adds the cells that the image of the m-th obstacle, `shift` away, reaches into.
