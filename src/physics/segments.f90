@@ -54,7 +54,7 @@ contains
     d = nearest
     do j = -reach(2), reach(2)
       do i = -reach(1), reach(1)
-        candidate = nearest + merge([i, j]*period, 0.0_real64, reach == 1)
+        candidate = nearest + [i, j]*period
         if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
       end do
     end do

@@ -288,11 +288,13 @@ contains
     integer(int32) :: e
 
     associate (cell => sim%tag(i)%cell)
-      call survey(self, sim%disk(i), sim%tag(i), sim%now, merge(0, no_gravity, self%faces%falling), i, near)
+      call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
+      near%cell = self%cells%number(cell)
       call self%obstacles%next_contact(sim%box, sim%disk(i), cell, near%time, near%partner)
       if (at_periodic_edge(self, cell)) then
         call scan_around_edge(self%cells, self%n, sim, i, near)
       else
+        call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
         call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
         call scan_chains_around(self%cells, sim, i, near)
       end if
