@@ -6,11 +6,13 @@
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
 #   HINTS=            no hints about memory (src/base/memory_hints.c)
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
+#   PREFIX=folder     where `install` puts things; default /usr/local; DESTDIR goes before it
 #   V=1               shows the commands
 #
 # Modules and their order are derived from the files in src/: file name = module name.
 MAKEFLAGS += --no-print-directory
 comma := ,
+PREFIX ?= /usr/local
 BUILD ?= build$(if $(DEBUG),/debug)
 $(if $(word 2,$(BUILD)),$(error BUILD=$(BUILD): the folder name may not contain spaces))
 
@@ -66,7 +68,8 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all demo figures test unit-tests check bench bench-check sanitize lint coverage docs set-up clean distclean help
+targets := all demo figures test unit-tests check bench bench-check sanitize lint coverage docs install uninstall dist \
+  set-up clean distclean help
 .PHONY: $(targets) FORCE
 
 # --- What is built, by a `make` whose goals are files in $(BUILD) ---------------------------------------------
@@ -148,8 +151,7 @@ unit-tests:
 	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
-	@.ci/set-up demo
-	@$(MAKE) $(jobs) all
+	@.ci/set-up demo && $(MAKE) $(jobs) all
 	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
 	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
@@ -159,8 +161,7 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@echo 'In runs/demo: crater.png; crater.html, a film for the browser; speeds.png and gas.png; the data (crater.h5, gas.h5).'
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
-	@.ci/set-up demo
-	@$(MAKE) $(jobs) all
+	@.ci/set-up demo && $(MAKE) $(jobs) all
 	@runs/figures.sh
 
 test:  ## sets up, then unit tests and whole runs (two minutes)
@@ -170,8 +171,7 @@ test:  ## sets up, then unit tests and whole runs (two minutes)
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
 
 check:  ## validates the physics and provokes faults (minutes)
-	@.ci/set-up demo test
-	@$(MAKE) $(jobs) all
+	@.ci/set-up demo test && $(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
@@ -180,8 +180,7 @@ bench: all  ## measures collisions per second; FULL=1: and more
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
 
 bench-check:  ## counts instructions per collision against what is promised
-	@.ci/set-up bench
-	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
+	@.ci/set-up bench && $(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
 
 # Unit tests, runs that write, stop and resume, damaged input. Leaks do not count in unit tests: gfortran 12 never
@@ -196,14 +195,12 @@ sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 
 lint:  ## warnings, style, and the rules of the design
-	@.ci/set-up lint
-	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
+	@.ci/set-up lint && $(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
-lints := lint-compiler lint-flang lint-fortran lint-python lint-shell lint-design
+lints := lint-compiler lint-flang lint-fortran lint-python lint-shell
 lint-compiler:
 	@$(MAKE) -s BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
 	  $(BUILD)/lint/ricochet $(patsubst tests/support/%.f90,$(BUILD)/lint/substitute/%.o,$(wildcard tests/support/*.f90))
-# A second opinion on all that needs no HDF5, whose modules are those of one compiler.
 flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
 lint-flang:
 	@$(if $(flang),$(MAKE) -s BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
@@ -212,10 +209,9 @@ lint-fortran:
 	@! $(dir $(venv))fprettify --diff --disable-indent --line-length 132 $(sources) | grep '^[-+]'
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
-lint-shell:
-	@shellcheck --format gcc .ci/run .ci/set-up .ci/build_info $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
-lint-design:
 	@$(venv) tests/support/check_style.py
+lint-shell:
+	@shellcheck --format gcc .ci/run .ci/set-up .ci/build_info .ci/install $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 
 coverage:  ## which lines of src/ the tests reach
 	@.ci/set-up demo test coverage
@@ -223,11 +219,16 @@ coverage:  ## which lines of src/ the tests reach
 	@RICOCHET="$$(realpath '$(BUILD)')/coverage/ricochet" $(venv) -m pytest -q tests
 	@$(venv) -m gcovr --root . --filter src/ --fail-under-line 95 $(BUILD)/coverage
 
-docs:  ## pages of the source, with FORD, into build/docs
+docs:  ## pages of the source, with FORD: build/docs/index.html
 	@.ci/set-up docs
 	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
-	@echo 'open $(BUILD)/docs/index.html'
+
+install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## program, scripts, completion, manual page into PREFIX
+uninstall:  ## removes what `install` put there
+dist:  ## a release, build/ricochet-VERSION.tar.gz
+install uninstall dist:
+	@BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' .ci/install $@ '$(PREFIX)'
 
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 	@.ci/set-up demo test
@@ -245,6 +246,5 @@ nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys
 	  echo '`make help` lists the targets.' >&2; exit 2
 
 help:  ## this list
-	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
-	@echo
-	@sed -n 's/^#   /  /p' Makefile
+	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile; echo; \
+	sed -n 's/^#   /  /p' Makefile

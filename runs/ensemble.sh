@@ -28,7 +28,7 @@ Running:
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
 with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that failed is tried
 again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
-share the work.  The program is build/ricochet, or what the variable RICOCHET names.
+share the work.  The program is build/ricochet (installed: the one beside this), or what RICOCHET names.
 
 All machines need the same folders.  Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 75 stopped, the same command goes on.
 TEXT
@@ -441,7 +441,10 @@ if [[ -n $dry ]]; then
   exit 0
 fi
 
-program=${RICOCHET:-$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)/build/ricochet}
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+program=${here%/*}/build/ricochet
+[[ ! -x $here/ricochet ]] || program=$here/ricochet # both are installed
+program=${RICOCHET:-$program}
 [[ -x $program ]] || die "no program $program: run make, or set RICOCHET"
 command -v flock >/dev/null || die "needs flock (package util-linux)"
 mkdir -p -- "$folder" || die "cannot make $folder"

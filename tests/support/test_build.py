@@ -1,7 +1,10 @@
 """The Makefile: folders, runners of unit tests, two at once, a linker that is not GNU's."""
 
 import os
+import re
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -107,3 +110,70 @@ def test_a_folder_that_cannot_be_written_is_named():
     assert run.returncode == 2
     assert run.stderr.splitlines()[0] == "Cannot write to /proc/build; BUILD=folder takes another"
     assert len(run.stderr.splitlines()) == 2  # and what `make` itself says
+
+
+def ran(*command, **options) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, timeout=120, **options
+    )
+
+
+def files_in(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if not path.is_dir()]
+
+
+def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
+    place = [f"DESTDIR={tmp_path / 'root'}", "PREFIX=/usr"]
+    assert make("install", *place).returncode == 0
+    installed = tmp_path / "root/usr"
+    inputs = installed / "share/ricochet/input"
+    ensemble = [installed / "bin/ricochet-ensemble", inputs / "lab.nml", "-d", "here"]
+    environment = {name: value for name, value in os.environ.items() if name != "RICOCHET"}
+    done = ran(*ensemble, "--seeds", "1,2", cwd=tmp_path, env=environment)
+    assert done.returncode == 0, done.stderr
+    script = installed / "share/ricochet/post/energy.py"
+    done = ran(sys.executable, script, "here/seed_1.h5", "-o", "energy.png", cwd=tmp_path)
+    assert done.returncode == 0 and (tmp_path / "energy.png").exists(), done.stderr
+    assert make("uninstall", *place).returncode == 0
+    assert files_in(tmp_path / "root") == []
+
+
+def test_the_manual_page_explains_every_variable(tmp_path):
+    assert make("install", f"PREFIX={tmp_path}").returncode == 0
+    page = (tmp_path / "share/man/man1/ricochet.1").read_text().replace("\\-", "-")
+    defaults = ran(tmp_path / "bin/ricochet", "--print-defaults").stdout
+    group, missing = "", []
+    for line in defaults.splitlines():
+        if found := re.match(r"(?:! )?&(\w+)", line):
+            group = found[1]
+        elif (found := re.match(r"(?:! )?  (?:! )?(\w+) = ", line)) and (
+            f"\n.B {group}.{found[1]}\n" not in page
+        ):
+            missing.append(f"{group}.{found[1]}")
+    assert missing == [] and ".B run.seed\n" in page
+    if shutil.which("man"):
+        assert ran("man", "--warnings", "-l", tmp_path / "share/man/man1/ricochet.1").stderr == ""
+
+
+def test_a_folder_that_cannot_be_installed_to_is_refused_in_one_line():
+    done = make("install", "PREFIX=here")
+    assert done.returncode == 2 and "write folders that begin with /" in done.stderr
+    assert len(done.stderr.splitlines()) == 2  # the second is that of make
+
+
+@pytest.mark.check
+def test_a_release_builds_and_runs_without_git_and_names_its_commit(tmp_path):
+    clone, commit = tmp_path / "clone", ran("git", "rev-parse", "HEAD", cwd=ROOT)
+    if commit.returncode != 0:
+        pytest.skip("not a git clone")
+    ran("git", "clone", "--quiet", ROOT, clone, check=True)
+    tarball = ran("make", "dist", cwd=clone, check=True).stdout.split()[-1]
+    ran("tar", "-xzf", clone / tarball, "-C", tmp_path, check=True)
+    release = next(tmp_path.glob("ricochet-*"))
+    built = subprocess.run(["make", "-j2"], cwd=release, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    version = ran("build/ricochet", "--version", cwd=release).stdout
+    named = re.search(r"commit: +(\w+)", version)[1]
+    assert commit.stdout.startswith(named)
+    done = ran("build/ricochet", "input/lab.nml", cwd=release)
+    assert done.returncode == 0, done.stderr
