@@ -6,7 +6,6 @@
 #   FFLAGS, LDFLAGS   replaced as a whole, as usual
 #   HINTS=            no hints about memory (src/base/memory_hints.c)
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
-#   PREFIX=folder     where `install` puts things; default /usr/local; DESTDIR goes before it
 #   V=1               shows the commands
 #
 # Modules and their order are derived from the files in src/: file name = module name.
@@ -224,8 +223,7 @@ docs:  ## pages of the source, with FORD: build/docs/index.html
 	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
 
-install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## program, scripts, completion, manual page into PREFIX
-uninstall:  ## removes what `install` put there
+install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## for all users, PREFIX=/usr/local, DESTDIR=; or uninstall
 dist:  ## a release, build/ricochet-VERSION.tar.gz
 install uninstall dist:
 	@BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' .ci/install $@ '$(PREFIX)'
@@ -245,6 +243,6 @@ nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys
 	@echo "There is no target and no file $@$$(python3 -c '$(nearest)' '$@' $(targets) 2>/dev/null)" >&2; \
 	  echo '`make help` lists the targets.' >&2; exit 2
 
-help:  ## this list
+help:
 	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile; echo; \
 	sed -n 's/^#   /  /p' Makefile
