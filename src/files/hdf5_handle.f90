@@ -3,12 +3,13 @@
 !> The first call that fails is remembered, and nothing is done after it. So a writer need not test every
 !> call: `report` says at the end whether all went well.
 module hdf5_handle
+  use, intrinsic :: iso_c_binding, only: c_int
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
     h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5pset_userblock_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
-    h5f_acc_rdwr_f, h5f_scope_global_f
+    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
   use system, only: free_bytes, last_problem, move_file, opening_problem
@@ -36,6 +37,15 @@ module hdf5_handle
     procedure :: check
     procedure :: report
   end type hdf5_handle_t
+
+  interface
+    !> Makes the library unable to follow a kind of link.
+    function forget_link(kind) result(status) bind(C, name="H5Lunregister")
+      import :: c_int
+      integer(c_int), value :: kind
+      integer(c_int) :: status
+    end function forget_link
+  end interface
 
 contains
 
@@ -73,16 +83,19 @@ contains
 
   !> Starts the library, silent on errors, and sets its properties. No file locks: they keep readers out, and a
   !> reader's lock could stop a run. No exit handler: files are closed by then, or could not be (disk full), and
-  !> it would crash. Storage of datasets is allocated at once, never filled, and has no time stamps, so that the
-  !> same run gives the same bytes.
+  !> it would crash. No links into other files, which may be devices, or not ours to write. Storage of datasets is
+  !> allocated at once, never filled, and has no time stamps, so that the same run gives the same bytes.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! properties of access to the file
     integer, intent(out) :: status
+    logical :: followed
 
     call h5dont_atexit_f(status)
     call h5open_f(status)
     if (status >= 0) call h5eset_auto_f(0, status)
+    if (status >= 0) call h5lis_registered_f(h5l_type_external_f, followed, status)
+    if (status >= 0 .and. followed) status = forget_link(int(h5l_type_external_f, c_int))
     if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
     if (status >= 0) call h5pset_file_locking_f(access, .false., .true., status)
     if (status >= 0) call h5pset_sieve_buf_size_f(access, sieve, status)

@@ -6,9 +6,10 @@ module hdf5_objects
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, &
     h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aexists_f, h5aopen_f, h5awrite_f, &
     h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
-    h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5tcopy_f, &
-    h5tset_size_f, h5tget_size_f, h5tclose_f, h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
-    h5t_fortran_s1
+    h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_virtual_f, &
+    h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+    h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tget_class_f, h5tis_variable_str_f, h5tclose_f, &
+    h5t_native_double, h5t_string_f, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
   use hdf5_handle, only: hdf5_handle_t
   use kinds, only: int32, int64, real64
   implicit none
@@ -17,10 +18,15 @@ module hdf5_objects
 
   integer, parameter :: scalar(0) = [integer ::]  !! extents of a single value
 
+  ! No file of ours has more of them: what a file says about its size is not to be relied on.
+  integer(int64), parameter :: most_texts = 10000
+  integer(size_t), parameter :: longest_text = 67108864      !! [bytes]
+
   type, extends(hdf5_handle_t) :: hdf5_file_t
   contains
     procedure :: make_group
     procedure :: make_dataset
+    procedure :: open_dataset
     procedure :: link
     procedure :: replace
     procedure :: extents
@@ -66,6 +72,27 @@ contains
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
+  !> Opens a dataset whose values are in this file. Those of another file may be a device, or not ours to write.
+  subroutine open_dataset(self, name, dataset, status)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(hid_t), intent(out) :: dataset
+    integer, intent(out) :: status                !! negative: there is none
+    integer(hid_t) :: creation
+    integer :: layout, n_files, closed
+
+    call h5dopen_f(self%id, name, dataset, status)
+    if (status < 0) return
+    call h5dget_create_plist_f(dataset, creation, status)
+    if (status >= 0) call h5pget_layout_f(creation, layout, status)
+    if (status >= 0) call h5pget_external_count_f(creation, n_files, status)
+    if (status >= 0) status = merge(-1, 0, layout == h5d_virtual_f .or. n_files > 0)
+    call h5pclose_f(creation, closed)
+    if (status >= 0) return
+    call self%check(status, "be used: "//name//" keeps its values in another file")
+    call h5dclose_f(dataset, closed)
+  end subroutine open_dataset
+
   !> Gives an object a second name.
   subroutine link(self, name, second_name)
     class(hdf5_file_t), intent(inout) :: self
@@ -82,16 +109,18 @@ contains
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hsize_t), allocatable :: extent(:), largest(:)
+    integer(hsize_t) :: n
     integer(hid_t) :: dataset, space
     integer :: status, closed, rank
 
     extent = [-1_hsize_t]
     if (allocated(self%failure)) return
-    call h5dopen_f(self%id, name, dataset, status)
+    call self%open_dataset(name, dataset, status)
     if (status < 0) return
     call h5dget_space_f(dataset, space, status)
+    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
-    if (status >= 0) then
+    if (status >= 0 .and. (rank > 0 .or. n == 1)) then       ! else it was made to have no values
       deallocate (extent)
       allocate (extent(rank), largest(rank))
       if (rank > 0) call h5sget_simple_extent_dims_f(space, extent, largest, status)
@@ -100,14 +129,23 @@ contains
     call h5dclose_f(dataset, closed)
   end function extents
 
-  !> Number of values in a dataset; -1 if it does not exist.
+  !> Number of values in a dataset; -1 if it does not exist, or says that it has more than any file can hold.
   function length(self, name) result(n)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(int64) :: n
 
-    n = product(self%extents(name))
+    n = values_in(self%extents(name))
   end function length
+
+  !> Number of values of a shape; -1 if it is too large to be counted.
+  pure function values_in(extents) result(n)
+    integer(hsize_t), intent(in) :: extents(:)
+    integer(int64) :: n
+
+    n = -1
+    if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
+  end function values_in
 
   !> Writes reals as doubles.
   subroutine put_reals(self, name, extents, values)
@@ -238,7 +276,7 @@ contains
     integer :: status, closed
 
     if (allocated(self%failure)) return
-    call h5dopen_f(self%id, name, dataset, status)
+    call self%open_dataset(name, dataset, status)
     if (status >= 0) call h5dwrite_f(dataset, h5kind_to_type(int64, h5_integer_kind), c_loc(value), status)
     call self%check(status, "write "//name)
     call h5dclose_f(dataset, closed)
@@ -274,7 +312,7 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset of n values; they stay as they are if it has another number, or cannot be read.
+  !> Reads a dataset of n values; they stay as they are if it has another number or kind, or cannot be read.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -282,15 +320,20 @@ contains
     integer(hid_t), intent(in) :: in_memory
     type(c_ptr), intent(in) :: address
     type(c_ptr) :: place
-    integer(hid_t) :: dataset
-    integer :: status, closed
+    integer(hid_t) :: dataset, stored_as
+    integer :: status, closed, kind_wanted, kind_found
 
     if (allocated(self%failure)) return
     place = address
     status = -1
     if (self%length(name) == n) then
-      call h5dopen_f(self%id, name, dataset, status)
+      call self%open_dataset(name, dataset, status)
+      if (status >= 0) call h5dget_type_f(dataset, stored_as, status)
+      if (status >= 0) call h5tget_class_f(stored_as, kind_found, status)
+      if (status >= 0) call h5tget_class_f(in_memory, kind_wanted, status)
+      if (status >= 0 .and. kind_found /= kind_wanted) status = -1
       if (status >= 0) call h5dread_f(dataset, in_memory, place, status)
+      call h5tclose_f(stored_as, closed)
       call h5dclose_f(dataset, closed)
     end if
     call self%check(status, "be read: "//name)
@@ -305,7 +348,7 @@ contains
     integer(hid_t) :: string
     integer :: closed
 
-    allocate (texts(max(0_int64, self%length(name))))
+    allocate (texts(min(max(0_int64, self%length(name)), most_texts)))
     texts = ""
     string = string_of(length)
     call self%fetch_values(name, size(texts), string, c_loc(texts))
@@ -320,18 +363,24 @@ contains
     character(len=:), allocatable, target :: buffer
     integer(hid_t) :: dataset, string
     integer(size_t) :: bytes
-    integer :: status, closed
+    integer :: status, closed, kind_found
+    logical :: elsewhere
 
     text = ""
     if (allocated(self%failure)) return
-    call h5dopen_f(self%id, name, dataset, status)
+    call self%open_dataset(name, dataset, status)
     if (status >= 0) call h5dget_type_f(dataset, string, status)
+    if (status >= 0) call h5tget_class_f(string, kind_found, status)
+    if (status >= 0 .and. kind_found /= h5t_string_f) status = -1
+    if (status >= 0) call h5tis_variable_str_f(string, elsewhere, status)
     if (status >= 0) call h5tget_size_f(string, bytes, status)
+    if (status >= 0 .and. (elsewhere .or. bytes > longest_text)) status = -1
     call self%check(status, "be read: "//name)
-    if (allocated(self%failure)) return
-    allocate (character(len=bytes) :: buffer)
-    call self%fetch_values(name, 1, string, c_loc(buffer))
-    text = trim(buffer)
+    if (.not. allocated(self%failure)) then
+      allocate (character(len=bytes) :: buffer)
+      call self%fetch_values(name, 1, string, c_loc(buffer))
+      if (.not. allocated(self%failure)) text = trim(buffer)
+    end if
     call h5tclose_f(string, closed)
     call h5dclose_f(dataset, closed)
   end subroutine fetch_text

@@ -4,7 +4,7 @@
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5dopen_f, &
+  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, &
     h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5screate_simple_f, h5sclose_f, &
     h5sselect_hyperslab_f, h5s_select_set_f, h5t_ieee_f32le, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
@@ -90,7 +90,7 @@ contains
     if (size(extents) == self%rank + 1) then
       self%capacity = extents(self%rank + 1)
       if (all(extents(:self%rank) == self%shape(:self%rank))) &
-        call h5dopen_f(file%id, trim(self%name), self%id, status)
+        call file%open_dataset(trim(self%name), self%id, status)
     end if
     call file%check(status, "be read: "//trim(self%name))
   end subroutine open_series

@@ -11,26 +11,30 @@ module last_frame
   public :: read_last_frame
 
   integer, parameter :: name_length = 64
+  integer(int64), parameter :: most_disks = 100000000       !! of any run
 
 contains
 
   !> Reads the `count` disks of the species with this name.
-  subroutine read_last_frame(path, name, count, n_columns, table, error)
+  subroutine read_last_frame(path, name, count, n_columns, table, chosen, error)
     character(len=*), intent(in) :: path
     character(len=*), intent(in) :: name                    !! of the species
     integer, intent(in) :: count
     integer, intent(in) :: n_columns                        !! wanted: 2, or 4 with velocities
     real(real64), allocatable, intent(out) :: table(:, :)   !! (n_columns,count) x, y, vx, vy
+    integer, allocatable, intent(out) :: chosen(:)          !! (count) their rows in the frame
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
     character(len=name_length), allocatable :: names(:)
     integer(int32), allocatable :: species(:)
-    integer, allocatable :: chosen(:)
+    integer(int64) :: n
     integer :: k
 
     call file%open(path, .false.)
     call file%fetch_texts(species_names, name_length, names)
-    allocate (species(max(0_int64, file%length(disk_species))))
+    n = file%length(disk_species)
+    if (n > most_disks) n = 0                               ! then it cannot be read
+    allocate (species(max(0_int64, n)))
     call file%fetch(disk_species, size(species), species)
     allocate (chosen, source=pack([(k, k=1, size(species))], species == findloc(names, name, dim=1)))
     if (size(chosen) == count) then

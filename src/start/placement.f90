@@ -5,14 +5,17 @@
 !> the same region grow together around the disks that are there already.
 module placement
   use kinds, only: int32, int64, pi, real64
+  use bounds, only: first_outside
   use box_geometry, only: box_t, obstacle_t
   use circles, only: new_circle
   use dense_growth, only: grow_disks
   use disks, only: disk_t, species_t
   use errors, only: error_t, exit_usage, fail
+  use h5md_layout, only: position, value_of, velocity
   use known_places, only: add_known, misfit_t, misfit_text, offset
   use last_frame, only: read_last_frame
   use packing, only: packing_t
+  use parameters, only: largest
   use position_file, only: read_positions
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
@@ -76,8 +79,10 @@ contains
     type(disk_t), intent(inout) :: disk(:)
     type(error_t), allocatable, intent(out) :: error
     real(real64), allocatable :: x(:, :)
+    integer, allocatable :: rows(:)
     integer :: k, columns
 
+    allocate (rows(0))
     select case (species(s)%placement)
     case ("explicit")
       x = species(s)%position
@@ -88,16 +93,17 @@ contains
     case default                                            ! 'file'
       columns = merge(4, 2, species(s)%velocities == "file")
       if (is_run(species(s)%file)) then
-        call read_last_frame(species(s)%file, species(s)%name, species(s)%count, columns, x, error)
+        call read_last_frame(species(s)%file, species(s)%name, species(s)%count, columns, x, rows, error)
       else
-        call read_positions(species(s)%file, species(s)%count, columns, x, error)
+        call read_positions(species(s)%file, species(s)%count, columns, x, rows, error)
       end if
+      if (.not. allocated(error)) call check_numbers(species(s), x, rows, error)
       if (allocated(error)) return
       do k = 1, merge(species(s)%count, 0, columns == 4)
         disk(offset(species, s) + k)%v = x(3:4, k)
       end do
     end select
-    if (.not. allocated(error)) call add_checked(packing, species, s, x, error)
+    if (.not. allocated(error)) call add_checked(packing, species, s, x, rows, error)
   end subroutine place_fixed
 
   !> Whether the file is the output of a run, finished or not.
@@ -108,12 +114,49 @@ contains
     yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
   end function is_run
 
+  !> Where the values of a disk come from, for messages: a line of a text file, a row of a dataset, or a rule.
+  pure function origin(species, rows, k, column) result(text)
+    type(species_settings_t), intent(in) :: species
+    integer, intent(in) :: rows(:)                          !! of the disks in the file; none: there is no file
+    integer, intent(in) :: k                                !! number of the disk in its species
+    integer, intent(in) :: column                           !! of x, y, vx, vy
+    character(len=:), allocatable :: text
+
+    if (size(rows) == 0) then
+      text = "species."//species%name//".placement"
+    else if (is_run(species%file)) then
+      text = position
+      if (column > 2) text = velocity
+      text = species%file//": "//text//value_of//": row "//written(rows(k))//" of the last frame"
+    else
+      text = species%file//":"//written(rows(k))
+    end if
+  end function origin
+
+  !> Refuses numbers that no text could have brought: NaN, infinite, or larger than the input may have.
+  subroutine check_numbers(species, x, rows, error)
+    type(species_settings_t), intent(in) :: species
+    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows
+    integer, intent(in) :: rows(:)                          !! as in `origin`
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k, column
+
+    do k = 1, size(x, 2)
+      column = first_outside(x(:, k), [-largest, largest])
+      if (column == 0) cycle
+      call fail(error, exit_usage, origin(species, rows, k, column)//": "//written(x(column, k)) &
+        //" is out of range (sizes up to 1e100)")
+      return
+    end do
+  end subroutine check_numbers
+
   !> Adds a species at known places, if they are free and in its region.
-  subroutine add_checked(packing, species, s, x, error)
+  subroutine add_checked(packing, species, s, x, rows, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
     real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    integer, intent(in) :: rows(:)                          !! as in `origin`
     type(error_t), allocatable, intent(out) :: error
     type(misfit_t), allocatable :: misfits(:)
     character(len=:), allocatable :: text
@@ -124,7 +167,7 @@ contains
     text = ""
     do k = 1, size(misfits)
       if (k > 1) text = text//new_line("a")
-      text = text//"species."//species(s)%name//".placement: "//misfit_text(packing, species, x, misfits(k))
+      text = text//origin(species(s), rows, int(misfits(k)%disk), 1)//": "//misfit_text(packing, species, x, misfits(k))
     end do
     call fail(error, exit_usage, text)
   end subroutine add_checked
@@ -183,7 +226,7 @@ contains
     do k = 1, size(group)
       if (allocated(error)) return
       associate (n => species(group(k))%count)
-        call add_checked(packing, species, group(k), x(:, first:first + n - 1), error)
+        call add_checked(packing, species, group(k), x(:, first:first + n - 1), [integer ::], error)
         first = first + n
       end associate
     end do

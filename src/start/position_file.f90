@@ -15,35 +15,38 @@ module position_file
 contains
 
   !> Reads exactly `count` disks.
-  subroutine read_positions(path, count, n_columns, table, error)
+  subroutine read_positions(path, count, n_columns, table, lines, error)
     character(len=*), intent(in) :: path
     integer, intent(in) :: count
     integer, intent(in) :: n_columns                        !! needed: 2, or 4 with velocities
     real(real64), allocatable, intent(out) :: table(:, :)   !! (n_columns,count)
+    integer, allocatable, intent(out) :: lines(:)           !! (count) in which the disks stand
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_line) :: line
     character(len=256) :: reason
     character(len=:), allocatable :: problem
-    integer :: unit, status, number, n
+    integer :: unit, status, number, n, before
 
     open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
     if (status /= 0) then
       call fail(error, exit_files, path//": "//trim(reason))
       return
     end if
-    allocate (table(n_columns, count))
+    allocate (table(n_columns, count), lines(count))
     n = 0
     number = 0
     do
       read (unit, "(a)", iostat=status, iomsg=reason) line
       if (status /= 0) exit
       number = number + 1
+      before = n
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
       if (len_trim(line) == longest_line) then
         problem = "the line is too long"
       else
         call read_line(line, n, table, problem)
       end if
+      if (n > before) lines(min(n, count)) = number
       if (problem == "") cycle
       call fail(error, exit_usage, path//":"//written(number)//": "//problem)
       exit
