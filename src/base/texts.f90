@@ -4,7 +4,7 @@ module texts
   use kinds, only: int64, real64
   implicit none
   private
-  public :: text_t, written, written_exactly, lower_case, shown, joined, place_of, nearest_word, suggestion
+  public :: text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -86,22 +86,31 @@ contains
     end do
   end function lower_case
 
-  !> Text from a user or a file, made fit for a message: quoted, cut if long, control characters as `?`.
+  !> Text with control characters as `?`.
+  pure function legible(text) result(line)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: line
+    integer :: i
+
+    line = text
+    do i = 1, len(line)
+      if (iachar(line(i:i)) < 32 .or. iachar(line(i:i)) == 127) line(i:i) = "?"
+    end do
+  end function legible
+
+  !> Text from a user or a file, made fit for a message: quoted, legible, cut if long.
   pure function shown(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
     integer, parameter :: longest = 40
-    integer :: i, last
+    integer :: last
 
     last = min(len(text), longest)
     do while (last > longest - 4 .and. last < len(text))
       if (iand(iachar(text(last + 1:last + 1)), 192) /= 128) exit   ! never cut inside a UTF-8 character
       last = last - 1
     end do
-    quoted = text(:last)
-    do i = 1, len(quoted)
-      if (iachar(quoted(i:i)) < 32 .or. iachar(quoted(i:i)) == 127) quoted(i:i) = "?"
-    end do
+    quoted = legible(text(:last))
     if (len(text) > longest) quoted = quoted//"..."
     quoted = '"'//quoted//'"'
   end function shown

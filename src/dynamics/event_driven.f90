@@ -17,7 +17,7 @@ module event_driven
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: event_driven_t
+  public :: event_driven_t, events_per_epoch
 
   !> Pair collisions per disk after which the origin of time moves, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 20

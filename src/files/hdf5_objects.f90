@@ -9,7 +9,7 @@ module hdf5_objects
     h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_virtual_f, &
     h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tget_class_f, h5tis_variable_str_f, h5tclose_f, &
-    h5t_native_double, h5t_string_f, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
+    h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
   use hdf5_handle, only: hdf5_handle_t
   use kinds, only: int32, int64, real64
   implicit none
@@ -73,24 +73,31 @@ contains
   end subroutine make_dataset
 
   !> Opens a dataset whose values are in this file. Those of another file may be a device, or not ours to write.
-  subroutine open_dataset(self, name, dataset, status)
+  subroutine open_dataset(self, name, dataset, status, like)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer, intent(out) :: status                !! negative: there is none
-    integer(hid_t) :: creation
-    integer :: layout, n_files, closed
+    integer(hid_t), intent(in), optional :: like  !! an HDF5 type of the kind that it must have: real, integer, text
+    integer(hid_t) :: creation, type
+    integer :: layout, n_files, kinds(2), closed
 
     call h5dopen_f(self%id, name, dataset, status)
     if (status < 0) return
     call h5dget_create_plist_f(dataset, creation, status)
     if (status >= 0) call h5pget_layout_f(creation, layout, status)
     if (status >= 0) call h5pget_external_count_f(creation, n_files, status)
-    if (status >= 0) status = merge(-1, 0, layout == h5d_virtual_f .or. n_files > 0)
-    call h5pclose_f(creation, closed)
-    if (status >= 0) return
+    if (status >= 0 .and. (layout == h5d_virtual_f .or. n_files > 0)) status = -1
     call self%check(status, "be used: "//name//" keeps its values in another file")
-    call h5dclose_f(dataset, closed)
+    call h5pclose_f(creation, closed)
+    if (status >= 0 .and. present(like)) then
+      call h5dget_type_f(dataset, type, status)
+      if (status >= 0) call h5tget_class_f(type, kinds(1), status)
+      if (status >= 0) call h5tget_class_f(like, kinds(2), status)
+      if (status >= 0 .and. kinds(1) /= kinds(2)) status = -1
+      call h5tclose_f(type, closed)
+    end if
+    if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
 
   !> Gives an object a second name.
@@ -320,20 +327,15 @@ contains
     integer(hid_t), intent(in) :: in_memory
     type(c_ptr), intent(in) :: address
     type(c_ptr) :: place
-    integer(hid_t) :: dataset, stored_as
-    integer :: status, closed, kind_wanted, kind_found
+    integer(hid_t) :: dataset
+    integer :: status, closed
 
     if (allocated(self%failure)) return
     place = address
     status = -1
     if (self%length(name) == n) then
-      call self%open_dataset(name, dataset, status)
-      if (status >= 0) call h5dget_type_f(dataset, stored_as, status)
-      if (status >= 0) call h5tget_class_f(stored_as, kind_found, status)
-      if (status >= 0) call h5tget_class_f(in_memory, kind_wanted, status)
-      if (status >= 0 .and. kind_found /= kind_wanted) status = -1
+      call self%open_dataset(name, dataset, status, like=in_memory)
       if (status >= 0) call h5dread_f(dataset, in_memory, place, status)
-      call h5tclose_f(stored_as, closed)
       call h5dclose_f(dataset, closed)
     end if
     call self%check(status, "be read: "//name)
@@ -363,15 +365,13 @@ contains
     character(len=:), allocatable, target :: buffer
     integer(hid_t) :: dataset, string
     integer(size_t) :: bytes
-    integer :: status, closed, kind_found
+    integer :: status, closed
     logical :: elsewhere
 
     text = ""
     if (allocated(self%failure)) return
-    call self%open_dataset(name, dataset, status)
+    call self%open_dataset(name, dataset, status, like=h5t_fortran_s1)
     if (status >= 0) call h5dget_type_f(dataset, string, status)
-    if (status >= 0) call h5tget_class_f(string, kind_found, status)
-    if (status >= 0 .and. kind_found /= h5t_string_f) status = -1
     if (status >= 0) call h5tis_variable_str_f(string, elsewhere, status)
     if (status >= 0) call h5tget_size_f(string, bytes, status)
     if (status >= 0 .and. (elsewhere .or. bytes > longest_text)) status = -1

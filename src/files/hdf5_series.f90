@@ -90,7 +90,7 @@ contains
     if (size(extents) == self%rank + 1) then
       self%capacity = extents(self%rank + 1)
       if (all(extents(:self%rank) == self%shape(:self%rank))) &
-        call file%open_dataset(trim(self%name), self%id, status)
+        call file%open_dataset(trim(self%name), self%id, status, like=self%storage_type())
     end if
     call file%check(status, "be read: "//trim(self%name))
   end subroutine open_series

@@ -123,8 +123,10 @@ contains
       //written(committed(1))//", the checkpoint says "//written(count))
     do k = 1, size(self%series)
       call self%series(k)%open(file)
+      if (self%series(k)%capacity < committed(1)) call file%check(-1, "go on: "//self%counter//" is " &
+        //written(committed(1))//", but "//trim(self%series(k)%name)//" has only "//written(self%series(k)%capacity))
     end do
-    self%capacity = self%series(1)%capacity
+    self%capacity = minval(self%series%capacity)
     self%appended = count
     self%committed = count
     if (committed(1) /= count) call file%replace(self%counter, count)

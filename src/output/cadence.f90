@@ -23,6 +23,7 @@ module cadence
     procedure :: is_due
     procedure :: is_new
     procedure :: take
+    procedure :: look_ahead
     procedure :: tighten
     procedure :: planned
   end type cadence_t
@@ -57,7 +58,7 @@ contains
     yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%events /= self%last_events
   end function is_new
 
-  !> Counts a sample taken now, and finds when the next ones are due: at the first multiples ahead.
+  !> Counts a sample taken now.
   pure subroutine take(self, sim)
     class(cadence_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -65,6 +66,15 @@ contains
     self%count = self%count + 1
     self%last_time = sim%time()
     self%last_events = sim%events
+    call self%look_ahead(sim)
+  end subroutine take
+
+  !> Finds when the next samples are due: at the first multiples ahead. This follows from the state alone, whenever
+  !> the last sample was taken.
+  pure subroutine look_ahead(self, sim)
+    class(cadence_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+
     if (self%every_time < never) then
       self%multiple = max(self%multiple, int(sim%time()/self%every_time, int64))
       do while (self%next_time() <= sim%time())
@@ -73,7 +83,7 @@ contains
     end if
     self%next_collisions = next_multiple(sim%collisions, self%every_collisions)
     self%next_events = next_multiple(sim%events, self%every_events)
-  end subroutine take
+  end subroutine look_ahead
 
   !> Lowers the limits so that the simulation pauses at the next sample.
   pure subroutine tighten(self, limits)

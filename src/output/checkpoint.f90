@@ -5,9 +5,11 @@
 !> moment. The file begins with a checksum of all that follows, which is verified before anything is read.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, real64
+  use kinds, only: int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
+  use checkpoint_checks, only: flaw_of_progress, flaw_of_state
+  use component_file, only: component_file_t
   use errors, only: error_t, exit_files, exit_usage, fail
   use hdf5_objects, only: hdf5_file_t
   use output, only: output_t, progress_t
@@ -15,9 +17,10 @@ module checkpoint
   use run_files, only: current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
   use run_input, only: run_input_t
   use sealed_file, only: checksum, flaw_of, seal
+  use settings, only: settings_t
   use simulation_state, only: simulation_t
   use system, only: free_bytes, last_problem, link_file, move_file, remove_file, synchronize
-  use texts, only: written
+  use texts, only: legible, written
   use version, only: program_version
   implicit none
   private
@@ -31,14 +34,14 @@ module checkpoint
   character(len=*), parameter :: free_to_change(5) = [character(len=26) :: "run.title = ", &
     "run.search = ", "run.queue = ", "stop.wall_clock = ", "output.checkpoint_every = "]
 
-  !> A file whose components are either written or read.
-  type :: component_file_t
-    type(hdf5_file_t) :: hdf5
-    logical :: writing = .false.
-  contains
-    generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers
-    procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers
-  end type component_file_t
+  ! Ranges of what is read
+  real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
+  real(real64), parameter :: most = 1.0e300_real64          !! of sums: two of them do not overflow
+  real(real64), parameter :: times(2) = [0.0_real64, longest], clocks(2) = [-longest, longest]
+  real(real64), parameter :: sums(2) = [-most, most], not_negative(2) = [0.0_real64, most]
+  real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
+  real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
+  integer(int64), parameter :: counts(2) = [0_int64, 2_int64**53]   !! exact also as reals
 
 contains
 
@@ -118,11 +121,32 @@ contains
       call exchange_state(file, sim)
       progress = progress_t(input%settings%output)
       call exchange_progress(file, progress)
+      call complete(file, input%settings, sim, progress, flaw)
+      if (flaw /= "") call fail(error, exit_usage, current//": is damaged: "//flaw//"; "//advice(path))
     end if
     call file%hdf5%close()
-    if (.not. allocated(error)) call file%hdf5%report(error)
     if (.not. allocated(error)) call output%resume(path, input, sim, progress, error)
   end subroutine read_checkpoint
+
+  !> Derives the rest of what has been read if all of it can be right.
+  subroutine complete(file, settings, sim, progress, flaw)
+    type(component_file_t), intent(in) :: file
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(inout) :: sim
+    type(progress_t), intent(inout) :: progress
+    character(len=:), allocatable, intent(out) :: flaw      !! what cannot be right; empty if nothing
+
+    flaw = ""
+    if (allocated(file%flaw)) flaw = file%flaw
+    if (allocated(file%hdf5%failure)) flaw = "it cannot "//file%hdf5%failure
+    if (flaw /= "") return
+    sim%disk%radius = sim%species(sim%tag%species)%radius
+    flaw = flaw_of_state(sim, settings)
+    if (flaw == "") flaw = flaw_of_progress(progress, sim, settings%output%event_log)
+    if (flaw /= "") return
+    call progress%frames%look_ahead(sim)
+    call progress%observables%look_ahead(sim)
+  end subroutine complete
 
   !> What to do without the checkpoint of an output, by whether the previous one is good.
   function advice(path)
@@ -179,7 +203,7 @@ contains
 
     call file%fetch_text("program", there)
     if (there /= program() .and. .not. allocated(file%failure)) then
-      call fail(error, exit_usage, file%path//": was written by "//there//", this is "//program())
+      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", this is "//program())
       return
     end if
     call file%fetch_text("input", there)
@@ -187,7 +211,7 @@ contains
     there = there//eol
     here = fixed_input(groups)
     do while (there /= "" .or. here /= "")
-      variable = there(:index(there//eol, eol) - 1)
+      variable = legible(there(:index(there//eol, eol) - 1))
       if (here(:index(here//eol, eol) - 1) /= variable) then
         call fail(error, exit_usage, file%path//": belongs to another input: there " &
           //variable//", here "//here(:index(here//eol, eol) - 1))
@@ -202,32 +226,31 @@ contains
   subroutine exchange_state(file, sim)
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
-    integer :: n
+    integer(int64) :: n
 
-    call file%exchange("epoch", sim%epoch)
-    call file%exchange("now", sim%now)
-    call file%exchange("next_epoch", sim%next_epoch)
-    call file%exchange("events", sim%events)
-    call file%exchange("collisions", sim%collisions)
-    call file%exchange("wall_collisions", sim%wall_collisions)
-    call file%exchange("obstacle_collisions", sim%obstacle_collisions)
-    call file%exchange("wall_impulse", sim%wall_impulse)
-    call file%exchange("virial", sim%virial)
-    call file%exchange("dissipated", sim%dissipated)
-    call file%exchange("start_energy", sim%start_energy)
-    n = sum(sim%species%count)
+    call file%exchange("epoch", sim%epoch, times)
+    call file%exchange("now", sim%now, times)
+    call file%exchange("next_epoch", sim%next_epoch, counts)
+    call file%exchange("events", sim%events, counts)
+    call file%exchange("collisions", sim%collisions, counts)
+    call file%exchange("wall_collisions", sim%wall_collisions, counts)
+    call file%exchange("obstacle_collisions", sim%obstacle_collisions, counts)
+    call file%exchange("wall_impulse", sim%wall_impulse, sums)
+    call file%exchange("virial", sim%virial, sums)
+    call file%exchange("dissipated", sim%dissipated, sums)
+    call file%exchange("start_energy", sim%start_energy, not_negative)
+    n = sum(int(sim%species%count, int64))
     if (.not. allocated(sim%disk)) allocate (sim%disk(n), sim%tag(n))
-    call file%exchange("disks/x1", sim%disk%x(1))
-    call file%exchange("disks/x2", sim%disk%x(2))
-    call file%exchange("disks/v1", sim%disk%v(1))
-    call file%exchange("disks/v2", sim%disk%v(2))
-    call file%exchange("disks/clock", sim%disk%clock)
-    call file%exchange("disks/species", sim%tag%species)
-    call file%exchange("disks/id", sim%tag%id)
-    call file%exchange("disks/collisions", sim%tag%collisions)
-    call file%exchange("disks/image1", sim%tag%image(1))
-    call file%exchange("disks/image2", sim%tag%image(2))
-    if (.not. file%writing) sim%disk%radius = sim%species(sim%tag%species)%radius
+    call file%exchange("disks/x1", sim%disk%x(1), places)
+    call file%exchange("disks/x2", sim%disk%x(2), places)
+    call file%exchange("disks/v1", sim%disk%v(1), speeds)
+    call file%exchange("disks/v2", sim%disk%v(2), speeds)
+    call file%exchange("disks/clock", sim%disk%clock, clocks)
+    call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
+    call file%exchange("disks/id", sim%tag%id, [1_int64, n])
+    call file%exchange("disks/collisions", sim%tag%collisions, counts)
+    call file%exchange("disks/image1", sim%tag%image(1), [-counts(2), counts(2)])
+    call file%exchange("disks/image2", sim%tag%image(2), [-counts(2), counts(2)])
   end subroutine exchange_state
 
   !> Writes or reads how far the output has come.
@@ -237,85 +260,20 @@ contains
 
     call exchange_cadence(file, "frames", progress%frames)
     call exchange_cadence(file, "observables", progress%observables)
-    call file%exchange("progress/events", progress%events)
-    call file%exchange("progress/spent", progress%spent)
+    call file%exchange("progress/events", progress%events, counts)
+    call file%exchange("progress/spent", progress%spent, not_negative)
   end subroutine exchange_progress
 
-  !> Writes or reads how far a cadence has come; its steps are part of the input.
+  !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
+  !> follows from them.
   subroutine exchange_cadence(file, name, cadence)
     type(component_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
     type(cadence_t), intent(inout) :: cadence
 
-    call file%exchange("progress/"//name//"/count", cadence%count)
-    call file%exchange("progress/"//name//"/multiple", cadence%multiple)
-    call file%exchange("progress/"//name//"/next_collisions", cadence%next_collisions)
-    call file%exchange("progress/"//name//"/next_events", cadence%next_events)
-    call file%exchange("progress/"//name//"/last_events", cadence%last_events)
-    call file%exchange("progress/"//name//"/last_time", cadence%last_time)
+    call file%exchange("progress/"//name//"/count", cadence%count, [1_int64, counts(2)])
+    call file%exchange("progress/"//name//"/last_events", cadence%last_events, counts)
+    call file%exchange("progress/"//name//"/last_time", cadence%last_time, times)
   end subroutine exchange_cadence
-
-  !> Writes or reads a real.
-  subroutine exchange_real(self, name, value)
-    class(component_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(inout) :: value
-    real(real64) :: buffer(1)
-
-    buffer = value
-    call self%exchange(name, buffer)
-    value = buffer(1)
-  end subroutine exchange_real
-
-  !> Writes or reads an array of reals.
-  subroutine exchange_reals(self, name, values)
-    class(component_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(inout) :: values(:)
-    real(real64), allocatable :: buffer(:)
-
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
-    values = buffer
-  end subroutine exchange_reals
-
-  !> Writes or reads an integer of 64 bits.
-  subroutine exchange_long(self, name, value)
-    class(component_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    integer(int64), intent(inout) :: value
-    integer(int64) :: buffer(1)
-
-    buffer = value
-    call self%exchange(name, buffer)
-    value = buffer(1)
-  end subroutine exchange_long
-
-  !> Writes or reads an array of integers of 64 bits.
-  subroutine exchange_longs(self, name, values)
-    class(component_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    integer(int64), intent(inout) :: values(:)
-    integer(int64), allocatable :: buffer(:)
-
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
-    values = buffer
-  end subroutine exchange_longs
-
-  !> Writes or reads an array of integers of 32 bits.
-  subroutine exchange_integers(self, name, values)
-    class(component_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    integer(int32), intent(inout) :: values(:)
-    integer(int32), allocatable :: buffer(:)
-
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(name, shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(name, size(buffer), buffer)
-    values = buffer
-  end subroutine exchange_integers
 
 end module checkpoint

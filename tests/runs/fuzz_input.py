@@ -7,22 +7,21 @@ its output are those that an independent reading of the file (below, by another 
     python tests/runs/fuzz_input.py --count 10000 --program build/ricochet
 """
 
-import argparse
-import os
 import random
 import re
 import subprocess
 import sys
 import tempfile
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+import fuzzing
+
 TIME_LIMIT = 5
+HARMLESS = {"accepted", "refused"}
 
 SEEDS = [
     """! a comment with a / and an ' in it
@@ -355,33 +354,14 @@ def cases(count: int, seed: int):
 
 def fuzz(program: str, count: int, seed: int) -> Counter:
     """Verdicts by kind; faulty files are shown on stderr."""
-    verdicts: Counter = Counter()
-    workers = os.cpu_count() or 1
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(workers) as pool:
-        paths = [Path(folder) / f"{number}.nml" for number in range(count)]
-        inputs = list(cases(count, seed))
-        results = pool.map(judge, [program] * count, inputs, paths)
-        for data, (verdict, details) in zip(inputs, results, strict=True):
-            verdicts[verdict] += 1
-            if verdict not in ("accepted", "refused"):
-                print(f"--- {verdict}: {details}\n{data!r}", file=sys.stderr)
-    return verdicts
+    with tempfile.TemporaryDirectory() as folder:
 
+        def verdict(case):
+            number, data = case
+            return judge(program, data, Path(folder) / f"{number}.nml")
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--count", type=int, default=10_000, help="number of files (%(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="of the injuries (%(default)s)")
-    parser.add_argument(
-        "--program",
-        default=os.environ.get("RICOCHET", str(ROOT / "build" / "ricochet")),
-        help="the program (%(default)s)",
-    )
-    options = parser.parse_args()
-    verdicts = fuzz(options.program, options.count, options.seed)
-    print(", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items())))
-    return 0 if set(verdicts) <= {"accepted", "refused"} else 1
+        return fuzzing.tally(verdict, enumerate(cases(count, seed)), HARMLESS)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(fuzzing.run(__doc__, fuzz, HARMLESS, count=10_000))

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import time
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -23,6 +22,7 @@ from whole_runs import (
     USAGE,
     differences,
     one_line,
+    seal,
     write_input,
 )
 
@@ -288,10 +288,3 @@ def write_short_run(folder) -> list[str]:
     """The beginning of a command that runs a moment, up to -o."""
     write_input(folder, MIXTURE)
     return ["gas.nml", "--set", "stop.time=0.5", "-o"]
-
-
-def seal(path):
-    """Renews the checksum of a checkpoint: CRC-32 over all but the header."""
-    data = path.read_bytes()
-    header = f"ricochet checkpoint 2, CRC-32 of the rest: {zlib.crc32(data[64:]):08X}".ljust(63)
-    path.write_bytes(header.encode() + b"\n" + data[64:])

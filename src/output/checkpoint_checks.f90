@@ -1,0 +1,170 @@
+!> Whether what a checkpoint holds can be the state of a run, beyond the range of each value: a right checksum only says
+!> that nobody has changed the file since it was sealed. What is wrong is named by its dataset.
+module checkpoint_checks
+  use cadence, only: cadence_t
+  use event_driven, only: events_per_epoch
+  use kinds, only: int32, int64, real64
+  use output, only: progress_t
+  use settings, only: settings_t
+  use simulation_state, only: simulation_t
+  use texts, only: written
+  implicit none
+  private
+  public :: flaw_of_state, flaw_of_progress
+
+  real(real64), parameter :: countable = 2.0_real64**53     !! steps of time that a real tells apart
+  real(real64), parameter :: rounding = 1.0e-6_real64       !! relative, more than that of any run
+
+contains
+
+  !> What cannot be right in a state whose values are all in their ranges; empty if nothing.
+  pure function flaw_of_state(sim, settings) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    type(settings_t), intent(in) :: settings
+    character(len=:), allocatable :: flaw
+    real(real64) :: dt                            ! [time]
+
+    flaw = flaw_of_tags(sim)
+    if (flaw == "") flaw = flaw_of_counts(sim)
+    dt = merge(settings%run%dt, 0.0_real64, settings%run%dynamics == "steps")
+    if (flaw == "" .and. dt > 0 .and. sim%time() > countable*dt) flaw = "now is more than 2**53 steps of time"
+    if (flaw == "") flaw = flaw_of_motion(sim, dt)
+  end function flaw_of_state
+
+  !> Each disk of the input must be there once, and be of its species.
+  pure function flaw_of_tags(sim) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: flaw
+    integer(int32), allocatable :: species(:)
+    integer(int32) :: s, i, first
+
+    allocate (species(sim%n_disks()))
+    first = 1
+    do s = 1, size(sim%species, kind=int32)
+      species(first:first + sim%species(s)%count - 1) = s
+      first = first + sim%species(s)%count
+    end do
+    flaw = ""
+    do i = 1, sim%n_disks()
+      associate (tag => sim%tag(i))
+        if (species(tag%id) == 0) then
+          flaw = in_row("id", i)//" is "//written(tag%id)//" a second time"
+        else if (species(tag%id) /= tag%species) then
+          flaw = in_row("species", i)//" is "//written(tag%species)//", but disk "//written(tag%id) &
+            //" is of species "//written(species(tag%id))
+        end if
+        if (flaw /= "") return
+        species(tag%id) = 0
+      end associate
+    end do
+  end function flaw_of_tags
+
+  !> Collisions are counted in several ways, which must agree.
+  pure function flaw_of_counts(sim) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: flaw
+    real(real64) :: own                           ! a sum of integers might overflow
+
+    own = sum(real(sim%tag%collisions, real64))
+    flaw = ""
+    associate (fixed => sum(sim%wall_collisions) + sim%obstacle_collisions)
+      if (sim%events /= sim%collisions + fixed) then
+        flaw = "events is "//written(sim%events)//", but "//written(sim%collisions + fixed)//" are counted by kind"
+      else if (own < 2*sim%collisions + fixed .or. own > 2*sim%collisions + fixed) then
+        flaw = "disks/collisions add up to "//written(own)//" instead of "//written(2*sim%collisions + fixed)
+      else if (sim%next_epoch /= 0 .and. (sim%next_epoch < sim%events .or. &
+        sim%next_epoch > sim%events + events_per_epoch(sim))) then
+        flaw = "next_epoch is "//written(sim%next_epoch)//" after "//written(sim%events)//" events"
+      end if
+    end associate
+  end function flaw_of_counts
+
+  !> There is as much kinetic energy as collisions have left and gravity may have given; so no disk has gone farther
+  !> than a speed allows, left the box, or collided in the future. With time steps a disk goes beyond a wall by less than
+  !> a step, and may sink by what it falls in each.
+  pure function flaw_of_motion(sim, dt) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: dt                !! 0: events are exact
+    character(len=:), allocatable :: flaw
+    real(real64) :: sunk(2), energy, fall
+    integer(int32) :: i
+
+    sunk = 0.5_real64*abs(sim%box%gravity)*dt*sim%now
+    fall = sum(sim%species%count*sim%species%mass)*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
+    flaw = ""
+    do i = 1, sim%n_disks()
+      associate (speed => sqrt(2*(sim%start_energy + fall)/sim%species(sim%tag(i)%species)%mass))
+        flaw = flaw_of_place(sim, i, speed, dt*speed + sunk)
+      end associate
+      if (flaw /= "") return
+    end do
+    energy = sim%kinetic_energy()
+    if (abs(energy - (sim%start_energy - sim%dissipated)) > rounding*sim%start_energy + (1 + rounding)*fall) flaw = &
+      "start_energy less dissipated is "//written(sim%start_energy - sim%dissipated)//", but the disks have "//written(energy)
+  end function flaw_of_motion
+
+  !> The same of one disk.
+  pure function flaw_of_place(sim, i, speed, beyond) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: speed             !! that it cannot have had [length/time]
+    real(real64), intent(in) :: beyond(2)         !! how far it may be beyond a wall [length]
+    character(len=:), allocatable :: flaw
+    real(real64) :: x(2), reach(2), periods(2)
+
+    flaw = ""
+    associate (disk => sim%disk(i), tag => sim%tag(i), edges => sim%box%edges())
+      periods = merge(2 + speed*sim%time()/edges, 0.0_real64, sim%box%periodic)
+      if (disk%clock > sim%now .or. disk%clock < -sim%epoch*(1 + rounding)) then
+        flaw = in_row("clock", i)//" is "//written(disk%clock)//"; possible: "//written(-sim%epoch)//" to "//written(sim%now)
+      else if (any(abs(real(tag%image, real64)) > periods)) then
+        flaw = in_row("image1, image2", i)//": the disk cannot have gone so far"
+      else
+        x = sim%position(i)
+        reach = disk%radius + rounding*edges + beyond
+        if (any(x < sim%box%lower - reach .or. x > sim%box%upper + reach)) flaw = in_row("x1, x2", i) &
+          //": the disk is outside the box, at "//written(x(1))//", "//written(x(2))
+      end if
+    end associate
+  end function flaw_of_place
+
+  !> A row of a dataset of the disks.
+  pure function in_row(name, i) result(text)
+    character(len=*), intent(in) :: name
+    integer(int32), intent(in) :: i
+    character(len=:), allocatable :: text
+
+    text = "disks/"//name//", row "//written(i)
+  end function in_row
+
+  !> What cannot be right in the progress of the output of a sound state; empty if nothing.
+  pure function flaw_of_progress(progress, sim, event_log) result(flaw)
+    type(progress_t), intent(in) :: progress
+    type(simulation_t), intent(in) :: sim
+    logical, intent(in) :: event_log              !! collisions are written
+    character(len=:), allocatable :: flaw
+    integer(int64) :: events
+
+    events = merge(sim%events, 0_int64, event_log)
+    flaw = flaw_of_cadence(progress%frames, "frames", sim)
+    if (flaw == "") flaw = flaw_of_cadence(progress%observables, "observables", sim)
+    if (flaw == "" .and. progress%events /= events) &
+      flaw = "progress/events is "//written(progress%events)//" instead of "//written(events)
+  end function flaw_of_progress
+
+  !> The last sample lies in the past, but not so far that another one would have been due.
+  pure function flaw_of_cadence(cadence, name, sim) result(flaw)
+    type(cadence_t), intent(in) :: cadence
+    character(len=*), intent(in) :: name
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: flaw
+
+    flaw = ""
+    if (cadence%last_time > sim%time() .or. cadence%last_events > sim%events .or. &
+      sim%time() > cadence%last_time + (1 + rounding)*cadence%every_time + spacing(4*sim%time()) .or. &
+      sim%time() > countable*cadence%every_time) flaw = "progress/"//name//": the last sample is of time " &
+      //written(cadence%last_time)//" and event "//written(cadence%last_events)//", the state of time " &
+      //written(sim%time())//" and event "//written(sim%events)
+  end function flaw_of_cadence
+
+end module checkpoint_checks
