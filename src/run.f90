@@ -3,7 +3,7 @@ module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use checkpoint, only: read_checkpoint, write_checkpoint
   use command_line, only: command_t
-  use errors, only: error_t, exit_stopped, fail
+  use errors, only: error_t, exit_files, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
   use kinds, only: int64, never, real64
@@ -11,6 +11,7 @@ module run
   use observables, only: total_energy
   use output, only: output_t
   use progress_line, only: progress_line_t
+  use run_files, only: current_checkpoint, is_file, run_file
   use run_input, only: run_input_t
   use run_setup, only: choose_evolution, new_simulation, read_input
   use simulation_state, only: simulation_t
@@ -60,6 +61,7 @@ contains
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
     if (.not. allocated(error)) call run%output%finish(run%sim, seconds() - run%started, run%rate, error)
+    if (allocated(error)) call rescue(run, error)
     if (.not. allocated(error)) call print_text(summary(run), error)
     call run%output%release()
   end subroutine perform_run
@@ -134,12 +136,14 @@ contains
       limits%turns = turns
       call run%output%tighten(limits)
       call run%evolution%advance(run%sim, limits, error)
-      if (.not. allocated(error)) call run%output%write_what_is_due(run%sim, error)
-      if (.not. allocated(error)) call run%output%write_events(run%sim, run%evolution%log, error)
+      if (allocated(error)) exit
+      call run%output%write_events(run%sim, run%evolution%log)
+      call run%output%write_what_is_due(run%sim, error)
       if (allocated(error)) exit
       now = seconds()
       ! However short the wall clock, each part of a run makes some progress.
       if (stop_requested() .or. (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock)) then
+        call run%output%reserve%give_up()
         call write_checkpoint(run%sim, run%output, error)
         if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
           //written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
@@ -157,6 +161,24 @@ contains
     end do
     call line%clear()
   end subroutine main_loop
+
+  !> Writes a checkpoint of a run that cannot write its output any more, and adds to the error how to go on.
+  subroutine rescue(run, error)
+    type(run_t), intent(inout) :: run
+    type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: problem
+
+    if (error%code /= exit_files) return
+    call run%output%reserve%give_up()
+    call write_checkpoint(run%sim, run%output, problem)
+    if (.not. allocated(problem)) then
+      error%message = error%message//"; a checkpoint has been written: --resume goes on from here"
+    else if (is_file(run_file(run%output%path, current_checkpoint))) then
+      error%message = error%message//"; --resume goes on from the last checkpoint"
+    else
+      error%message = error%message//"; there is no checkpoint: --force starts over"
+    end if
+  end subroutine rescue
 
   !> Whether the run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever
   !> happen any more and no rule names a time to wait for.

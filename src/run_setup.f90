@@ -5,7 +5,7 @@ module run_setup
   use cell_grid, only: cell_grid_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
-  use event_log, only: event_log_t
+  use event_log, only: event_log_t, log_capacity
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
   use input_fit, only: check_fit
@@ -22,8 +22,6 @@ module run_setup
   implicit none
   private
   public :: read_input, settings_from_text, new_simulation, choose_evolution
-
-  integer, parameter :: log_capacity = 8192     !! collisions, twice what is written at once
 
 contains
 

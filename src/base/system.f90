@@ -11,7 +11,7 @@ module system
   public :: watch_signals, stop_requested, checkpoint_requests
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
+  public :: is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
   public :: fill_standard_streams, print_text
 
   !> A lock on a run's output. The kernel drops it when the process ends, however it ends.
@@ -22,6 +22,14 @@ module system
     procedure :: acquire
     procedure :: release
   end type lock_t
+
+  !> Room on the disk that nobody else can take. The kernel frees it when the process ends, however it ends.
+  type :: reserve_t
+    integer(c_int), private :: descriptor = -1
+  contains
+    procedure :: take
+    procedure :: give_up
+  end type reserve_t
 
   abstract interface
     !> A call that changes what the process is subject to.
@@ -87,6 +95,18 @@ module system
       integer(c_int), value :: descriptor
     end subroutine c_unlock
 
+    function c_reserve(path, bytes) bind(C, name="system_reserve") result(descriptor)
+      import :: c_char, c_int, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t), value :: bytes
+      integer(c_int) :: descriptor
+    end function c_reserve
+
+    subroutine c_release(descriptor) bind(C, name="system_release")
+      import :: c_int
+      integer(c_int), value :: descriptor
+    end subroutine c_release
+
     subroutine c_exit(code) bind(C, name="exit")
       import :: c_int
       integer(c_int), value :: code
@@ -143,13 +163,15 @@ contains
     name = buffer(:index(buffer, c_null_char) - 1)
   end function host_name
 
-  !> Renames a file and, in the same instant, replaces the one that had the new name.
+  !> Renames a file and, in the same instant, replaces the one that had the new name. It has moved even if the
+  !> folder cannot be synchronized: then only a crash of the whole machine could still undo it.
   subroutine move_file(from, to, moved)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: moved
+    logical :: done
 
     moved = c_rename(from//c_null_char, to//c_null_char) == 0
-    if (moved) call synchronize(folder_of(to), moved)
+    if (moved) call synchronize(folder_of(to), done)
   end subroutine move_file
 
   !> Gives a file a second name and takes that name from any other file. Some file systems cannot.
@@ -262,5 +284,25 @@ contains
     call c_unlock(self%path//c_null_char, self%descriptor)
     self%descriptor = -1
   end subroutine release
+
+  !> Takes room on the disk of a file. Where the file system cannot keep room the run goes on without it.
+  subroutine take(self, path, bytes, taken)
+    class(reserve_t), intent(inout) :: self
+    character(len=*), intent(in) :: path               !! of a file that does not exist, and will not
+    integer(int64), intent(in) :: bytes
+    logical, intent(out) :: taken                      !! false: there is not so much room
+
+    self%descriptor = c_reserve(path//c_null_char, bytes)
+    taken = self%descriptor /= -1
+  end subroutine take
+
+  !> Gives up the room, if any was taken.
+  subroutine give_up(self)
+    class(reserve_t), intent(inout) :: self
+
+    if (self%descriptor < 0) return
+    call c_release(self%descriptor)
+    self%descriptor = -1
+  end subroutine give_up
 
 end module system

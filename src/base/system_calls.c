@@ -71,19 +71,22 @@ void system_fill_standard_streams(void)
 
 bool system_talks_to_terminal(void) { return isatty(STDERR_FILENO) == 1; }
 
-/* Writes all bytes, also to a pipe that takes only some at a time. */
+/* Writes all bytes, also to a pipe that takes only some at a time. What says again and again that it is ready,
+   and then refuses, is left alone: it is no failure. */
 int system_print(const char *bytes)
 {
     size_t count = strlen(bytes);
-    while (count > 0) {
+    for (int refusals = 0; count > 0 && refusals < 1000;) {
         const ssize_t written = write(STDOUT_FILENO, bytes, count);
         if (written >= 0) {
             bytes += written;
             count -= (size_t)written;
-        } else if (errno == EAGAIN) {
+            refusals = 0;
+        } else if (errno == EAGAIN || errno == EINTR) {
             struct pollfd output = {.fd = STDOUT_FILENO, .events = POLLOUT};
             poll(&output, 1, -1);
-        } else if (errno != EINTR) {
+            refusals++;
+        } else {
             return -1;
         }
     }
@@ -154,6 +157,21 @@ int64_t system_free_bytes(const char *folder)
     if (statvfs(folder, &disk) != 0 || disk.f_blocks == 0) return INT64_MAX;
     return (int64_t)disk.f_frsize*(int64_t)disk.f_bavail;
 }
+
+/* Takes room on a disk, with a file that has lost its name: however the process ends, the room is free again.
+   Returns a descriptor, -1 if there is not so much room, or -2 where room cannot be kept. */
+int system_reserve(const char *path, int64_t bytes)
+{
+    const int no_room = -1, cannot = -2;
+    const int descriptor = open_file(path, O_RDWR | O_CREAT | O_EXCL);
+    if (descriptor < 0) return cannot;
+    unlink(path);
+    errno = posix_fallocate(descriptor, 0, bytes);
+    if (errno == 0) return descriptor;
+    return closed(descriptor, errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? no_room : cannot);
+}
+
+void system_release(int descriptor) { close(descriptor); }
 
 /* Returns a descriptor that holds the lock, -1 if another process has it, or -2 where there are no locks. */
 int system_lock(const char *path)

@@ -42,7 +42,7 @@ module hdf5_series
 contains
 
   !> Number of values of one sample.
-  pure function width(self)
+  elemental function width(self)
     class(series_t), intent(in) :: self
     integer :: width
 

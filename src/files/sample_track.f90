@@ -11,13 +11,20 @@ module sample_track
   use texts, only: written
   implicit none
   private
-  public :: track_t
+  public :: samples_t, track_t
 
   integer(int64), parameter :: batch_bytes = 262144     !! samples that are written together
   integer(int64), parameter :: most_in_batch = 512      !! samples
   integer(int64), parameter :: first_bytes = 67108864   !! room made for an unknown number of samples
   integer(int64), parameter :: fewest = 16              !! samples there is room for, however large
   integer(int64), parameter :: growth = 4               !! room is multiplied by this when it is used up
+
+  !> Samples that could not be written: they wait in a checkpoint for the run to go on.
+  type :: samples_t
+    real(real64), allocatable :: values(:, :)           !! (width,count)
+  contains
+    procedure :: count => count_samples
+  end type samples_t
 
   type :: track_t
     type(series_t), allocatable :: series(:)            !! step and time first, if they share them; none: not in use
@@ -26,30 +33,45 @@ module sample_track
     integer(int64) :: appended = 0                      !! samples taken over, written or not
     integer(int64), private :: committed = 0            !! samples that are complete in the file
     real(real64), private :: waiting_since = 0.0_real64 !! of the oldest sample in the buffer [s]
-    real(real64), allocatable, private :: buffer(:, :)  !! (width,batch) samples that are not written
+    real(real64), allocatable, private :: buffer(:, :)  !! (width,:) samples that are not written
   contains
     procedure :: make
     procedure :: resume
     procedure :: copy
     procedure :: close => close_track
+    procedure :: first_capacity
     procedure :: enlarged
     procedure :: append
     procedure :: write_buffer
+    procedure :: verify
     procedure :: room
+    procedure :: most_unwritten
+    procedure :: unwritten
     procedure, private :: batch
+    procedure, private :: keep
     procedure, private :: write_samples
     procedure, private :: link_step_and_time
   end type track_t
 
 contains
 
+  !> Number of samples.
+  pure function count_samples(self) result(n)
+    class(samples_t), intent(in) :: self
+    integer(int64) :: n
+
+    n = 0
+    if (allocated(self%values)) n = size(self%values, 2, int64)
+  end function count_samples
+
   !> Bytes of one sample in the file.
-  pure function room(self) result(bytes)
+  elemental function room(self) result(bytes)
     class(track_t), intent(in) :: self
     integer(int64) :: bytes
     integer :: k
 
     bytes = 0
+    if (.not. allocated(self%series)) return
     do k = 1, size(self%series)
       bytes = bytes + self%series(k)%room()
     end do
@@ -63,6 +85,29 @@ contains
     n = max(1_int64, min(most_in_batch, batch_bytes/self%room()))
   end function batch
 
+  !> Bytes of the samples that may be waiting to be written when a write fails.
+  pure function most_unwritten(self, most, together) result(bytes)
+    class(track_t), intent(in) :: self
+    integer(int64), intent(in) :: most                  !! samples of the run; 0: their number is unknown
+    integer, intent(in) :: together                     !! samples that are appended at once, at most
+    integer(int64) :: bytes, count
+
+    bytes = 0
+    if (.not. allocated(self%series)) return
+    count = self%batch() - 1 + together
+    if (most > 0) count = min(count, most)
+    bytes = count*sum(int(self%series%width(), int64))*(storage_size(self%buffer)/8)
+  end function most_unwritten
+
+  !> The samples up to number `last` that are not in the file.
+  pure function unwritten(self, last) result(samples)
+    class(track_t), intent(in) :: self
+    integer(int64), intent(in) :: last                  !! <= appended
+    type(samples_t) :: samples
+
+    if (last > self%committed) samples%values = self%buffer(:, :last - self%committed)
+  end function unwritten
+
   !> The capacity that `count` more samples need, with room for later ones if it has to grow.
   pure function enlarged(self, count) result(n)
     class(track_t), intent(in) :: self
@@ -75,16 +120,24 @@ contains
     end do
   end function enlarged
 
+  !> Room to begin with for an unknown number of samples.
+  pure function first_capacity(self) result(n)
+    class(track_t), intent(in) :: self
+    integer(int64) :: n
+
+    n = 0
+    if (allocated(self%series)) n = max(fewest, first_bytes/self%room())
+  end function first_capacity
+
   !> Makes the track in a new file.
   subroutine make(self, file, capacity)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: capacity              !! samples; 0: their number is unknown
+    integer(int64), intent(in) :: capacity              !! samples
     integer :: k
 
     if (.not. allocated(self%series)) return
     self%capacity = capacity
-    if (capacity == 0) self%capacity = max(fewest, first_bytes/self%room())
     do k = 1, size(self%series)
       call self%series(k)%make(file, self%capacity)
     end do
@@ -108,15 +161,22 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Opens the track of a file and goes back to its first `count` samples.
-  subroutine resume(self, file, count)
+  !> Opens the track of a file and goes back to those of its first `taken` samples that are in the file.
+  subroutine resume(self, file, taken, unwritten)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: count
-    integer(int64) :: committed(1)
+    integer(int64), intent(in) :: taken
+    type(samples_t), intent(in) :: unwritten
+    integer(int64) :: committed(1), count
     integer :: k
 
     if (.not. allocated(self%series)) return
+    count = taken - unwritten%count()
+    if (count < 0) call file%check(-1, "go on: the checkpoint has more samples than were taken")
+    if (unwritten%count() > 0) then
+      if (size(unwritten%values, 1) /= sum(self%series%width())) &
+        call file%check(-1, "go on: the samples in the checkpoint are not of its kind")
+    end if
     committed = 0
     call file%fetch(self%counter, 1, committed)
     if (committed(1) < count) call file%check(-1, "go on: "//self%counter//" is " &
@@ -152,6 +212,25 @@ contains
     call file%replace(self%counter, self%committed)
   end subroutine copy
 
+  !> Notes a failure of the file if it lacks samples.
+  subroutine verify(self, file)
+    class(track_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+    integer(int64) :: committed(1)
+    integer :: k
+
+    if (.not. allocated(self%series)) return
+    committed = -1
+    call file%fetch(self%counter, 1, committed)
+    if (committed(1) /= self%appended) call file%check(-1, "be read back: samples are missing")
+    do k = 1, size(self%series)
+      associate (series => self%series(k))
+        if (file%length(trim(series%name)) /= series%width()*self%appended) &
+          call file%check(-1, "be read back: samples are missing in "//trim(series%name))
+      end associate
+    end do
+  end subroutine verify
+
   !> Closes the series; the samples in the buffer must have been written.
   subroutine close_track(self)
     class(track_t), intent(inout) :: self
@@ -164,6 +243,7 @@ contains
   end subroutine close_track
 
   !> Takes over the next samples, for which there must be room. They are written at once if they fill a batch.
+  !> What cannot be written stays in the buffer.
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -172,18 +252,32 @@ contains
 
     count = size(samples, 2)
     if (self%appended - self%committed + count > self%batch()) call self%write_buffer(file, 0.0_real64)
-    if (allocated(file%failure)) return                 ! the buffer may still be full
     waiting = self%appended - self%committed
     self%appended = self%appended + count
-    if (count >= self%batch()) then
-      call self%write_samples(file, samples)
-    else
-      if (waiting == 0) self%waiting_since = seconds()
-      if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), self%batch()))
-      self%buffer(:, waiting + 1:waiting + count) = samples
-      if (waiting + count == self%batch()) call self%write_buffer(file, 0.0_real64)
-    end if
+    if (count >= self%batch()) call self%write_samples(file, samples)
+    if (self%committed == self%appended) return
+    if (waiting == 0) self%waiting_since = seconds()
+    call self%keep(waiting, samples)
+    if (waiting + count == self%batch()) call self%write_buffer(file, 0.0_real64)
   end subroutine append
+
+  !> Puts samples into the buffer, behind those that wait there.
+  subroutine keep(self, waiting, samples)
+    class(track_t), intent(inout) :: self
+    integer(int64), intent(in) :: waiting               !! samples in the buffer
+    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    real(real64), allocatable :: longer(:, :)
+    integer(int64) :: needed
+
+    needed = waiting + size(samples, 2)
+    if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), max(needed, self%batch())))
+    if (needed > size(self%buffer, 2)) then             ! only when nothing can be written any more
+      allocate (longer(size(samples, 1), needed))
+      longer(:, :waiting) = self%buffer(:, :waiting)
+      call move_alloc(longer, self%buffer)
+    end if
+    self%buffer(:, waiting + 1:needed) = samples
+  end subroutine keep
 
   !> Writes the buffer if its oldest sample has waited for some time.
   subroutine write_buffer(self, file, least_wait)

@@ -10,12 +10,14 @@ module checkpoint
   use cadence, only: cadence_t
   use checkpoint_checks, only: flaw_of_progress, flaw_of_state
   use component_file, only: component_file_t
+  use disk_room, only: checkpoint_room
   use errors, only: error_t, exit_files, exit_usage, fail
   use hdf5_objects, only: hdf5_file_t
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
   use run_files, only: current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
   use run_input, only: run_input_t
+  use sample_track, only: samples_t
   use sealed_file, only: checksum, flaw_of, seal
   use settings, only: settings_t
   use simulation_state, only: simulation_t
@@ -58,7 +60,7 @@ contains
     new = run_file(output%path, new_checkpoint)
     current = run_file(output%path, current_checkpoint)
     call output%save(progress, error)
-    if (.not. allocated(error)) call check_room(current, size(sim%disk, kind=int64), error)
+    if (.not. allocated(error)) call check_room(current, sim%n_disks(), error)
     if (allocated(error)) return
     call remove_file(new)
     file%writing = .true.
@@ -82,12 +84,11 @@ contains
   !> Fails if a checkpoint of n disks does not fit onto the disk.
   subroutine check_room(path, n, error)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: n
+    integer, intent(in) :: n
     type(error_t), allocatable, intent(out) :: error
-    integer(int64), parameter :: per_disk = 60, besides = 32768     !! [bytes]
 
-    if (free_bytes(path) < per_disk*n + besides) call fail(error, exit_files, path &
-      //": cannot be written: "//written(per_disk*n + besides)//" bytes needed, " &
+    if (free_bytes(path) < checkpoint_room(n)) call fail(error, exit_files, path &
+      //": cannot be written: "//written(checkpoint_room(n))//" bytes needed, " &
       //written(free_bytes(path))//" bytes free")
   end subroutine check_room
 
@@ -257,11 +258,15 @@ contains
   subroutine exchange_progress(file, progress)
     type(component_file_t), intent(inout) :: file
     type(progress_t), intent(inout) :: progress
+    integer :: k
 
     call exchange_cadence(file, "frames", progress%frames)
     call exchange_cadence(file, "observables", progress%observables)
     call file%exchange("progress/events", progress%events, counts)
     call file%exchange("progress/spent", progress%spent, not_negative)
+    do k = 1, size(progress%unwritten)
+      call exchange_samples(file, "unwritten/"//written(k), progress%unwritten(k))
+    end do
   end subroutine exchange_progress
 
   !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
@@ -275,5 +280,27 @@ contains
     call file%exchange("progress/"//name//"/last_events", cadence%last_events, counts)
     call file%exchange("progress/"//name//"/last_time", cadence%last_time, times)
   end subroutine exchange_cadence
+
+  !> Writes or reads samples, often none.
+  subroutine exchange_samples(file, name, samples)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(samples_t), intent(inout) :: samples
+    real(real64), allocatable :: values(:)
+    integer(int64) :: extent(2)
+    integer :: status
+
+    if (file%writing) then
+      if (samples%count() > 0) call file%hdf5%put(name, shape(samples%values), [samples%values])
+    else if (size(file%hdf5%extents(name)) == 2) then
+      extent = file%hdf5%extents(name)
+      status = -1
+      if (product(real(extent, real64)) < huge(0)) allocate (values(product(extent)), stat=status)
+      call file%hdf5%check(-abs(status), "be read: "//name)
+      if (status /= 0) return
+      call file%exchange(name, values, sums)
+      samples%values = reshape(values, extent)
+    end if
+  end subroutine exchange_samples
 
 end module checkpoint

@@ -4,8 +4,9 @@
 !> these. Otherwise, when the room is used up, and at the end, a new file replaces it in one instant.
 module h5md_file
   use kinds, only: int64, real64
+  use errors, only: error_t
   use hdf5_objects, only: hdf5_file_t
-  use sample_track, only: track_t
+  use sample_track, only: samples_t, track_t
   use system, only: remove_file
   implicit none
   private
@@ -23,6 +24,7 @@ module h5md_file
     procedure :: replace_by
     procedure :: write_buffers
     procedure :: close => close_file
+    procedure :: verify
   end type h5md_file_t
 
 contains
@@ -31,21 +33,25 @@ contains
   subroutine make_tracks(self, capacities)
     class(h5md_file_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(n_tracks)    !! samples; 0: their number is unknown
+    integer(int64) :: capacity
     integer :: k
 
     do k = 1, n_tracks
-      call self%track(k)%make(self%file, capacities(k))
+      capacity = capacities(k)
+      if (capacity == 0) capacity = self%track(k)%first_capacity()
+      call self%track(k)%make(self%file, capacity)
     end do
   end subroutine make_tracks
 
   !> Opens the tracks of the open file and goes back to their first samples.
-  subroutine resume_tracks(self, counts)
+  subroutine resume_tracks(self, counts, unwritten)
     class(h5md_file_t), intent(inout) :: self
-    integer(int64), intent(in) :: counts(n_tracks)        !! of samples to keep
+    integer(int64), intent(in) :: counts(n_tracks)        !! of samples that have been taken
+    type(samples_t), intent(in) :: unwritten(n_tracks)    !! the last of them, which are not in the file
     integer :: k
 
     do k = 1, n_tracks
-      call self%track(k)%resume(self%file, counts(k))
+      call self%track(k)%resume(self%file, counts(k), unwritten(k))
     end do
     call self%file%flush()
   end subroutine resume_tracks
@@ -100,5 +106,20 @@ contains
     end do
     call self%file%close()
   end subroutine close_file
+
+  !> Reads back what shows whether the closed file has all samples, and no room for more.
+  subroutine verify(self, error)
+    class(h5md_file_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(hdf5_file_t) :: file
+    integer :: k
+
+    call file%open(self%file%path, writable=.false.)
+    do k = 1, n_tracks
+      call self%track(k)%verify(file)
+    end do
+    call file%close()
+    call file%report(error)
+  end subroutine verify
 
 end module h5md_file

@@ -4,11 +4,11 @@ module output
   use kinds, only: int64, real64
   use cadence, only: cadence_t
   use errors, only: error_t, exit_files, fail
+  use disk_room, only: check_room, keep_room, last_room
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use h5md_file, only: event_track, frame_track, h5md_file_t, n_tracks, observable_track
-  use h5md_layout, only: event_counter, frame_counter, observables_group, position, sample_counter, time_of, &
-    value_of
+  use h5md_layout, only: event_counter, frame_counter, sample_counter
   use hdf5_objects, only: hdf5_file_t
   use observables, only: observed
   use run_description, only: describe_cost, describe_run
@@ -17,10 +17,11 @@ module output
   use run_input, only: run_input_t
   use samples, only: event_series, frame_sample, frame_series, observable_sample, observable_series
   use settings, only: output_settings_t
+  use sample_track, only: samples_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, &
-    remove_file, seconds, synchronize
+  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, &
+    reserve_t, seconds, synchronize
   use texts, only: written
   implicit none
   private
@@ -33,6 +34,9 @@ module output
     type(cadence_t) :: frames, observables
     integer(int64) :: events = 0                  !! collisions written to the event log
     real(real64) :: spent = 0.0_real64            !! wall time of earlier parts of the run [s]
+    type(samples_t) :: unwritten(n_tracks)        !! counted above, but not in the file
+  contains
+    procedure, private :: counts
   end type progress_t
 
   interface progress_t
@@ -46,6 +50,7 @@ module output
     type(run_input_t) :: input                    !! described in the file
     type(h5md_file_t), private :: h5md
     type(lock_t), private :: lock
+    type(reserve_t) :: reserve                    !! room for a last checkpoint: give it up before that
   contains
     procedure :: open => open_output
     procedure :: resume
@@ -78,6 +83,14 @@ contains
     end associate
   end function new_progress
 
+  !> Number of samples of each track.
+  pure function counts(self)
+    class(progress_t), intent(in) :: self
+    integer(int64) :: counts(n_tracks)
+
+    counts = [self%frames%count, self%observables%count, self%events]
+  end function counts
+
   !> Opens the output of a new run and writes the first samples.
   subroutine open_output(self, path, input, sim, force, error)
     class(output_t), intent(inout) :: self
@@ -86,7 +99,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: force                  !! replace, at the end, a finished file
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: capacities(n_tracks)
+    integer(int64) :: capacities(n_tracks), kept
 
     call self%claim(path, error)
     if (allocated(error)) return
@@ -94,8 +107,10 @@ contains
     if (.not. allocated(error)) then
       self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
-      call check_room(self%h5md, capacities, path, error)
+      kept = last_room(self%h5md%track, capacities, sim%n_disks())
+      call check_room(self%h5md%track, capacities, kept, path, error)
     end if
+    if (.not. allocated(error)) call keep_room(self%reserve, kept, path, error)
     if (.not. allocated(error)) then
       call remove_checkpoints(path)
       call remove_file(run_file(path, unfinished))
@@ -111,7 +126,7 @@ contains
     if (allocated(error)) call self%release()
   end subroutine open_output
 
-  !> Opens the output of a stopped run, and goes back to where its checkpoint stands.
+  !> Opens the output of a stopped run, goes back to where its checkpoint stands, and writes what waits there.
   subroutine resume(self, path, input, sim, progress, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -120,6 +135,7 @@ contains
     type(progress_t), intent(in) :: progress
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: capacities(n_tracks)
+    integer :: k
 
     if (.not. is_file(run_file(path, unfinished))) then
       call fail(error, exit_files, run_file(path, unfinished)//": is missing: without the samples written so " &
@@ -130,9 +146,15 @@ contains
     if (allocated(error)) return
     self%progress = progress
     call self%plan(input, sim, capacities)
-    call self%h5md%file%open(run_file(path, unfinished), writable=.true.)
-    call self%h5md%resume_tracks([progress%frames%count, progress%observables%count, progress%events])
-    call self%h5md%file%report(error)
+    call keep_room(self%reserve, last_room(self%h5md%track, capacities, sim%n_disks()), path, error)
+    if (.not. allocated(error)) then
+      call self%h5md%file%open(run_file(path, unfinished), writable=.true.)
+      call self%h5md%resume_tracks(progress%counts(), progress%unwritten)
+      do k = 1, n_tracks
+        if (progress%unwritten(k)%count() > 0) call self%append(k, progress%unwritten(k)%values, sim)
+      end do
+      call self%h5md%file%report(error)
+    end if
     if (allocated(error)) call self%release()
   end subroutine resume
 
@@ -199,21 +221,6 @@ contains
     capacities = [self%progress%frames%planned(rule%limits), self%progress%observables%planned(rule%limits), 0_int64]
   end subroutine plan
 
-  !> Refuses a run whose planned output does not fit onto the disk.
-  subroutine check_room(h5md, capacities, path, error)
-    type(h5md_file_t), intent(in) :: h5md
-    integer(int64), intent(in) :: capacities(n_tracks)
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(out) :: error
-    real(real64) :: needed
-
-    needed = real(max(capacities(frame_track), 2_int64), real64)*real(h5md%track(frame_track)%room(), real64) &
-      + real(max(capacities(observable_track), 2_int64), real64)*real(h5md%track(observable_track)%room(), real64)
-    if (needed > real(free_bytes(path), real64)) call fail(error, exit_files, path &
-      //": the output will have "//written(int(min(needed, 9.0e18_real64), int64))//" bytes, " &
-      //written(free_bytes(path))//" are free; choose fewer frames or make room")
-  end subroutine check_room
-
   !> Creates a file under a temporary name, with everything but the tracks.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
@@ -264,18 +271,16 @@ contains
     call self%progress%observables%take(sim)
   end subroutine write_observables
 
-  !> Writes the collisions that the log holds, and empties it.
-  subroutine write_events(self, sim, log, error)
+  !> Takes over the collisions that the log holds, and empties it; `write_what_is_due` tells of a failure.
+  subroutine write_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(event_log_t), intent(inout) :: log
-    type(error_t), allocatable, intent(out) :: error
 
     if (log%n == 0) return
     call self%append(event_track, log%record(:, :log%n), sim)
     self%progress%events = self%progress%events + log%n
     call log%clear()
-    call self%h5md%file%report(error)
   end subroutine write_events
 
   !> Appends samples to a track, in a larger file if there is no room for them in this one.
@@ -298,31 +303,46 @@ contains
     integer(int64), intent(in) :: capacities(n_tracks)
     type(simulation_t), intent(in) :: sim
     type(h5md_file_t) :: new
+    integer(int64) :: needed
 
     call self%h5md%write_buffers()
+    needed = sum(self%h5md%track%appended*self%h5md%track%room())
+    if (needed > free_bytes(self%path)) then
+      self%h5md%file%unsaved = needed
+      call self%h5md%file%check(-1, "be copied to a file of the right size")
+    end if
     if (allocated(self%h5md%file%failure)) return
     call self%create_file(new%file, sim)
     call self%h5md%replace_by(new, capacities)
   end subroutine rebuild
 
   !> Returns how far the output is when all that was written has reached the disk: a checkpoint relies on it.
+  !> After a failure, which has been reported before, what could not be written belongs to it.
   subroutine save(self, progress, error)
     class(output_t), intent(inout) :: self
     type(progress_t), intent(out) :: progress
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: counts(n_tracks)
     logical :: done
+    integer :: k
 
     progress = self%progress
     progress%spent = self%progress%spent + seconds() - self%opened
-    call self%h5md%write_buffers()
-    call self%h5md%file%report(error)
-    if (allocated(error)) return
+    if (.not. allocated(self%h5md%file%failure)) then
+      call self%h5md%write_buffers()
+      call self%h5md%file%report(error)
+      if (allocated(error)) return
+    end if
     call synchronize(run_file(self%path, unfinished), done)
     if (.not. done) call fail(error, exit_files, run_file(self%path, unfinished)//": cannot be written: "//last_problem())
+    counts = progress%counts()
+    do k = 1, n_tracks
+      progress%unwritten(k) = self%h5md%track(k)%unwritten(counts(k))
+    end do
   end subroutine save
 
   !> Ends the output of a finished run: the last samples, unused room given up, a check of the file, its final
-  !> name.
+  !> name. If that fails, a checkpoint written afterwards leads back to the moment before.
   subroutine finish(self, sim, wall_seconds, rate, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -330,52 +350,35 @@ contains
     real(real64), intent(in) :: rate              !! collisions per processor time since then [1/s]
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: part
+    type(progress_t) :: before
     logical :: moved
 
+    before = self%progress
     part = run_file(self%path, unfinished)
     if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
     call self%h5md%write_buffers()
     call self%h5md%file%report(error)
-    if (.not. allocated(error) .and. any(self%h5md%track%appended /= self%h5md%track%capacity)) then
-      call self%rebuild(self%h5md%track%appended, sim)
-      if (allocated(self%h5md%file%failure)) deallocate (self%h5md%file%failure)     ! the file is good without it
+    if (.not. allocated(error)) then
+      call self%reserve%give_up()          ! for the copy; if that fails its room is free for a checkpoint
+      if (any(self%h5md%track%appended /= self%h5md%track%capacity)) call self%rebuild(self%h5md%track%appended, sim)
+      call describe_cost(self%h5md%file, self%progress%spent + wall_seconds, rate)
+      call self%h5md%close()
+      call self%h5md%file%report(error)
     end if
-    call describe_cost(self%h5md%file, self%progress%spent + wall_seconds, rate)
-    call self%h5md%close()
-    call self%h5md%file%report(error)
-    if (.not. allocated(error)) call check_file(part, self%progress, sim, error)
+    if (.not. allocated(error)) call self%h5md%verify(error)
     if (.not. allocated(error)) then
       call synchronize(part, moved)
       if (moved) call move_file(part, self%path, moved)
       if (.not. moved) call fail(error, exit_files, part//": cannot be renamed to "//self%path//": "//last_problem())
     end if
-    if (.not. allocated(error)) call remove_checkpoints(self%path)
-    call self%release()
-  end subroutine finish
-
-  !> Reads back what shows whether the file is complete.
-  subroutine check_file(path, progress, sim, error)
-    character(len=*), intent(in) :: path
-    type(progress_t), intent(in) :: progress
-    type(simulation_t), intent(in) :: sim
-    type(error_t), allocatable, intent(out) :: error
-    type(hdf5_file_t) :: file
-    real(real64), allocatable :: time(:)
-
-    call file%open(path, writable=.false.)
-    allocate (time(progress%frames%count))
-    call file%fetch(position//time_of, size(time), time)
-    if (file%length(position//value_of) /= 2*size(time)*int(sim%n_disks(), int64)) &
-      call file%check(-1, "be read back: frames are missing")
-    if (file%length(observables_group//"total_energy"//value_of) /= progress%observables%count) &
-      call file%check(-1, "be read back: observables are missing")
-    if (.not. allocated(file%failure)) then
-      if (time(size(time)) < sim%time()) call file%check(-1, "be read back: the last frame is missing")
+    if (allocated(error)) then
+      self%progress = before
+    else
+      call remove_checkpoints(self%path)
+      call self%release()
     end if
-    call file%close()
-    call file%report(error)
-  end subroutine check_file
+  end subroutine finish
 
   !> Closes the files, finished or not, and removes the lock.
   subroutine release(self)
@@ -383,6 +386,7 @@ contains
 
     call self%h5md%write_buffers()
     call self%h5md%close()
+    call self%reserve%give_up()
     call self%lock%release()
   end subroutine release
 

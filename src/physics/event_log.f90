@@ -3,7 +3,9 @@ module event_log
   use kinds, only: int32, real64
   implicit none
   private
-  public :: event_log_t
+  public :: event_log_t, log_capacity
+
+  integer, parameter :: log_capacity = 8192     !! collisions, twice what is written at once
 
   !> A log without records is switched off. The dynamics should pause when it is full.
   type :: event_log_t

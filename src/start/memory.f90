@@ -12,6 +12,8 @@ module memory
   ! Measured with 200 000 and a million disks; a test compares them with real runs. [bytes]
   integer(int64), parameter :: per_disk = 240, per_growing_disk = 340, besides = 20000000
   integer(int64), parameter :: unlimited = huge(1_int64)
+  ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.
+  integer, parameter :: most_lines = 1000
 
 contains
 
@@ -63,12 +65,12 @@ contains
     integer(int64) :: bytes
     character(len=1024) :: line                           !! NUMBER:CONTROLLERS:PATH
     character(len=:), allocatable :: folder, name
-    integer :: unit, status, first, last, length
+    integer :: unit, status, first, last, length, k
 
     bytes = unlimited
     open (newunit=unit, file=root//"/proc/self/cgroup", status="old", action="read", iostat=status)
     if (status /= 0) return
-    do
+    do k = 1, most_lines
       read (unit, "(a)", iostat=status) line
       if (status /= 0) exit
       first = index(line, ":")
@@ -95,12 +97,12 @@ contains
     character(len=*), intent(in) :: label, path
     integer(int64) :: number
     character(len=200) :: line
-    integer :: unit, status
+    integer :: unit, status, k
 
     number = unlimited
     open (newunit=unit, file=path, status="old", action="read", iostat=status)
     if (status /= 0) return
-    do
+    do k = 1, most_lines
       read (unit, "(a)", iostat=status) line
       if (status /= 0) exit
       if (index(line, label) /= 1) cycle

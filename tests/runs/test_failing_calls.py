@@ -1,0 +1,163 @@
+"""Each system call of a run fails, once or from then on: one line, and nothing is lost."""
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from whole_runs import (
+    FILES,
+    FINISHED,
+    STOPPED,
+    USAGE,
+    committed,
+    differences,
+    is_beginning,
+    one_line,
+    write_input,
+)
+
+#: Few calls, but of every kind: frames of a planned number, observables and events of an unknown
+#: one, so that the file is rebuilt at the end, and two checkpoints.
+SMALL = """&box boundary = 'periodic', 'wall' /
+&species name = 'gas' count = 60 radius = 0.03 temperature = 1 /
+&stop events = 2 /
+&output observables_every_collisions = 2 event_log = .true. checkpoint_every = 1e-6 /
+"""
+COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
+OPTIONS = ("--force", "--resume")
+#: What the program calls, and how each call fails: once, or with + from then on.
+WAYS = {
+    "openat": ["EIO", "EIO+"],
+    "read": ["EIO", "EIO+"],
+    "pread64": ["EIO", "EIO+"],
+    "write": ["EIO", "ENOSPC+"],
+    "pwrite64": ["EIO", "ENOSPC+"],
+    "fallocate": ["ENOSPC", "EIO"],
+    "fsync": ["EIO", "EIO+", "EINVAL+"],
+    "link": ["EPERM"],
+    "rename": ["EIO", "EIO+"],
+    "unlink": ["EIO", "EIO+"],
+    "close": ["EIO", "EIO+"],
+    "ftruncate": ["EIO", "EIO+"],
+    "flock": ["ENOLCK"],
+    "newfstatat": ["EIO", "EIO+"],
+}
+
+
+@pytest.fixture(scope="module")
+def stage(program, tmp_path_factory):
+    """A folder with what must come of the run, folders to copy for each option, and their traces.
+
+    With --force an earlier result is there, with --resume a stopped run. In memory, where there is
+    a file system in memory: it is the calls that count, not the disk.
+    """
+    if not shutil.which("strace"):
+        pytest.skip("strace is not installed")
+    memory = Path("/dev/shm")
+    place = tempfile.mkdtemp(dir=memory) if os.access(memory, os.W_OK) else None
+    stage = Path(place or tmp_path_factory.mktemp("stage"))
+    for option, change, code in (
+        ("whole", [], FINISHED),
+        ("--force", ["--set", "run.seed=2"], FINISHED),
+        ("--resume", ["--set", "stop.wall_clock=1e-9"], STOPPED),
+    ):
+        folder = stage / option
+        folder.mkdir()
+        write_input(folder, SMALL)
+        run = started(program, *COMMAND, *change, folder=folder)
+        assert run.returncode == code, run.stderr
+    try:
+        for option in OPTIONS:
+            shutil.copytree(stage / option, stage / "count")
+            run = traced(program, stage / "count", option, "-e", f"trace={','.join(WAYS)}")
+            if run.returncode != FINISHED:
+                pytest.skip("strace cannot trace here: " + run.stderr.strip()[-80:])
+            (stage / "count" / "trace").rename(stage / f"trace{option}")
+            shutil.rmtree(stage / "count")
+        yield stage
+    finally:
+        shutil.rmtree(stage)
+
+
+def started(*command, folder=None):
+    """The run, in a folder."""
+    options = {"capture_output": True, "text": True, "timeout": 20, "check": False}
+    return subprocess.run([*command], cwd=folder, **options)
+
+
+def traced(program, folder, option, *what):
+    """The run under strace, which writes to the file `trace`."""
+    strace = ["strace", "-f", "--seccomp-bpf", "-y", "-o", "trace", *what]
+    return started(*strace, program, *COMMAND, option, folder=folder)
+
+
+def positions(stage, option, call) -> range:
+    """The numbers of the calls of one kind from the first on that has to do with the input."""
+    lines = (stage / f"trace{option}").read_text().splitlines()
+    begin = next(k for k, line in enumerate(lines) if "gas.nml" in line)
+    calls = [k for k, line in enumerate(lines) if re.match(rf"\d+ +{call}\(", line)]
+    return range(sum(k < begin for k in calls) + 1, len(calls) + 1)
+
+
+def outcome(program, stage, option, call, inject) -> str:
+    """What is wrong after a run in which calls failed; empty if nothing is."""
+    folder = stage / f"{option} {inject}"
+    shutil.copytree(stage / option, folder)
+    try:
+        check_outcome(program, stage, folder, option, call, inject)
+    except (AssertionError, subprocess.TimeoutExpired, OSError, KeyError) as problem:
+        return f"{option} {inject}: {problem}"
+    finally:
+        shutil.rmtree(folder)
+    return ""
+
+
+def same_results(stage, result) -> bool:
+    """A resumed run may have been stopped by another limit of the wall clock."""
+    found = differences(stage / "whole" / "gas.h5", result)
+    return [name for name in found if "wall_clock" not in name and "overrides" not in name] == []
+
+
+def check_outcome(program, stage, folder, option, call, inject):
+    earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
+    run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
+    assert run.returncode in (FINISHED, USAGE, FILES), (run.returncode, run.stderr)
+    result, part = folder / "gas.h5", folder / "gas.h5.part"
+    if run.returncode == FINISHED:
+        assert run.stderr == ""
+        assert same_results(stage, result)
+        return
+    if call != "write":
+        one_line(run)
+    if call == "write" and result.exists() and not part.exists():
+        return  # the summary had no readers
+    assert not result.exists() or result.read_bytes() == earlier, "the earlier result is gone"
+    if part.exists():
+        found = committed(part)
+        assert is_beginning(found, committed(stage / "whole" / "gas.h5")) == []
+    resumable = (folder / "gas.chk.h5").exists()
+    assert resumable or option == "--force", "the checkpoint is gone"
+    again = started(program, *COMMAND, "--resume" if resumable else "--force", folder=folder)
+    assert again.returncode == FINISHED, ("again", run.stderr, again.stderr)
+    assert same_results(stage, result)
+
+
+@pytest.mark.parametrize("call", WAYS)
+@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
+def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step):
+    cases = [
+        (program, stage, option, call, f"inject={call}:error={way[0]}:when={position}{way[1]}")
+        for option in OPTIONS
+        for position in positions(stage, option, call)[::step]
+        for way in (way.partition("+")[:2] for way in WAYS[call])
+    ]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        found = [problem for problem in pool.map(lambda case: outcome(*case), cases) if problem]
+    print(len(cases), "cases")
+    assert not found, "\n".join(found)
