@@ -165,7 +165,11 @@ run_member() {
     arguments+=(--set "${rest%% --set *}")
     if [[ $rest == *' --set '* ]]; then rest="--set ${rest#* --set }"; else rest=; fi
   done
-  if [[ -e $base.chk.h5 ]]; then arguments+=(--resume); fi
+  if [[ -e $base.chk.h5 ]]; then
+    arguments+=(--resume)
+  elif [[ -e $base.h5.part ]]; then
+    arguments+=(--force) # killed, or broke off: its frames come again
+  fi
   "$program" "${arguments[@]}" >"$base.log" 2>&1 </dev/null {events}>&- &
   child=$!
   while :; do # `wait` also ends when a signal comes

@@ -11,8 +11,16 @@ module system
   public :: watch_signals, stop_requested, checkpoint_requests
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
+  public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
+  public :: file_size, read_start, write_start
   public :: fill_standard_streams, print_text
+
+  !> What a path can name.
+  character(len=18), parameter :: kinds_of_files(*) = [character(len=18) :: "nothing", "a file", "a folder", &
+    "a symbolic link", "a pipe or a device"]
+
+  !> Answers of `c_lock` other than a descriptor.
+  integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: there are no locks here
 
   !> A lock on a run's output. The kernel drops it when the process ends, however it ends.
   type :: lock_t
@@ -89,6 +97,35 @@ module system
       integer(c_int64_t) :: bytes
     end function c_free_bytes
 
+    function c_file_size(path) bind(C, name="system_file_size") result(bytes)
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t) :: bytes
+    end function c_file_size
+
+    function c_read_start(path, bytes, count) bind(C, name="system_read_start") result(n)
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      character(kind=c_char), intent(out) :: bytes(*)
+      integer(c_int64_t), value :: count
+      integer(c_int64_t) :: n
+    end function c_read_start
+
+    function c_write_start(path, bytes, count) bind(C, name="system_write_start") result(status)
+      import :: c_char, c_int, c_int64_t
+      character(kind=c_char), intent(in) :: path(*), bytes(*)
+      integer(c_int64_t), value :: count
+      integer(c_int) :: status
+    end function c_write_start
+
+    subroutine c_opening_problem(path, writable, text, size) bind(C, name="system_opening_problem")
+      import :: c_bool, c_char, c_size_t
+      character(kind=c_char), intent(in) :: path(*)
+      logical(c_bool), value :: writable
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_size_t), value :: size
+    end subroutine c_opening_problem
+
     subroutine c_unlock(path, descriptor) bind(C, name="system_unlock")
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
@@ -124,12 +161,11 @@ module system
   procedure(question), bind(C, name="system_stop_requested") :: stop_requested        !! by a signal
   procedure(question), bind(C, name="system_talks_to_terminal") :: talks_to_terminal  !! on standard error
 
-  procedure(path_call), bind(C, name="system_try_to_read") :: c_try_to_read
-  procedure(path_call), bind(C, name="system_try_to_update") :: c_try_to_update
   procedure(path_call), bind(C, name="system_synchronize") :: c_synchronize
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder
   procedure(path_call), bind(C, name="system_make_folder") :: c_make_folder
-  procedure(path_call), bind(C, name="system_lock") :: c_lock   !! returns a descriptor, -1 (taken), -2 (no locks)
+  procedure(path_call), bind(C, name="system_what_is") :: c_what_is   !! returns an index of `kinds_of_files`
+  procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or a number above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
   procedure(naming_call), bind(C, name="rename") :: c_rename
@@ -214,21 +250,49 @@ contains
     done = c_synchronize(path//c_null_char) == 0
   end subroutine synchronize
 
-  !> Why a file cannot be opened, in the system's words; empty if it can.
+  !> Why a file cannot be opened; empty if it can. A file is to be written only if it has no other name, by a link.
   function opening_problem(path, writable) result(text)
     character(len=*), intent(in) :: path
     logical, intent(in) :: writable
     character(len=:), allocatable :: text
-    integer(c_int) :: status
+    character(len=256, kind=c_char) :: buffer
 
-    if (writable) then
-      status = c_try_to_update(path//c_null_char)
-    else
-      status = c_try_to_read(path//c_null_char)
-    end if
-    text = ""
-    if (status /= 0) text = last_problem()
+    call c_opening_problem(path//c_null_char, logical(writable, c_bool), buffer, len(buffer, c_size_t))
+    text = buffer(:index(buffer, c_null_char) - 1)
   end function opening_problem
+
+  !> What a path names, in words. Links are not followed.
+  function what_is(path) result(kind)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: kind
+
+    kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
+  end function what_is
+
+  !> Size of a file; 0 for pipes and devices, -1 if there is none. [bytes]
+  function file_size(path) result(bytes)
+    character(len=*), intent(in) :: path
+    integer(int64) :: bytes
+
+    bytes = c_file_size(path//c_null_char)
+  end function file_size
+
+  !> Reads the first bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
+  subroutine read_start(path, bytes, n)
+    character(len=*), intent(in) :: path
+    character(len=*), intent(out) :: bytes
+    integer(int64), intent(out) :: n                   !! how many there are, at most len(bytes); -1: it cannot be read
+
+    n = c_read_start(path//c_null_char, bytes, len(bytes, int64))
+  end subroutine read_start
+
+  !> Writes over the first bytes of a regular file that has no other name.
+  subroutine write_start(path, bytes, done)
+    character(len=*), intent(in) :: path, bytes
+    logical, intent(out) :: done
+
+    done = c_write_start(path//c_null_char, bytes, len(bytes, int64)) == 0
+  end subroutine write_start
 
   !> Whether a path leads to a folder.
   function is_folder(path) result(yes)
@@ -264,16 +328,26 @@ contains
     text = buffer(:index(buffer, c_null_char) - 1)
   end function last_problem
 
-  !> Takes the lock file `path` for this process, or reports that another process holds it. Where the file
-  !> system has no locks the run goes on without one.
-  subroutine acquire(self, path, taken)
+  !> Takes the lock file `path` for this process, or says why it cannot. Where the file system has no locks the run
+  !> goes on without one.
+  subroutine acquire(self, path, problem)
     class(lock_t), intent(inout) :: self
     character(len=*), intent(in) :: path
-    logical, intent(out) :: taken                      !! by another process
+    character(len=:), allocatable, intent(out) :: problem    !! empty if there is none
 
     self%path = path
     self%descriptor = c_lock(path//c_null_char)
-    taken = self%descriptor == -1
+    select case (self%descriptor)
+    case (taken)
+      problem = "another run, perhaps of another user, is writing it; its lock is "//path
+    case (foreign)
+      problem = "cannot be locked: "//path//" is not the lock of a run, which is an empty file without a second name; " &
+        //"remove it, or choose another output"
+    case (failed)
+      problem = "cannot be created: "//path//": "//last_problem()
+    case default
+      problem = ""
+    end select
   end subroutine acquire
 
   !> Removes the lock file and gives up the lock, if this process holds it.

@@ -107,10 +107,10 @@ void system_name_host(char *text, size_t size)
 
 /* --- Files --- */
 
-/* The one place where files are opened by a name that the user chose. */
+/* The one place where files are opened by a name that the user chose. Never waits for the other end of a pipe. */
 static int open_file(const char *path, int flags)
 {
-    return open(path, flags | O_CLOEXEC, 0644);
+    return open(path, flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
 }
 
 /* Closes a file, keeps errno, and returns the status that the caller is to return. */
@@ -122,27 +122,92 @@ static int closed(int descriptor, int status)
     return status;
 }
 
-/* Whether a file can be opened with these flags: 0 or -1. */
-static int try_to_open(const char *path, int flags)
+/* Opens a regular file that exists. One that is to be written must have no other name, by a symbolic or hard link: what
+   is written there would change a file that is not the run's. Returns -1 and the reason if it cannot. */
+static int open_regular(const char *path, int flags, const char **problem)
 {
-    const int descriptor = open_file(path, flags);
-    return descriptor < 0 ? -1 : closed(descriptor, 0);
+    struct stat file;
+    const bool writing = flags != O_RDONLY;
+    const int descriptor = open_file(path, writing ? flags | O_NOFOLLOW : flags);
+    *problem = NULL;
+    if (descriptor < 0 || fstat(descriptor, &file) != 0)
+        *problem = writing && errno == ELOOP ? "it is a symbolic link" : strerror(errno);
+    else if (S_ISDIR(file.st_mode))
+        *problem = strerror(EISDIR);
+    else if (!S_ISREG(file.st_mode))
+        *problem = "it is a pipe or a device, not a file";
+    else if (writing && file.st_nlink > 1)
+        *problem = "it has a second name, by a hard link";
+    if (descriptor < 0 || !*problem) return descriptor;
+    close(descriptor);
+    errno = EINVAL;
+    return -1;
 }
 
-int system_try_to_read(const char *path) { return try_to_open(path, O_RDONLY); }
-
-int system_try_to_update(const char *path) { return try_to_open(path, O_RDWR); }
-
-int system_synchronize(const char *path)
+/* Why a file cannot be read, or written; empty if it can. */
+void system_opening_problem(const char *path, bool writable, char *text, size_t size)
 {
-    const int descriptor = open_file(path, O_RDONLY);
-    return descriptor < 0 ? -1 : closed(descriptor, fsync(descriptor));
+    const char *problem;
+    const int descriptor = open_regular(path, writable ? O_RDWR : O_RDONLY, &problem);
+    if (descriptor >= 0) close(descriptor);
+    strncpy(text, problem ? problem : "", size - 1);
+    text[size - 1] = '\0';
+}
+
+/* Reads the first bytes of a file; returns how many there are, at most `count`. */
+int64_t system_read_start(const char *path, char *bytes, int64_t count)
+{
+    const char *problem;
+    const int descriptor = open_regular(path, O_RDONLY, &problem);
+    int64_t total = 0, more = 1;
+    if (descriptor < 0) return -1;
+    while (more > 0 && total < count) {
+        do more = read(descriptor, bytes + total, (size_t)(count - total));
+        while (more < 0 && errno == EINTR);
+        total += more;
+    }
+    return closed(descriptor, 0) + (more < 0 ? -1 : total);
+}
+
+/* Writes over the first bytes of a file. */
+int system_write_start(const char *path, const char *bytes, int64_t count)
+{
+    const char *problem;
+    const int descriptor = open_regular(path, O_WRONLY, &problem);
+    if (descriptor < 0) return -1;
+    if (write(descriptor, bytes, (size_t)count) != count) return closed(descriptor, -1);
+    return close(descriptor);
 }
 
 int system_find_folder(const char *path)
 {
     struct stat found;
     return stat(path, &found) == 0 && S_ISDIR(found.st_mode) ? 0 : -1;
+}
+
+/* What a path names, as numbered in system.f90. Links are not followed. */
+int system_what_is(const char *path)
+{
+    enum { nothing = 1, file, folder, symbolic_link, pipe_or_device };
+    struct stat found;
+    if (lstat(path, &found) != 0) return nothing;
+    return S_ISREG(found.st_mode) ? file : S_ISDIR(found.st_mode) ? folder
+         : S_ISLNK(found.st_mode) ? symbolic_link : pipe_or_device;
+}
+
+/* 0 for pipes and devices, -1 if there is no file. */
+int64_t system_file_size(const char *path)
+{
+    struct stat found;
+    return stat(path, &found) == 0 ? (int64_t)found.st_size : -1;
+}
+
+/* Some file systems cannot synchronize a folder (EINVAL), and one that takes files need not be readable. */
+int system_synchronize(const char *path)
+{
+    const int descriptor = open_file(path, O_RDONLY);
+    if (descriptor < 0) return errno == EACCES && system_find_folder(path) == 0 ? 0 : -1;
+    return closed(descriptor, fsync(descriptor) == 0 || errno == EINVAL ? 0 : -1);
 }
 
 /* Succeeds also if another process was faster. */
@@ -173,27 +238,39 @@ int system_reserve(const char *path, int64_t bytes)
 
 void system_release(int descriptor) { close(descriptor); }
 
-/* Returns a descriptor that holds the lock, -1 if another process has it, or -2 where there are no locks. */
+/* Whether a path is the name of an open file. */
+static bool is_name_of(const char *path, const struct stat *file)
+{
+    struct stat named;
+    return lstat(path, &named) == 0 && named.st_dev == file->st_dev && named.st_ino == file->st_ino;
+}
+
+/* Returns a descriptor that holds the lock, or one of the numbers below, which system.f90 knows. A lock file is empty
+   and has one name; anything else is somebody's. One that this user may not write is that of another user's run. */
 int system_lock(const char *path)
 {
-    const int taken = -1, no_locks = -2;
+    enum { taken = -1, without_locks = -2, foreign = -3, failed = -4 };
     for (int trial = 0; trial < 100; trial++) {
-        struct stat locked, named;
-        const int descriptor = open_file(path, O_RDWR | O_CREAT);
-        if (descriptor < 0) return no_locks;
+        struct stat file = {0};
+        const int descriptor = open_file(path, O_RDWR | O_CREAT | O_NOFOLLOW), reason = errno;
+        const bool exists = (descriptor < 0 ? lstat(path, &file) : fstat(descriptor, &file)) == 0;
+        if (exists && (!S_ISREG(file.st_mode) || file.st_nlink > 1 || file.st_size > 0))
+            return descriptor < 0 ? foreign : closed(descriptor, foreign);
+        errno = reason;
+        if (descriptor < 0) return exists && errno == EACCES ? taken : failed;
         if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
-            return closed(descriptor, errno == EWOULDBLOCK ? taken : no_locks);
+            return closed(descriptor, errno == EWOULDBLOCK ? taken : without_locks);
         /* The previous holder may have removed the file meanwhile. A lock on a file without a name is worth nothing. */
-        if (fstat(descriptor, &locked) == 0 && stat(path, &named) == 0 && locked.st_dev == named.st_dev &&
-            locked.st_ino == named.st_ino)
-            return descriptor;
+        if (is_name_of(path, &file)) return descriptor;
         close(descriptor);
     }
     return taken;
 }
 
+/* Removes the lock file, unless the name belongs to another file by now. */
 void system_unlock(const char *path, int descriptor)
 {
-    unlink(path);
+    struct stat file;
+    if (fstat(descriptor, &file) == 0 && is_name_of(path, &file)) unlink(path);
     close(descriptor);
 }

@@ -139,9 +139,10 @@ contains
 
     self%path = path
     self%final_path = path
-    reason = opening_problem(path, writable)
-    if (reason == "") reason = "it is damaged, or not an HDF5 file"
     call prepare(self, access, status)
+    reason = opening_problem(path, writable)
+    if (reason /= "") status = -1
+    if (reason == "") reason = "it is damaged, or not an HDF5 file"
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
     call self%check(status, "be "//trim(merge("written", "read   ", writable))//": "//reason)
     call h5pclose_f(access, closed)

@@ -1,11 +1,14 @@
-!> The files of a run, all named after its output OUT.h5.
+!> The files of a run, all named after its output OUT.h5, and what of it may be replaced or removed: only what a run
+!> has written, and of that nothing that somebody may still want.
 module run_files
-  use system, only: remove_file
+  use errors, only: error_t, exit_files, fail
+  use kinds, only: int64
+  use system, only: read_start, remove_file, what_is
   implicit none
   private
-  public :: run_file, is_file, is_hdf5_file, remove_checkpoints
+  public :: run_file, output_of, is_file, check_places, check_start, remove_checkpoints, remove_temporaries
 
-  ! What the name of a file ends with. An ending with .h5 replaces that of the output.
+  ! What the name of a file ends with. An ending with .h5 replaces that of the output; an output without has none.
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! the output while it is being written
     unfinished_new = ".part_new", &               !! the same until all that is written once is in it
@@ -13,6 +16,12 @@ module run_files
     current_checkpoint = ".chk.h5", &
     previous_checkpoint = ".chk_prev.h5", &
     new_checkpoint = ".chk_new.h5"                !! while it is being written
+  character(len=12), parameter :: endings(*) = [character(len=12) :: "", unfinished, unfinished_new, lock, &
+    current_checkpoint, previous_checkpoint, new_checkpoint]
+
+  ! What such files begin with; zeros as long as the rest of the file is not complete.
+  character(len=8), parameter :: hdf5 = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+  character(len=8), parameter :: free = repeat(achar(0), 8), sealed = "ricochet"
 
 contains
 
@@ -21,10 +30,83 @@ contains
     character(len=*), intent(in) :: output        !! path of the output
     character(len=*), intent(in) :: ending        !! one of the names above
     character(len=:), allocatable :: path
+    integer :: kept
 
     path = output//ending
-    if (index(ending//"|", ".h5|") > 0 .and. index(output//"|", ".h5|") > 1) path = output(:len(output) - 3)//ending
+    kept = index(ending//"|", ".h5|") - 1
+    if (kept > 0) path = output//ending(:kept)
+    if (kept > 0 .and. index(output//"|", ".h5|") > 1) path = output(:len(output) - 3)//ending
   end function run_file
+
+  !> The output of the run that has a file of this name, not being its output; empty if there can be none.
+  pure function output_of(path) result(output)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: output
+    integer :: k, last
+
+    do k = 2, size(endings)
+      do last = len(path) - len_trim(endings(k)), len(path) - len_trim(endings(k)) + 3, 3
+        if (last < 1) cycle
+        output = path(:last)//".h5"
+        if (run_file(output, trim(endings(k))) == path) return
+        output = path(:last)
+        if (run_file(output, trim(endings(k))) == path) return
+      end do
+    end do
+    output = ""
+  end function output_of
+
+  !> Fails if something that no run has written stands where the run is to write.
+  subroutine check_places(output, error)
+    character(len=*), intent(in) :: output        !! path of the output
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: path, what
+    logical :: ours
+    integer :: k
+
+    do k = 1, size(endings)
+      path = run_file(output, trim(endings(k)))
+      what = what_is(path)
+      if (what == "nothing" .or. endings(k) == lock) cycle
+      if (what == "a file") then
+        ours = begins(path, [merge(hdf5, sealed, index(endings(k), ".chk") == 0), free])
+        if (ours) cycle
+        what = "not a file of a run"
+      end if
+      call fail(error, exit_files, path//": exists already and is "//what//"; it is left as it is; remove it, " &
+        //"or choose another output with -o")
+      return
+    end do
+  end subroutine check_places
+
+  !> Whether a file is empty, or begins in one of several ways.
+  function begins(path, ways) result(yes)
+    character(len=*), intent(in) :: path
+    character(len=8), intent(in) :: ways(:)
+    logical :: yes
+    character(len=8) :: first
+    integer(int64) :: n
+
+    call read_start(path, first, n)
+    yes = n == 0 .or. (n == 8 .and. any(ways == first))
+  end function begins
+
+  !> Fails if a new run would replace an output, or delete what another run has left: that needs --force.
+  subroutine check_start(output, error)
+    character(len=*), intent(in) :: output        !! path of the output
+    type(error_t), allocatable, intent(out) :: error
+
+    if (is_file(output)) then
+      call fail(error, exit_files, output//": exists already; --force replaces it when the run has finished, " &
+        //"-o writes elsewhere")
+    else if (is_file(run_file(output, current_checkpoint))) then
+      call fail(error, exit_files, run_file(output, current_checkpoint)//": exists already, from a run that was " &
+        //"stopped; --resume goes on, --force starts over")
+    else if (is_file(run_file(output, unfinished))) then
+      call fail(error, exit_files, run_file(output, unfinished)//": exists already, from a run that ended without a " &
+        //"checkpoint; --force deletes it and starts over, -o writes elsewhere")
+    end if
+  end subroutine check_start
 
   !> Removes all checkpoints of an output.
   subroutine remove_checkpoints(output)
@@ -35,27 +117,20 @@ contains
     call remove_file(run_file(output, new_checkpoint))
   end subroutine remove_checkpoints
 
-  !> Whether the file is in HDF5 format, by its first bytes: nothing else is ever replaced.
-  function is_hdf5_file(path) result(yes)
-    character(len=*), intent(in) :: path
-    logical :: yes
-    character(len=8) :: first
-    integer :: unit, status
+  !> Removes what a run that was killed has left half made.
+  subroutine remove_temporaries(output)
+    character(len=*), intent(in) :: output        !! path of the output
 
-    yes = .false.
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=status)
-    if (status /= 0) return
-    read (unit, iostat=status) first
-    if (status == 0) yes = first == char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
-    close (unit)
-  end function is_hdf5_file
+    call remove_file(run_file(output, unfinished_new))
+    call remove_file(run_file(output, new_checkpoint))
+  end subroutine remove_temporaries
 
   !> Whether there is a file of this name.
   function is_file(path) result(yes)
     character(len=*), intent(in) :: path
     logical :: yes
 
-    inquire (file=path, exist=yes)
+    yes = what_is(path) /= "nothing"
   end function is_file
 
 end module run_files

@@ -4,7 +4,7 @@ module sealed_file
   use, intrinsic :: iso_c_binding, only: c_int, c_int8_t, c_long
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int64
-  use system, only: is_folder
+  use system, only: what_is, write_start
   implicit none
   private
   public :: seal, flaw_of, checksum
@@ -37,17 +37,11 @@ contains
     character(len=*), intent(in) :: path, title
     logical, intent(out) :: done
     character(len=header_length) :: header, required
-    integer :: unit, status
+    integer :: status
 
     call read_file(path, title, header, required, status)
-    if (status == 0) open (newunit=unit, file=path, access="stream", form="unformatted", action="readwrite", &
-      status="old", iostat=status)
     done = status == 0
-    if (.not. done) return
-    write (unit, pos=1, iostat=status) required
-    done = status == 0
-    close (unit, iostat=status)
-    done = done .and. status == 0
+    if (done) call write_start(path, required, done)
     if (done) done = flaw_of(path, title) == ""
   end subroutine seal
 
@@ -58,11 +52,14 @@ contains
     character(len=header_length) :: header, required
     integer :: status
 
+    flaw = what_is(path)
+    if (flaw /= "a file" .and. flaw /= "nothing") then
+      flaw = "is "//flaw
+      return
+    end if
     call read_file(path, title, header, required, status)
     flaw = ""
-    if (is_folder(path)) then
-      flaw = "is a folder"
-    else if (status /= 0) then
+    if (status /= 0) then
       flaw = "cannot be read"
     else if (header == "") then
       flaw = "is empty"

@@ -5,6 +5,7 @@ module command_line
   use errors, only: error_t, exit_usage, fail
   use hdf5_handle, only: hdf5_version
   use parameters, only: defaults_text, explain
+  use run_files, only: output_of
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t
   use version, only: program_version
@@ -21,7 +22,7 @@ module command_line
     logical :: resume = .false.
     logical :: check = .false.                     !! validate only
     logical :: quiet = .false.
-    logical :: force = .false.                     !! overwrite a finished output file
+    logical :: force = .false.                     !! replace a finished output, delete an unfinished one
   end type command_t
 
   character(len=16), parameter :: switches(*) = [character(len=16) :: "--resume", "--check", "--quiet", "--force", &
@@ -81,6 +82,9 @@ contains
       call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
     end if
     if (command%output == "") command%output = default_output(command%input)
+    if (.not. allocated(error) .and. output_of(command%output) /= "") call fail(error, exit_usage, "the output " &
+      //shown(command%output)//" would have a name that is kept for files of the run with the output " &
+      //shown(output_of(command%output))//"; choose another with -o")
   end subroutine parse_arguments
 
   !> Takes one option, and the next argument if it is the option's value.
@@ -224,7 +228,8 @@ contains
       "                      restores the default"//eol// &
       "  --resume            continue from the checkpoint of a stopped run"//eol// &
       "  --check             read and check everything, run nothing"//eol// &
-      "  --force             overwrite a finished output file"//eol// &
+      "  --force             start over: delete FILE.part and the checkpoints of a run"//eol// &
+      "                      that did not finish; at the end, replace a finished FILE"//eol// &
       "  --quiet             no progress on stderr"//eol// &
       "  --print-defaults    an input file with every variable and its default"//eol// &
       "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &

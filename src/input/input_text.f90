@@ -2,7 +2,7 @@
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
-  use system, only: is_folder
+  use system, only: file_size, is_folder, opening_problem, read_start
   use texts, only: written
   implicit none
   private
@@ -13,22 +13,20 @@ module input_text
 
 contains
 
-  !> The bytes of a regular file. Nothing is opened before its size is known: opening a pipe hangs.
+  !> The bytes of a regular file.
   subroutine read_text(path, text, error)
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    character(len=200) :: reason
-    integer(int64) :: bytes
-    integer :: unit, status, odd
-    logical :: exists
+    integer(int64) :: bytes, n
+    integer :: odd
 
-    inquire (file=path, exist=exists, size=bytes)
-    if (.not. exists) then
+    bytes = file_size(path)
+    if (bytes < 0) then
       call fail(error, exit_files, path//": there is no such file")
     else if (is_folder(path)) then
       call fail(error, exit_files, path//": is a folder, not an input file")
-    else if (bytes <= 0) then
+    else if (bytes == 0) then
       call fail(error, exit_usage, path//": is empty, or a pipe or a device instead of a file")
     else if (bytes > largest_file) then
       call fail(error, exit_usage, path//": has "//written(bytes)// &
@@ -36,14 +34,12 @@ contains
     end if
     if (allocated(error)) return
     allocate (character(len=bytes) :: text)
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", &
-      status="old", iostat=status, iomsg=reason)
-    if (status == 0) read (unit, iostat=status, iomsg=reason) text
-    if (status /= 0) then
-      call fail(error, exit_files, path//": cannot be read: "//trim(reason))
+    call read_start(path, text, n)
+    if (n < 0) then
+      call fail(error, exit_files, path//": cannot be read: "//opening_problem(path, writable=.false.))
       return
     end if
-    close (unit)
+    text = text(:n)
     odd = first_odd_byte(text)
     if (odd > 0) call fail(error, exit_usage, path//": is not a text file: byte "//written(odd)// &
       " is a control character, code "//written(iachar(text(odd:odd))))

@@ -15,7 +15,7 @@ module checkpoint
   use hdf5_objects, only: hdf5_file_t
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
-  use run_files, only: current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
+  use run_files, only: check_places, current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
   use run_input, only: run_input_t
   use sample_track, only: samples_t
   use sealed_file, only: checksum, flaw_of, seal
@@ -62,7 +62,6 @@ contains
     call output%save(progress, error)
     if (.not. allocated(error)) call check_room(current, sim%n_disks(), error)
     if (allocated(error)) return
-    call remove_file(new)
     file%writing = .true.
     call file%hdf5%create(new, final_path=current, reserved=reserved)
     call file%hdf5%put("program", program())
@@ -153,10 +152,14 @@ contains
   function advice(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: advice
+    type(error_t), allocatable :: foreign
 
+    call check_places(path, foreign)
     advice = run_file(path, previous_checkpoint)
     if (flaw_of(advice, title) == "") then
       advice = "the previous one is good: give "//advice//" its name to go on from there"
+    else if (allocated(foreign)) then
+      advice = "remove it; then --force instead of --resume starts over"
     else
       advice = "--force instead of --resume starts over"
     end if

@@ -12,7 +12,7 @@ module output
   use hdf5_objects, only: hdf5_file_t
   use observables, only: observed
   use run_description, only: describe_cost, describe_run
-  use run_files, only: current_checkpoint, is_file, is_hdf5_file, lock, remove_checkpoints, run_file, &
+  use run_files, only: check_places, check_start, is_file, lock, remove_checkpoints, remove_temporaries, run_file, &
     unfinished, unfinished_new
   use run_input, only: run_input_t
   use samples, only: event_series, frame_sample, frame_series, observable_sample, observable_series
@@ -47,6 +47,7 @@ module output
     type(progress_t) :: progress
     real(real64), private :: opened = 0.0_real64  !! by the clock of `seconds` [s]
     character(len=:), allocatable :: path         !! of the finished file
+    logical, private :: replaces = .false.        !! a finished file that was there at the start
     type(run_input_t) :: input                    !! described in the file
     type(h5md_file_t), private :: h5md
     type(lock_t), private :: lock
@@ -103,7 +104,7 @@ contains
 
     call self%claim(path, error)
     if (allocated(error)) return
-    call check_path(path, force, error)
+    if (.not. force) call check_start(path, error)
     if (.not. allocated(error)) then
       self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
@@ -158,12 +159,13 @@ contains
     if (allocated(error)) call self%release()
   end subroutine resume
 
-  !> Makes the folders, and takes the lock that keeps other runs from this output.
+  !> Makes the folders, takes the lock that keeps other runs from this output, and looks at what else is there.
   subroutine claim(self, path, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    logical :: made, taken
+    character(len=:), allocatable :: problem
+    logical :: made
 
     self%path = path
     self%opened = seconds()
@@ -173,32 +175,15 @@ contains
     else if (is_folder(path)) then
       call fail(error, exit_files, path//": is a folder; the output must be a file")
     else
-      call self%lock%acquire(run_file(path, lock), taken)
-      if (taken) call fail(error, exit_files, path//": another run is writing it; its lock is "//run_file(path, lock))
+      call self%lock%acquire(run_file(path, lock), problem)
+      if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
+    if (allocated(error)) return
+    call check_places(path, error)
+    if (.not. allocated(error)) call remove_temporaries(path)
+    if (allocated(error)) call self%release()
+    self%replaces = is_file(path)
   end subroutine claim
-
-  !> Refuses to overwrite foreign files, and results without --force.
-  subroutine check_path(path, force, error)
-    character(len=*), intent(in) :: path
-    logical, intent(in) :: force
-    type(error_t), allocatable, intent(out) :: error
-    logical :: exists, foreign
-
-    exists = is_file(path)
-    foreign = exists
-    if (exists) foreign = .not. is_hdf5_file(path)
-    if (foreign) then
-      call fail(error, exit_files, path//": exists already and is not the output of a run; it is left as it is; " &
-        //"choose another name")
-    else if (exists .and. .not. force) then
-      call fail(error, exit_files, path//": exists already, from a finished run; --force replaces it, "// &
-        "-o writes elsewhere")
-    else if (is_file(run_file(path, current_checkpoint)) .and. .not. force) then
-      call fail(error, exit_files, run_file(path, current_checkpoint)//": exists already, from a run that was " &
-        //"stopped; --resume goes on, --force starts over")
-    end if
-  end subroutine check_path
 
   !> Sets up the tracks, and says how many samples of each are planned.
   subroutine plan(self, input, sim, capacities)
@@ -227,7 +212,6 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
 
-    call remove_file(run_file(self%path, unfinished_new))
     call file%create(run_file(self%path, unfinished_new), final_path=run_file(self%path, unfinished))
     call describe_run(file, self%input, sim)
   end subroutine create_file
@@ -367,6 +351,10 @@ contains
       call self%h5md%file%report(error)
     end if
     if (.not. allocated(error)) call self%h5md%verify(error)
+    if (.not. (allocated(error) .or. self%replaces)) then
+      if (is_file(self%path)) call fail(error, exit_files, self%path//": has been made by another program during the " &
+        //"run; it is left as it is, and the results are in "//part)
+    end if
     if (.not. allocated(error)) then
       call synchronize(part, moved)
       if (moved) call move_file(part, self%path, moved)

@@ -5,6 +5,7 @@ module position_file
   use errors, only: error_t, exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
   use input_values, only: read_real
+  use system, only: opening_problem
   use texts, only: shown, written
   implicit none
   private
@@ -27,9 +28,13 @@ contains
     character(len=:), allocatable :: problem
     integer :: unit, status, number, n, before
 
-    open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
-    if (status /= 0) then
-      call fail(error, exit_files, path//": "//trim(reason))
+    problem = opening_problem(path, writable=.false.)
+    if (problem == "") then
+      open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
+      if (status /= 0) problem = trim(reason)
+    end if
+    if (problem /= "") then
+      call fail(error, exit_files, path//": cannot be read: "//problem)
       return
     end if
     allocate (table(n_columns, count), lines(count))

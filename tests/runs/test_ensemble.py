@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from whole_runs import MIXTURE, differences, wait_for, write_input
+from whole_runs import MIXTURE, differences, frames_in, wait_for, write_input
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
@@ -322,6 +322,20 @@ def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
     wait_for(lambda: members_in(tmp_path / "rough") == [])
     assert finish(real("rough", "-j", "2")) == 0
     assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
+
+
+def test_a_member_killed_without_a_checkpoint_is_made_anew(real, tmp_path):
+    def start():
+        return real("rough", "--set", "output.checkpoint_every=", members=("--seeds", "1"))
+
+    part = tmp_path / "rough" / "seed_1.h5.part"
+    launcher = start()
+    wait_for(lambda: frames_in(part) > 5)
+    for process in members_in(tmp_path / "rough"):
+        os.kill(process, signal.SIGKILL)
+    assert finish(launcher) == 1
+    assert part.exists() and not list(tmp_path.glob("rough/*.chk.h5"))
+    assert finish(start()) == 0
 
 
 def test_members_depend_neither_on_order_nor_on_jobs_nor_on_company(real, ricochet, tmp_path):

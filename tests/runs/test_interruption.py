@@ -61,8 +61,8 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
     whole = committed(tmp_path / "whole.h5")
     part, rng, killed = tmp_path / "gas.h5.part", random.Random(tries), 0
     for _ in range(tries):
-        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
-        process = started("gas.nml", "-o", "gas.h5", "--quiet", *resume)
+        again = "--resume" if (tmp_path / "gas.chk.h5").exists() else "--force"
+        process = started("gas.nml", "-o", "gas.h5", "--quiet", again)
         time.sleep(rng.uniform(0, 0.7 * duration))
         process.kill()
         message = process.communicate()[1]
@@ -78,8 +78,8 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
             if shutil.which("h5dump"):
                 assert frames_by_h5dump(part) == len(found["particles/disks/position/time"])
     assert killed > tries / 4
-    resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
-    assert ricochet("gas.nml", "-o", "gas.h5", *resume).returncode == FINISHED
+    again = "--resume" if (tmp_path / "gas.chk.h5").exists() else "--force"
+    assert ricochet("gas.nml", "-o", "gas.h5", again).returncode == FINISHED
     assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
 
 

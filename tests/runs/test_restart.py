@@ -243,7 +243,9 @@ def test_what_is_no_checkpoint_is_called_what_it_is(ricochet, tmp_path, stopped)
     earlier.unlink()
     run = ricochet(*stopped, "--resume")
     assert run.returncode == USAGE
-    assert one_line(run) == "gas.chk.h5: is a folder; --force instead of --resume starts over"
+    assert one_line(run) == (
+        "gas.chk.h5: is a folder; remove it; then --force instead of --resume starts over"
+    )
 
 
 def test_the_checkpoint_before_is_kept_and_is_as_good(ricochet, tmp_path):
