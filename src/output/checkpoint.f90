@@ -298,7 +298,8 @@ contains
     else if (size(file%hdf5%extents(name)) == 2) then
       extent = file%hdf5%extents(name)
       status = -1
-      if (product(real(extent, real64)) < huge(0)) allocate (values(product(extent)), stat=status)
+      if (minval(extent) > 0 .and. product(real(extent, real64)) < huge(0)) &
+        allocate (values(product(extent)), stat=status)
       call file%hdf5%check(-abs(status), "be read: "//name)
       if (status /= 0) return
       call file%exchange(name, values, sums)

@@ -22,7 +22,6 @@ module output
   use stop_rules, only: stop_rule_t
   use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, &
     reserve_t, seconds, synchronize
-  use texts, only: written
   implicit none
   private
   public :: output_t, progress_t
