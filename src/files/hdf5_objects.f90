@@ -125,9 +125,10 @@ contains
     call self%open_dataset(name, dataset, status)
     if (status < 0) return
     call h5dget_space_f(dataset, space, status)
-    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
-    if (status >= 0 .and. (rank > 0 .or. n == 1)) then       ! else it was made to have no values
+    n = 1
+    if (status >= 0 .and. rank == 0) call h5sget_simple_extent_npoints_f(space, n, status)
+    if (status >= 0 .and. n == 1) then              ! else it was made to have no values
       deallocate (extent)
       allocate (extent(rank), largest(rank))
       if (rank > 0) call h5sget_simple_extent_dims_f(space, extent, largest, status)
