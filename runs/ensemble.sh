@@ -125,8 +125,10 @@ check_names() {
   local -A seen=()
   local name
   for name in "${names[@]}"; do
-    [[ -n $name && ${#name} -le 200 && $name != *[/[:cntrl:]]* && $name != [-.[:blank:]]* && $name != *[[:blank:]] ]] ||
-      die "'$name' cannot name a member: 1 to 200 characters, no slash or tab, no dash, dot or blank in front"
+    [[ -n $name && ${#name} -le 200 && $name != *[/[:cntrl:]]* && $name != [-.[:blank:]]* &&
+      $name != *[[:blank:]] ]] ||
+      die "'$name' cannot name a member: up to 200 characters, not empty, no slash," \
+        "no dash or dot in front, no blanks around"
     [[ $name != *.chk && $name != parallel && $name != slurm ]] ||
       die "'$name' cannot name a member: $name.h5 or $name.log is something else"
     [[ -z ${seen[x$name]:-} ]] || die "two members are called '$name'"
@@ -136,9 +138,11 @@ check_names() {
 
 # --- the folder: nothing is written through a link, into a FIFO, or into a file of something else ---
 
-# FILE is absent or an ordinary file.
+# Is FILE absent or ordinary?
+may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
+
 check_ordinary() {
-  [[ ! -L $1 && (! -e $1 || -f $1) ]] ||
+  may_be_ours "$1" ||
     fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
 }
 
@@ -162,12 +166,12 @@ remember() {
   local line name k door='' changed=''
   local -A before=() linked=()
   if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time
-    flock -w 10 "$door" 2>/dev/null || true
+    flock -w 2 "$door" 2>/dev/null || true
   fi
   for name in input.nml manifest.txt; do check_ordinary "$folder/$name"; done
   while IFS= read -r -d '' name; do
     linked[x$name]=1
-  done < <(find "$folder/" -maxdepth 1 -name '*.log' -links +1 -printf '%f\0')
+  done < <(find "$folder/" -maxdepth 1 -name '*.log' -links +1 -printf '%f\0' 2>/dev/null)
   if [[ -e $folder/manifest.txt ]]; then
     while IFS= read -r line; do before[x${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
   fi
@@ -225,7 +229,7 @@ run_member() {
 
 # Opens a member's log as `lock`: a file that is ordinary, has one name, and is what was opened.
 open_log() {
-  [[ ! -L $1 && (! -e $1 || -f $1) ]] && { exec {lock}>>"$1"; } 2>/dev/null || return
+  may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
   [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
   exec {lock}>&-
   return 1
@@ -365,7 +369,8 @@ prepare_shares() {
 judge_by_files() {
   local name
   for name in "${names[@]}"; do
-    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]]; then
+    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]] &&
+      may_be_ours "$folder/$name.log"; then
       failure "$name" "$(tail -n 1 -- "$folder/$name.log")"
     fi
   done
@@ -392,7 +397,8 @@ run_parallel() {
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
-    [[ ! -e $folder/$name.h5.part ]] || flock --timeout 60 "$folder/$name.log" true || true
+    [[ ! -e $folder/$name.h5.part ]] || ! may_be_ours "$folder/$name.log" ||
+      flock --timeout 60 "$folder/$name.log" true || true
   done
 }
 

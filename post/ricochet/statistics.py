@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+MOST_WINDOWS = 10**6
 Law = Callable[[np.ndarray], np.ndarray]
 
 
@@ -87,6 +88,8 @@ def ratio(amount: np.ndarray, per: np.ndarray, factor: float = 1.0) -> Estimate:
 def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Middles and means of the windows of a series (T,); an incomplete last one is left out."""
     count = max(1, int(np.floor((time[-1] - time[0]) / width + 1e-9)))
+    if count > MOST_WINDOWS:
+        raise ValueError(f"{count} windows of {width:g}")
     index = np.minimum(((time - time[0]) / width).astype(int), count)
     sums = np.bincount(index, value, count + 1)[:count]
     numbers = np.bincount(index, minlength=count + 1)[:count]
