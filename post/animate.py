@@ -9,10 +9,6 @@ the run.
 
 from pathlib import Path
 
-import numpy as np
-from matplotlib import animation
-from tqdm import tqdm
-
 from ricochet import Run, RunError, read_run
 from ricochet.drawing import (
     LABELS,
@@ -25,7 +21,12 @@ from ricochet.drawing import (
     species_legend,
     values_of,
 )
+from ricochet.files import destination
 from ricochet.script import command_line, film_frames, launch, positive, text_of
+
+import numpy as np
+from matplotlib import animation
+from tqdm import tqdm
 
 
 def film_path(wish: Path | None, run: Run) -> Path:
@@ -66,8 +67,7 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
     writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(fps=fps)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with writer.saving(figure, str(path), dpi=100):
+    with writer.saving(figure, str(destination(path)), dpi=100):
         for frame in tqdm(frames, unit="frame", desc=path.name, disable=None):
             disks.set_offsets(run.position[frame])
             if colour != "species":

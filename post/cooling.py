@@ -9,14 +9,14 @@ of the heaviest to the lightest species, 1 in equilibrium.
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run
 from ricochet.drawing import COLOURS, band, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.theory import EQUIPARTITION
 from ricochet.thermodynamics import lightest_and_heaviest
+
+import numpy as np
 
 
 class Cooling(NamedTuple):

@@ -13,15 +13,15 @@ disks and for all: 1 in a perfect triangular crystal.
 
 from collections.abc import Callable
 
-import numpy as np
-from scipy.spatial import Delaunay, cKDTree
-
 from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis
 from ricochet.theory import RELAXATION
 from ricochet.thermodynamics import SKIP, packing, settled, temperature
+
+import numpy as np
+import scipy
 
 MOST_FRAMES = 50  # for g(r) and psi6
 
@@ -81,7 +81,7 @@ def pair_correlation(run: Run, edges: np.ndarray) -> np.ndarray:
         x = run.position[k] - run.lower
         margin = np.where(run.periodic, -np.inf, r[-1])
         inner = np.all((x > margin) & (x < run.edges - margin), axis=1)
-        tree, part = (cKDTree(p, boxsize=size) for p in (x, x[inner]))
+        tree, part = (scipy.spatial.cKDTree(p, boxsize=size) for p in (x, x[inner]))
         sums += np.diff(part.count_neighbors(tree, r))
         centres += inner.sum()
     density = (run.count - 1) / np.prod(run.edges)
@@ -93,7 +93,7 @@ def bond_order(run: Run, frame: int) -> np.ndarray:
     x = run.position[frame]
     near = 4 * np.sqrt(np.prod(run.edges) / run.count)
     points = padded(x, run, near)
-    start, neighbours = Delaunay(points).vertex_neighbor_vertices
+    start, neighbours = scipy.spatial.Delaunay(points).vertex_neighbor_vertices
     centre = np.repeat(np.arange(len(points)), np.diff(start))
     inside = centre < run.count
     bonds = points[neighbours[inside]] - points[centre[inside]]

@@ -8,13 +8,13 @@ collision itself is not small compared with the search; above it disks no longer
 caches.
 """
 
-import numpy as np
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import PowerLaw, fit_power_law
 from ricochet.thermodynamics import packing
+
+import numpy as np
 
 LABELS = {
     "rescan": "everything anew at each collision",

@@ -9,14 +9,14 @@ now further than one radius from their first position; `width` and `depth`, the 
 positions of the displaced ones, from the rim of the bed downwards.
 """
 
-import numpy as np
-from matplotlib.ticker import LogLocator
-from scipy.spatial import ConvexHull
-
 from ricochet import Run
 from ricochet.crater import Crater, bed, crater, displaced, packing_field, projectile
 from ricochet.drawing import COLOURS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, read_all, report
+
+import numpy as np
+import scipy
+from matplotlib.ticker import LogLocator
 
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
@@ -32,7 +32,8 @@ def draw_hull(axes: plt.Axes, run: Run) -> None:
     """The outline of the crater: hull of the first positions of the displaced disks."""
     points = run.position[0][displaced(run)]
     if len(points) > 3:
-        ring = points[ConvexHull(points, qhull_options="QJ").vertices]  # QJ: also for a row
+        hull = scipy.spatial.ConvexHull(points, qhull_options="QJ")  # QJ: also for a row
+        ring = points[hull.vertices]
         axes.fill(*ring.T, fill=False, edgecolor=COLOURS[1], lw=1.4, zorder=4)
         axes.plot([], [], color=COLOURS[1], lw=1.4, label="hull of the displaced disks")
         axes.legend(loc="upper left")

@@ -12,13 +12,13 @@ runs ended by time, with more energy left than `stop.energy_fraction`.
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run
 from ricochet.crater import Crater, bed, crater, projectile
 from ricochet.drawing import COLOURS, plt
 from ricochet.script import command_line, launch, measured, read_all, report
 from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law
+
+import numpy as np
 
 AXES = {
     "mass": "mass of the projectile / mass of a bed disk, $M$",

@@ -8,12 +8,12 @@ at the start: the drift, that is the change over the whole run along a fitted li
 the standard deviation from that line; and the largest change.
 """
 
-import numpy as np
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import windows
+
+import numpy as np
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
 

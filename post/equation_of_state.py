@@ -9,13 +9,13 @@ only.  Disks between walls are denser away from them: the wall pressure belongs 
 the centres, and differs from the bulk by about 1/sqrt(N).
 """
 
-import numpy as np
-
 from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import columns, command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, combined
 from ricochet.thermodynamics import SKIP, packing, z_rate, z_virial, z_wall
+
+import numpy as np
 
 NONE = Estimate(float("nan"), float("nan"))
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}

@@ -11,13 +11,13 @@ means over the second half of the time.
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, windows
 from ricochet.thermodynamics import lightest_and_heaviest
+
+import numpy as np
 
 
 class Approach(NamedTuple):

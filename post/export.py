@@ -10,10 +10,11 @@ carries velocity, radius, mass, the box and the time.  Numbers keep all their di
 from collections.abc import Iterator
 from pathlib import Path
 
-from tqdm import tqdm
-
 from ricochet import Run, RunError, read_run
+from ricochet.files import destination
 from ricochet.script import chosen_frames, command_line, launch, text_of
+
+from tqdm import tqdm
 
 PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1:id:I:1"
 
@@ -70,8 +71,7 @@ def main() -> None:
     if path.suffix not in (".xyz", ".csv"):
         raise RunError(f"{path}: export ends in .xyz or .csv")
     frames = chosen_frames(run, args.frames, args.count)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as file:
+    with destination(path).open("w") as file:
         file.writelines(exported(run, path.suffix, frames))
     print(text_of([{"export": path, "frames": len(frames), "of": run.frames}]))
 

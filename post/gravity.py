@@ -16,15 +16,15 @@ their errors come from ten blocks of time.
 
 from typing import NamedTuple
 
-import numpy as np
-from scipy.integrate import cumulative_trapezoid
-
 from ricochet import Run, RunError, read_run
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.thermodynamics import equilibrium_frames
+
+import numpy as np
+import scipy
 
 SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
@@ -101,9 +101,9 @@ def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], count: int) -> float:
     """What `log_slope` gives for `count` values that follow a density exactly."""
-    integral = cumulative_trapezoid(density, x, initial=0) / np.trapezoid(density, x)
+    integral = scipy.integrate.cumulative_trapezoid(density, x, initial=0)
     ranks = (np.arange(count) + 0.5) / count
-    return log_slope(np.interp(ranks, integral, x), limits)
+    return log_slope(np.interp(ranks, integral / integral[-1], x), limits)
 
 
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:

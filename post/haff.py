@@ -8,13 +8,13 @@ K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  Right: K against collisions per d
 energy and it falls more slowly.  Periodic boxes at rest as a whole.
 """
 
-import numpy as np
-
 from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.thermodynamics import free_disks, packing, temperature
+
+import numpy as np
 
 POINTS = 200
 

@@ -13,12 +13,12 @@ standard error.
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
 from ricochet.script import command_line, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
+
+import numpy as np
 
 
 class Divergence(NamedTuple):

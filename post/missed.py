@@ -24,12 +24,12 @@ from itertools import combinations_with_replacement
 from math import comb
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
+
+import numpy as np
 
 SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
 

@@ -8,13 +8,13 @@ there is one run).
 Theory: each species has <K> = kT = E / N and <v> = sqrt(pi kT / 2 m).
 """
 
-import numpy as np
-
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, hold_against
 from ricochet.theory import maxwell_cdf, maxwell_pdf
+
+import numpy as np
 
 
 def means(run: Run, frames: list[int], name: str) -> np.ndarray:

@@ -11,18 +11,20 @@ evenly spread, as fit into 30 MB.
 """
 
 import base64
+import hashlib
 import html
 import json
 import re
 from pathlib import Path
 
+from ricochet import Run, RunError, read_run
+from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
+from ricochet.files import destination
+from ricochet.script import chosen_disks, command_line, film_frames, launch, text_of
+
 import numpy as np
 from matplotlib.colors import to_hex
 from tqdm import tqdm
-
-from ricochet import Run, RunError, read_run
-from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
-from ricochet.script import chosen_disks, command_line, film_frames, launch, text_of
 
 PAGE = Path(__file__).with_suffix(".html")
 ROOM = 29e6  # bytes of base64 for the disks
@@ -171,19 +173,31 @@ def page(run: Run, facts: dict, blocks: dict) -> str:
     """The whole file."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
-    known = json.dumps(facts).replace("</", "<\\/")
+    known = json.dumps(facts, allow_nan=False).replace("<", "\\u003c")
     data = [f'<script type="application/json" id="film">{known}</script>']
     for name, block in blocks.items():
         text = base64.b64encode(block).decode()
         data.append(f'<script type="text/plain" id="{name}-data">{text}</script>')
+    template = PAGE.read_text(encoding="utf-8")
     fillings = {
+        "policy": policy(template),
         "title": html.escape(title),
         "caption": html.escape(caption([run])),
         "source": html.escape(f"{run.path.name} (ricochet {commit})"),
         "data": "\n".join(data),
     }
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
-    return blank.sub(lambda found: fillings[found[1]], PAGE.read_text(encoding="utf-8"))
+    return blank.sub(lambda found: fillings[found[1]], template)
+
+
+def policy(template: str) -> str:
+    """What the page may do: run its own script in its own style, and load nothing."""
+    rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
+    for tag in ("script", "style"):
+        (own,) = re.findall(f"<{tag}>(.*?)</{tag}>", template, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
+        rules.append(f"{tag}-src 'sha256-{digest}'")
+    return "; ".join(rules)
 
 
 def main() -> None:
@@ -198,8 +212,7 @@ def main() -> None:
     args.count = args.count or frames_that_fit(run)
     frames, traced = film_frames(run, args), chosen_disks(run, args.disks or [])
     text = page(run, *film(run, frames, chosen_colour(run, args.colour), traced))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
     print(text_of([{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]))
 

@@ -12,9 +12,6 @@ long paths more often; therefore each counts 1 over its time.  The line is for d
 without memory (Boltzmann, Enskog).
 """
 
-import numpy as np
-from scipy.special import ive
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, launch, read_all, report
@@ -29,6 +26,9 @@ from ricochet.thermodynamics import (
     temperature,
     z_virial,
 )
+
+import numpy as np
+import scipy
 
 SIDES = ("left", "right", "bottom", "top")
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
@@ -113,7 +113,8 @@ def path_density(x: np.ndarray) -> np.ndarray:
     """
     u = np.linspace(0, 5, 2001)[1:]  # v / sqrt(2 kT / m)
     half = u**2 / 2
-    nu = ((1 + u**2) * ive(0, half) + u**2 * ive(1, half)) / np.sqrt(2)
+    slow, fast = (scipy.special.ive(order, half) for order in (0, 1))
+    nu = ((1 + u**2) * slow + u**2 * fast) / np.sqrt(2)
     rate = nu / (u * 2 / np.sqrt(np.pi))  # collisions per mean free path
     weight = 2 * u * np.exp(-(u**2)) * nu
     weight /= np.sum(weight)

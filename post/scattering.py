@@ -11,12 +11,12 @@ velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, kappa =
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.theory import scattering_angle
+
+import numpy as np
 
 
 class Scattering(NamedTuple):

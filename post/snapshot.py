@@ -7,9 +7,6 @@
 Colour: species, speed, displacement from the first frame, or collisions so far.
 """
 
-import numpy as np
-from matplotlib.colors import to_rgba_array
-
 from ricochet import Run, read_run
 from ricochet.drawing import (
     LABELS,
@@ -24,6 +21,9 @@ from ricochet.drawing import (
     values_of,
 )
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
+
+import numpy as np
+from matplotlib.colors import to_rgba_array
 
 
 def darker(colours: list[str]) -> np.ndarray:

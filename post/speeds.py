@@ -12,13 +12,13 @@ collisions: frames that are closer count for the tests as one frame every 5 coll
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
-import numpy as np
-
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
+
+import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
 MEMORY = 5.0  # collisions per disk after which a speed is independent

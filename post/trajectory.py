@@ -7,12 +7,12 @@ With a frame at every event (output.frames_every_events = 1) the straight lines 
 are the exact path of flight without gravity.  Several runs are drawn side by side.
 """
 
-import numpy as np
-from matplotlib.patches import Circle
-
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, disk_collection, draw_box, plt
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, read_all, report
+
+import numpy as np
+from matplotlib.patches import Circle
 
 
 def paths_of(run: Run, disks: list[int], frames: list[int]) -> list[np.ndarray]:
@@ -55,7 +55,8 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
         axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=0.9))
     axes.set_title(
         f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])},  "
-        f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)"
+        f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)",
+        parse_math=False,
     )
 
 

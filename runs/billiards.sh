@@ -23,7 +23,7 @@ for k in {1..64}; do
       output.frames_every_events=1000000
     printf '\n'
   done
-done >"$data/sinai_pairs/members.txt"
+done | replace "$data/sinai_pairs/members.txt"
 runs/ensemble.sh input/sinai.nml -d "$data/sinai_pairs" \
   --manifest "$data/sinai_pairs/members.txt" "$@"
 runs/ensemble.sh input/brownian.nml -d "$data/brownian" --seeds 1 --set stop.time=10 "$@"

@@ -1,6 +1,7 @@
 # shellcheck shell=bash
 # What the scripts of the systems share; the first line of each reads it. It sets python, data (the
-# folder of the runs) and figures (that of the figures). Options of ensemble.sh, such as -j 4, go through.
+# folder of the runs), figures (that of the figures) and `replace`. Options of ensemble.sh, such as
+# -j 4, go through.
 set -euo pipefail
 if [[ " $* " == *' -h '* || " $* " == *' --help '* ]]; then
   sed -n '2,/^[^#]/ s/^# \{0,1\}//p' "$0"
@@ -15,3 +16,8 @@ command -v "$python" >/dev/null || {
   exit 2
 }
 mkdir -p -- "$data" "$figures"
+
+# FILE becomes what comes in; a link in its place goes, and nothing is written through it.
+replace() {
+  rm -f -- "$1" && (set -C && cat >"$1")
+}

@@ -26,7 +26,7 @@ for repeat in 1 2 3; do # the best of three counts: a disturbance can only add
   measure 100000000 10 1 pairs 16 32 64 128 256 512 1024 2048 4096 8192
   measure 1000000 10 0 cells 16 32 64 128 256 512 1024 2048 4096 8192 16384 65536 262144
   measure 1000000 5 0 cells 1048576
-done >"$data/members.txt"
+done | replace "$data/members.txt"
 
 runs/ensemble.sh input/gas.nml -d "$data" --manifest "$data/members.txt" "$@" -j 1
 "$python" post/cost.py "$data"/*.h5 -o "$figures/cost.png" --csv "$figures/cost.csv"

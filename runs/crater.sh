@@ -20,7 +20,7 @@ for seed in {1..8}; do
   for restitution in 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 0.95; do
     member 25 5 5 "$restitution" "$seed"
   done
-done | sort -u >"$data/members.txt"
+done | sort -u | replace "$data/members.txt"
 
 runs/ensemble.sh input/crater.nml -d "$data/one" --seeds 1 \
   --set output.frames_every_time=0.002 --set output.observables_every_time=0.001 "$@"

@@ -30,14 +30,20 @@ with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that fa
 again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is build/ricochet (installed: the one beside this), or what RICOCHET names.
 
-All machines need the same folders.  Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 75 stopped, the same command goes on.
+All machines need the same folders.  Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 3 the
+folder cannot be used; 75 stopped, the same command goes on.
 TEXT
 }
 
-die() {
-  printf 'ensemble.sh: %s\n' "$*" >&2
-  exit 2
+# CODE TEXT...: one line and the end.
+fail() {
+  local code=$1
+  shift
+  printf 'ensemble.sh: %s\n' "${*//[[:cntrl:]]/?}" >&2
+  exit "$code"
 }
+
+die() { fail 2 "$@"; }
 
 # "; did you mean --seeds?", if one of the words behind the first is like it (and Python is there)
 nearest() {
@@ -48,45 +54,48 @@ for near in difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1): print(f"; d
 
 # --- members: two parallel arrays, the name and the overrides ("--set A=B --set C=D") ---
 
+most=100000
 names=()
 overrides=()
 
-# 1-4,11 -> 1 2 3 4 11
-expand_seeds() {
-  local part
-  for part in ${1//,/ }; do
-    if [[ $part =~ ^([0-9]+)-([0-9]+)$ ]] && ((BASH_REMATCH[1] <= BASH_REMATCH[2])); then
-      seq "${BASH_REMATCH[1]}" "${BASH_REMATCH[2]}"
-    elif [[ $part =~ ^[0-9]+$ ]]; then
-      printf '%s\n' "$part"
-    else
-      die "--seeds $1: '$part' is neither a number nor a range such as 1-8"
+# 1-4,11 -> run.seed=1,2,3,4,11 among the scans
+scan_seeds() {
+  local part first last parts list=()
+  mapfile -t -d , parts < <(printf '%s,' "$1")
+  for part in "${parts[@]}"; do
+    first=1 last=0
+    if [[ $part =~ ^(0|[1-9][0-9]{0,9})(-(0|[1-9][0-9]{0,9}))?$ ]]; then
+      first=${BASH_REMATCH[1]} last=${BASH_REMATCH[3]:-${BASH_REMATCH[1]}}
     fi
+    ((first <= last)) ||
+      die "--seeds $1: '$part' is neither a number nor a range such as 1-8 (no leading zeros)"
+    ((${#list[@]} + last - first < most)) || die "--seeds $1: more than $most members"
+    for (( ; first <= last; first++)); do list+=("$first"); done
   done
+  printf -v list '%s,' "${list[@]}"
+  scans+=("run.seed=${list%,}")
 }
 
-# species.ball.mass, 5 -> ball.mass_5: a file name without blanks and slashes
-name_of() {
-  local variable=${1#species.} value=$2
-  [[ $variable == *.*.* || $1 == species.* ]] || variable=${variable#*.}
-  printf '%s_%s' "$variable" "${value//[^A-Za-z0-9.+-]/_}"
-}
-
-# Every combination of the scans (first varies slowest) and the seeds.
+# Every combination of the scans (first varies slowest) and the seeds; species.ball.mass, 5 becomes
+# ball.mass_5 in the name, without blanks and slashes.
 generate_members() {
-  local scan variable list separator value k old_names old_overrides
+  local scan variable list values separator value k short old_names old_overrides
   names=("") overrides=("")
   for scan in "${scans[@]}"; do
     [[ $scan == *.*=?* ]] || die "--scan $scan: write VARIABLE=VALUE,VALUE,..."
     variable=${scan%%=*} list=${scan#*=} separator=,
     [[ $list == *';'* ]] && separator=';'
+    mapfile -t -d "$separator" values < <(printf '%s' "$list")
+    short=${variable#species.}
+    [[ $short == *.*.* || $variable == species.* ]] || short=${short#*.}
+    ((${#names[@]} * ${#values[@]} <= most)) || die "--scan $variable: more than $most members"
     old_names=("${names[@]}") old_overrides=("${overrides[@]}")
     names=() overrides=()
     for k in "${!old_names[@]}"; do
-      while read -r -d "$separator" value; do
-        names+=("${old_names[k]:+${old_names[k]}_}$(name_of "$variable" "$value")")
+      for value in "${values[@]}"; do
+        names+=("${old_names[k]:+${old_names[k]}_}${short}_${value//[^A-Za-z0-9.+-]/_}")
         overrides+=("${old_overrides[k]:+${old_overrides[k]} }--set $variable=$value")
-      done <<<"$list$separator"
+      done
     done
   done
 }
@@ -108,6 +117,7 @@ read_manifest() {
     [[ -z $rest || $rest == '--set '* ]] ||
       die "$1: member '${names[-1]}': '$rest' does not begin with --set"
     overrides+=("$rest")
+    ((${#names[@]} <= most)) || die "$1: more than $most members"
   done <"$1"
 }
 
@@ -115,11 +125,35 @@ check_names() {
   local -A seen=()
   local name
   for name in "${names[@]}"; do
-    [[ -n $name && $name != */* && $name != -* && $name != .* ]] ||
-      die "'$name' cannot name a member: no slash, no leading dash or dot, not empty"
-    [[ -z ${seen[$name]:-} ]] || die "two members are called '$name'"
-    seen[$name]=1
+    [[ -n $name && ${#name} -le 200 && $name != *[/[:cntrl:]]* && $name != [-.[:blank:]]* &&
+      $name != *[[:blank:]] ]] ||
+      die "'$name' cannot name a member: up to 200 characters, not empty, no slash," \
+        "no dash or dot in front, no blanks around"
+    [[ $name != *.chk && $name != parallel && $name != slurm ]] ||
+      die "'$name' cannot name a member: $name.h5 or $name.log is something else"
+    [[ -z ${seen[x$name]:-} ]] || die "two members are called '$name'"
+    seen[x$name]=1
   done
+}
+
+# --- the folder: nothing is written through a link, into a FIFO, or into a file of something else ---
+
+# Is FILE absent or ordinary?
+may_be_ours() { [[ ! -L $1 && (! -e $1 || -f $1) ]]; }
+
+check_ordinary() {
+  may_be_ours "$1" ||
+    fail 3 "$1 is not an ordinary file: remove it, or choose another folder"
+}
+
+# FILE becomes what comes in, whole or not at all; what was there is replaced, not written to.
+put() {
+  local new=$folder/.new.$$.${HOSTNAME:-} reason
+  check_ordinary "$1"
+  if ! reason=$({ rm -f -- "$new" && (set -C && cat >"$new") && mv -fT -- "$new" "$1"; } 2>&1); then
+    rm -f -- "$new" 2>/dev/null || true
+    fail 3 "cannot write $1: ${reason##*: }"
+  fi
 }
 
 # Does member NAME have data, finished or not?
@@ -129,29 +163,44 @@ has_data() {
 
 # Members of an earlier command on the folder must mean the same: results are told apart by name.
 remember() {
-  local line name k
-  local -A before=()
-  if [[ -e $folder/manifest.txt ]]; then
-    while IFS= read -r line; do before[${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
+  local line name k door='' changed=''
+  local -A before=() linked=()
+  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time
+    flock -w 2 "$door" 2>/dev/null || true
   fi
-  if [[ -e $folder/input.nml ]] && ! cmp -s "$input" "$folder/input.nml"; then
+  for name in input.nml manifest.txt; do check_ordinary "$folder/$name"; done
+  while IFS= read -r -d '' name; do
+    linked[x$name]=1
+  done < <(find "$folder/" -maxdepth 1 -name '*.log' -links +1 -printf '%f\0' 2>/dev/null)
+  if [[ -e $folder/manifest.txt ]]; then
+    while IFS= read -r line; do before[x${line%%$'\t'*}]=${line#*$'\t'}; done <"$folder/manifest.txt"
+  fi
+  if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
+    [[ -e $folder/manifest.txt ]] ||
+      fail 3 "$folder/input.nml is not of an ensemble: choose another folder"
     for name in "${!before[@]}"; do
-      ! has_data "$name" ||
+      ! has_data "${name#x}" ||
         die "$folder holds members of another version of $input (see $folder/input.nml):" \
           "choose another folder, or remove this one"
     done
   fi
   for k in "${!names[@]}"; do
     name=${names[k]}
-    if [[ ${before[$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
-      die "$folder holds a member '$name' with other settings (${before[$name]}):" \
+    check_ordinary "$folder/$name.log"
+    [[ ! -e $folder/$name.log || -n ${before[x$name]+known} && -z ${linked[x$name.log]:-} ]] ||
+      fail 3 "$folder/$name.log is not of this ensemble: remove it, or choose another folder"
+    if [[ ${before[x$name]-${overrides[k]}} != "${overrides[k]}" ]] && has_data "$name"; then
+      die "$folder holds a member '$name' with other settings (${before[x$name]}):" \
         "choose another folder or name"
     fi
-    before[$name]=${overrides[k]}
+    [[ ${before[x$name]-none} == "${overrides[k]}" ]] || changed=1
+    before[x$name]=${overrides[k]}
   done
-  cp -f -- "$input" "$folder/.input.$$" && mv -f -- "$folder/.input.$$" "$folder/input.nml"
-  for name in "${!before[@]}"; do printf '%s\t%s\n' "$name" "${before[$name]}"; done | sort \
-    >"$folder/.manifest.$$" && mv -f -- "$folder/.manifest.$$" "$folder/manifest.txt"
+  cmp -s -- "$input" "$folder/input.nml" || put "$folder/input.nml" <"$input"
+  [[ -z $changed ]] ||
+    for name in "${!before[@]}"; do printf '%s\t%s\n' "${name#x}" "${before[$name]}"; done | sort |
+    put "$folder/manifest.txt" || exit 3
+  [[ -z $door ]] || exec {door}<&-
 }
 
 # --- workers ---
@@ -170,7 +219,7 @@ run_member() {
   elif [[ -e $base.h5.part ]]; then
     arguments+=(--force) # killed, or broke off: its frames come again
   fi
-  "$program" "${arguments[@]}" >"$base.log" 2>&1 </dev/null {events}>&- &
+  "$program" "${arguments[@]}" >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
   child=$!
   while :; do # `wait` also ends when a signal comes
     interrupted='' status=0
@@ -182,6 +231,14 @@ run_member() {
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
+# Opens a member's log as `lock`: a file that is ordinary, has one name, and is what was opened.
+open_log() {
+  may_be_ours "$1" && { exec {lock}>>"$1"; } 2>/dev/null || return
+  [[ ! -L $1 && $1 -ef /dev/fd/$lock && $(stat -L -c %h "/dev/fd/$lock") == 1 ]] && return
+  exec {lock}>&-
+  return 1
+}
+
 # Walk along all members; take those that no other worker and no other copy has taken.
 # The lock is on the log; the program inherits it, so it holds as long as the program lives.
 work() {
@@ -191,8 +248,10 @@ work() {
     if [[ -n $stopping ]] || ! kill -0 $$ 2>/dev/null; then break; fi
     base=$folder/${names[k]}
     if [[ -e $base.h5 ]] || ! mkdir "$claims/$k" 2>/dev/null; then continue; fi
-    exec {lock}>>"$base.log"
-    if ! flock -n "$lock"; then
+    if ! open_log "$base.log"; then
+      printf '%s closed\n' "$k" >&"$events"
+      continue
+    elif ! flock -n "$lock"; then
       printf '%s busy\n' "$k" >&"$events"
     elif [[ -e $base.h5 ]]; then
       printf '%s 0\n' "$k" >&"$events"
@@ -234,7 +293,7 @@ forward() {
 
 run_all() {
   local k status slot part message=''
-  claims=$(mktemp -d)
+  claims=$(mktemp -d 2>/dev/null) || fail 3 "cannot make a folder in ${TMPDIR:-/tmp}"
   trap 'rm -rf -- "$claims"' EXIT
   mkfifo "$claims/pipe"
   exec {events}<>"$claims/pipe"
@@ -268,11 +327,15 @@ count_reply() {
   0) finished=$((finished + 1)) ;;
   75) ;;
   busy) busy=$((busy + 1)) ;;
-  *)
-    failed=$((failed + 1))
-    failures+=("${names[$1]} (exit $2): $(tail -n 1 -- "$folder/${names[$1]}.log")")
-    ;;
+  closed) failure "${names[$1]}" "cannot write $folder/${names[$1]}.log" ;;
+  *) failure "${names[$1]} (exit $2)" "$(tail -n 1 -- "$folder/${names[$1]}.log")" ;;
   esac
+}
+
+# WHO WHY
+failure() {
+  failed=$((failed + 1))
+  failures+=("$1: ${2:-no message in its log}")
 }
 
 summarise() {
@@ -286,7 +349,7 @@ summarise() {
   ((failed == 0)) || exit 1
   if ((finished < total)); then
     if ((busy > 0)); then printf '  %d are run by another copy\n' "$busy" >&2; fi
-    printf '  the same command goes on with the rest\n' >&2
+    printf '  %sthe same command goes on with the rest\n' "${stopped:+stopped: }" >&2
     exit 75
   fi
 }
@@ -299,7 +362,7 @@ prepare_shares() {
   here=$(cd -- "$folder" && pwd)
   for k in "${!names[@]}"; do
     [[ -e $folder/${names[k]}.h5 ]] || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
-  done >"$folder/left.txt"
+  done | put "$folder/left.txt" || exit 3
   left=$((total - finished))
   shares=$((left < most ? left : most))
   share_command=(env "RICOCHET=$(realpath -- "$program")" bash "$script" "$here/input.nml" -d "$here"
@@ -310,9 +373,9 @@ prepare_shares() {
 judge_by_files() {
   local name
   for name in "${names[@]}"; do
-    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]]; then
-      failed=$((failed + 1))
-      failures+=("$name: $(tail -n 1 -- "$folder/$name.log")")
+    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]] &&
+      may_be_ours "$folder/$name.log"; then
+      failure "$name" "$(tail -n 1 -- "$folder/$name.log")"
     fi
   done
 }
@@ -323,6 +386,7 @@ run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
   prepare_shares
+  put "$folder/parallel.log" </dev/null
   [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
   [[ ! -t 2 ]] || options+=(--bar)
   parallel "${options[@]}" "exec $(printf '%q ' "${share_command[@]}"){}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
@@ -337,7 +401,8 @@ run_parallel() {
 wait_for_locks() {
   local name
   for name in "${names[@]}"; do
-    [[ ! -e $folder/$name.h5.part ]] || flock --timeout 60 "$folder/$name.log" true || true
+    [[ ! -e $folder/$name.h5.part ]] || ! may_be_ours "$folder/$name.log" ||
+      flock --timeout 60 "$folder/$name.log" true || true
   done
 }
 
@@ -347,12 +412,14 @@ submit_to_slurm() {
   local id='' here task
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
   here=$(cd -- "$folder" && pwd)
+  check_ordinary "$folder/slurm.job"
   [[ ! -s $folder/slurm.job ]] || id=$(<"$folder/slurm.job")
   if [[ -n $id && -n $(squeue --noheader --array --jobs "$id" 2>/dev/null || true) ]]; then
     printf '%s: Slurm job %s goes on: %d of %d members finished\n' "$folder" "$id" "$finished" "$total" >&2
     exit 75
   fi
   prepare_shares
+  check_ordinary "$folder/slurm.log"
   task="#!/usr/bin/env bash
 trap 'kill -TERM \$child' TERM
 $(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!
@@ -364,7 +431,7 @@ fi
 exit \$status"
   id=$(sbatch --parsable --array="1-$shares%$jobs" --requeue --signal=B:TERM@60 --open-mode=append \
     --job-name="${here##*/}" --output="$here/slurm.log" <<<"$task") || die "sbatch refused the job"
-  printf '%s\n' "${id%%;*}" >"$folder/slurm.job"
+  put "$folder/slurm.job" <<<"${id%%;*}"
   printf '%s: Slurm job %s submitted, %d of %d members finished before\n' \
     "$folder" "${id%%;*}" "$finished" "$total" >&2
   printf '  the same command says how far it is\n' >&2
@@ -373,10 +440,12 @@ exit \$status"
 
 # --- command line ---
 
-trap 'exit 75' TERM INT # until members run there is nothing to end
+trap 'fail 75 "stopped before any member ran"' TERM INT
+unset CDPATH
 script=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)/${BASH_SOURCE[0]##*/}
 input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
 common='' scans=()
+for word; do [[ $word != *[[:cntrl:]]* ]] || die "'$word' holds control characters"; done
 while (($#)); do
   case $1 in
   -h | --help) usage && exit 0 ;;
@@ -408,21 +477,19 @@ done
 [[ -n $input ]] || die "no input file, see --help"
 [[ -r $input && -f $input ]] || die "cannot read $input$(nearest "$input" "${input%"${input##*/}"}"*.nml)"
 [[ -n $folder ]] || die "no folder for the members: -d FOLDER"
-[[ $jobs =~ ^[1-9][0-9]*$ ]] || die "-j $jobs: not a number of members"
+[[ $folder != -* ]] || folder=./$folder
+[[ $jobs =~ ^[1-9][0-9]{0,5}$ ]] || die "-j $jobs: not a number of members"
 [[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: pool, slurm or parallel"
 [[ -z $hosts || $engine == parallel ]] || die "--sshloginfile goes with --engine parallel"
-[[ -z $hosts || -r $hosts ]] || die "cannot read $hosts"
-[[ $share =~ ^(|[1-9][0-9]*/[1-9][0-9]*)$ ]] || die "--share $share: write K/M, such as 2/10"
+[[ -z $hosts || -f $hosts && -r $hosts ]] || die "cannot read $hosts, or it is not an ordinary file"
+[[ $share =~ ^(|[1-9][0-9]{0,8}/[1-9][0-9]{0,8})$ ]] || die "--share $share: write K/M, such as 2/10"
 if [[ -n $manifest ]]; then
   [[ -z $seeds && ${#scans[@]} == 0 ]] || die "either --manifest or --seeds and --scan"
-  [[ -r $manifest ]] || die "cannot read $manifest"
+  [[ -f $manifest && -r $manifest ]] || die "cannot read $manifest, or it is not an ordinary file"
   read_manifest "$manifest"
 else
   [[ -n $seeds || ${#scans[@]} -gt 0 ]] || die "no members: give --seeds, --scan or --manifest"
-  if [[ -n $seeds ]]; then
-    seeds=$(expand_seeds "$seeds") || exit 2
-    scans+=("run.seed=${seeds//$'\n'/,}")
-  fi
+  [[ -z $seeds ]] || scan_seeds "$seeds"
   generate_members
 fi
 ((${#names[@]} > 0)) || die "no members"
@@ -449,9 +516,9 @@ here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 program=${here%/*}/build/ricochet
 [[ ! -x $here/ricochet ]] || program=$here/ricochet # both are installed
 program=${RICOCHET:-$program}
-[[ -x $program ]] || die "no program $program: run make, or set RICOCHET"
+[[ -f $program && -x $program ]] || die "no program $program: run make, or set RICOCHET"
 command -v flock >/dev/null || die "needs flock (package util-linux)"
-mkdir -p -- "$folder" || die "cannot make $folder"
+reason=$(mkdir -p -- "$folder" 2>&1) || fail 3 "cannot make $folder: ${reason##*: }"
 [[ -n $share ]] || remember
 
 total=${#names[@]} finished=0 failed=0 busy=0 ended=0 next_line=30 stopped='' claims=''
@@ -459,6 +526,7 @@ workers=() failures=()
 for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
 skipped=$finished
 if ((finished < total)); then
+  [[ -w $folder ]] || fail 3 "cannot write into $folder"
   case $engine in
   pool) run_all ;;
   parallel) run_parallel ;;

@@ -96,7 +96,7 @@ HTML
   section rates 'Bulk: pressure in time, free paths' state
   section haff 'Bulk: cooling by the law of Haff' state
   printf '</main>\n</html>\n'
-} >"$figures/index.html"
+} | replace "$figures/index.html"
 printf 'figures = %s/index.html\n' "$figures"
 
 if ((${#failed[@]} > 0)); then

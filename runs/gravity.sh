@@ -21,7 +21,7 @@ for v0 in 0.1 0.5 1 2; do
     printf 'v0_%s_seed_%s\t--set species.A.speed=%s --set species.B.speed=%s --set run.seed=%s\n' \
       "$v0" "$seed" "$v0" "$v0" "$seed"
   done
-done >"$data/members.txt"
+done | replace "$data/members.txt"
 runs/ensemble.sh input/gravity.nml -d "$data/equipartition" --manifest "$data/members.txt" \
   --set stop.time=20 --set output.frames_every_time=20 "$@"
 "$python" post/equipartition.py "$data"/equipartition/*.h5 -o "$figures/gravity_equipartition.png" \

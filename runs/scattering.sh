@@ -7,7 +7,7 @@ for k in {0..40}; do
   awk -v k="$k" 'BEGIN {
     s = 1.2 * k / 40
     printf "b_%.2f\t--set species.light.position=0.2,%.17g\n", s, 0.5 + 0.101 * s }'
-done >"$data/members.txt"
+done | replace "$data/members.txt"
 
 runs/ensemble.sh input/scattering.nml -d "$data" --manifest "$data/members.txt" "$@"
 "$python" post/scattering.py "$data"/*.h5 -o "$figures/scattering.png" --csv "$figures/scattering.csv"

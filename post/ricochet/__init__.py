@@ -5,9 +5,10 @@
 
 `reader` opens files, `bridges` hands them to other programs; `statistics`, `theory`, `hard_disks`,
 `thermodynamics` and `crater` measure and compare; `drawing` draws disks and walls; `script` is what
-the command-line scripts share.
+the command-line scripts share; `files` trusts neither what it reads nor where it writes.
 """
 
+from . import packages as packages  # first
 from .bridges import mdanalysis_universe
 from .reader import Events, Obstacle, Run, RunError, Series, read_run
 

@@ -7,7 +7,7 @@ others are the bed.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+import scipy
 
 from .reader import Run, RunError
 
@@ -81,6 +81,7 @@ def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, .
         range=limits,
         weights=np.pi * run.radius[here] ** 2,
     )
-    smooth = gaussian_filter(area, 2.5 * np.median(run.radius[here]) / side, mode="reflect")
+    reach = 2.5 * np.median(run.radius[here]) / side
+    smooth = scipy.ndimage.gaussian_filter(area, reach, mode="reflect")
     fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])
     return (xs[1:] + xs[:-1]) / 2, (ys[1:] + ys[:-1]) / 2, fraction

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.patches import Circle, Rectangle
 
+from .files import destination
 from .reader import Run, RunError
 
 STYLE = Path(__file__).with_name("style.mplstyle")
@@ -149,6 +150,5 @@ def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
     }
     if path.suffix not in keys:
         raise RunError(f"{path}: a figure ends in {', '.join(keys)}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, metadata=keys[path.suffix])
+    figure.savefig(destination(path), metadata=keys[path.suffix])
     plt.close(figure)

@@ -5,9 +5,11 @@ time, chi = pair correlation at contact, Z = P / (n kT).
 """
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 # Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
 # above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
@@ -34,9 +36,13 @@ SHIFT = np.array(
 )
 CLOSE_PACKING = math.pi / math.sqrt(12)
 
-# Z (1 - eta)^2 is close to 1 and smooth, so interpolating it is safe.
-_smooth = CubicSpline(np.append(0, FLUID[:, 0]), np.append(1, FLUID[:, 1] * (1 - FLUID[:, 0]) ** 2))
-_shift = CubicSpline(np.append(0, FLUID[:10, 0]), np.append(0, SHIFT))
+
+@cache
+def splines() -> tuple[Callable, Callable]:
+    """Z (1 - eta)^2, which is close to 1 and smooth and so safe to interpolate, and c."""
+    eta, z = FLUID.T
+    smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
+    return smooth, scipy.interpolate.CubicSpline(np.append(0, eta[:10]), np.append(0, SHIFT))
 
 
 def henderson(eta: np.ndarray) -> np.ndarray:
@@ -47,12 +53,12 @@ def henderson(eta: np.ndarray) -> np.ndarray:
 def simulated(eta: np.ndarray) -> np.ndarray:
     """Z of the fluid between the points of `FLUID`; NaN beyond the last."""
     eta = np.asarray(eta, dtype=float)
-    return np.where(eta <= FLUID[-1, 0], _smooth(eta) / (1 - eta) ** 2, np.nan)
+    return np.where(eta <= FLUID[-1, 0], splines()[0](eta) / (1 - eta) ** 2, np.nan)
 
 
 def simulated_finite(eta: np.ndarray, count: int) -> np.ndarray:
     """The same for `count` disks in a periodic box, eta up to 0.5."""
-    return simulated(eta) + _shift(eta) / count
+    return simulated(eta) + splines()[1](eta) / count
 
 
 def crystal(eta: np.ndarray, count: float = math.inf) -> np.ndarray:

@@ -12,10 +12,8 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 (`.part`) is read up to its last committed frame.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -23,11 +21,10 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
+from .files import RunError, Unsound, attribute, find, numbers, open_file, tree, whole
+
 DISKS = "particles/disks"
-
-
-class RunError(Exception):
-    """A file that cannot be used; the message is one line that says what and where."""
+LONGEST_NAME = 40
 
 
 class Series(NamedTuple):
@@ -90,13 +87,17 @@ class Frames:
             raise RunError(f"{self.path}: no frame {frame}, there are {self.count}") from None
         steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
         with open_file(self.path) as file:
-            data = file[f"{DISKS}/{self.name}/value"]
+            data = find(file, f"{DISKS}/{self.name}/value")
             if len(steps) == 1 and steps[0] > 0:
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
             elif chosen.ndim and chosen.size:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
             else:
                 values = data[chosen] if chosen.size else data[:0]
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            first = chosen[bad[0, 0]] if chosen.ndim else chosen
+            raise RunError(f"{self.path}: {self.name}: not all numbers in frame {first} are finite")
         return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
@@ -176,23 +177,26 @@ class Run:
     def observable(self, name: str) -> Series:
         """The observable `name`, such as 'total_energy' or 'all/kinetic_energy'."""
         with open_file(self.path) as file:
-            group = file.get(f"observables/{name}")
-            if not isinstance(group, h5py.Group) or "value" not in group:
-                raise RunError(f"{self.path}: has no observable '{name}'")
-            count = committed(file, "observables", group["value"].shape[0])
+            group = find(file, f"observables/{name}")
+            if group is None or find(group, "value") is None:
+                raise Unsound(f"has no observable '{name}'")
+            count = committed(file, "observables", len(numbers(group, "value")))
             if count == 0:
-                raise RunError(f"{self.path}: holds no observables yet")
-            return Series(*(checked(group[part], count)[:count] for part in Series._fields))
+                raise Unsound("holds no observables yet")
+            return Series(rows(group, "time", count), rows(group, "value", count, None))
 
     @cached_property
     def events(self) -> Events:
         """All collisions; needs `output.event_log = .true.` in the input file."""
         with open_file(self.path) as file:
-            if "events" not in file:
-                raise RunError(f"{self.path}: has no event log, set output.event_log = .true.")
-            count = committed(file, "events", file["events/time"].shape[0])
-            events = (checked(file[f"events/{part}"], count, ()) for part in Events._fields)
-            return Events(*(data[:count] for data in events))
+            if find(file, "events") is None:
+                raise Unsound("has no event log, set output.event_log = .true.")
+            count = committed(file, "events", len(numbers(file, "events/time")))
+            time, impulse = (rows(file, f"events/{name}", count) for name in ("time", "impulse"))
+            i, j = (rows(file, f"events/{name}", count, kinds="iu") for name in "ij")
+            if np.any(i < 1) or np.any(np.maximum(i, j) > self.count):
+                raise Unsound("events of disks that there are not")
+            return Events(time, i, j, impulse)
 
     @cached_property
     def collisions_per_disk(self) -> Series:
@@ -238,119 +242,129 @@ def read_run(path: str | Path) -> Run:
     path = Path(path)
     with open_file(path) as file:
         check_format(path, file)
-        return run_of(path, file)
-
-
-@contextmanager
-def open_file(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file for reading; any fault found in it becomes a RunError."""
-    with hdf5_file(path) as file:
-        try:
-            yield file
-        except KeyError as problem:
-            raise RunError(f"{path}: not a complete Ricochet run, {problem.args[0]}") from None
-        except (OSError, RuntimeError, MemoryError):
-            raise RunError(f"{path}: the file is damaged") from None
-        except (AttributeError, IndexError, TypeError, ValueError):
-            raise RunError(f"{path}: not laid out as a Ricochet run, or damaged") from None
-
-
-def hdf5_file(path: Path) -> h5py.File:
-    """The open file, also while a simulation writes it."""
-    if not path.exists():
-        part = Path(f"{path}.part")
-        near = (f"{other}" for other in path.parent.glob("*.h5*") if ".chk." not in other.name)
-        hint = f", but there is {part} of an unfinished run" if part.exists() else None
-        hint = hint or did_you_mean(str(path), near)
-        raise RunError(f"{path}: no such file{hint}")
-    if path.is_dir():
-        raise RunError(f"{path}: is a folder, not a run")
-    try:
-        return h5py.File(path, "r", locking=False)
-    except PermissionError:
-        raise RunError(f"{path}: no permission to read") from None
-    except OSError:
-        state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
-        raise RunError(f"{path}: {state}") from None
-
-
-def did_you_mean(word: str, others: Iterable[str]) -> str:
-    """A suggestion, if one of the others is like the word."""
-    return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
-
-
-def checked(data: h5py.Dataset, count: int, item: tuple[int, ...] | None = None) -> h5py.Dataset:
-    """The dataset, if it holds at least `count` numbers, or arrays of the shape `item`."""
-    usual = data.dtype.kind in "iuf" and data.dtype.itemsize <= 8
-    if not usual or len(data) < count or item not in (None, data.shape[1:]):
-        raise ValueError(f"{data.name}: not {count} numbers, or arrays of the shape {item}")
-    return data
+        run = run_of(path, file)
+    for frames in (run.position, run.velocity):  # not every script reads them
+        frames[[0, -1]]
+    return run
 
 
 def check_format(path: Path, file: h5py.File) -> None:
     """Refuse a file of another kind or of a later version."""
-    version = file["h5md"].attrs.get("version") if "h5md" in file else None
     if path.name.endswith(".chk.h5"):
-        raise RunError(f"{path}: a checkpoint, resume the run or read its .part file")
-    if version is None or DISKS not in file:
-        raise RunError(f"{path}: an HDF5 file, but not of a Ricochet run")
+        raise Unsound("a checkpoint, resume the run or read its .part file")
+    h5md = find(file, "h5md")
+    version = None if h5md is None else attribute(h5md, "version")
+    if version is None or find(file, DISKS) is None:
+        raise Unsound("an HDF5 file, but not of a Ricochet run")
     if version[0] != 1:
-        raise RunError(f"{path}: H5MD version {version[0]}.{version[1]}, this program reads 1.x")
+        raise Unsound(f"H5MD version {version[0]}.{version[1]}, this program reads 1.x")
 
 
 def run_of(path: Path, file: h5py.File) -> Run:
     """The run in an open file."""
-    disks = file[DISKS]
-    count = committed(file, DISKS, disks["position/value"].shape[0])
+    disks = find(file, DISKS)
+    time = numbers(disks, "position/time")
+    count, disk_count = committed(file, DISKS, len(time)), len(numbers(disks, "mass", 1))
     if count == 0:
-        raise RunError(f"{path}: holds no frame yet")
-    box, mass = disks["box"], checked(disks["mass"], 1, ())[:]
-    parameters = tree(file["parameters"]) if "parameters" in file else {}
-    species = checked(disks["species"], len(mass), ())[:].astype(int)
-    names = parameters.get("species", {}).get("names")
+        raise Unsound("holds no frame yet")
     frames = {}
     for name, item in {"position": (2,), "velocity": (2,), "image": (2,), "collisions": ()}.items():
-        if name in disks:
-            checked(disks[name]["value"], count, (len(mass), *item))
+        if name in ("position", "velocity") or find(disks, name) is not None:
+            numbers(disks, f"{name}/value", count, (disk_count, *item))
             frames[name] = Frames(path, name, count)
+    box = find(disks, "box")
+    parameters, provenance = (
+        {} if group is None else tree(group)
+        for group in (find(file, "parameters"), find(file, "provenance"))
+    )
+    species = rows(disks, "species", disk_count, kinds="iu").astype(int)
     return Run(
         path=path,
-        time=checked(disks["position/time"], count, ())[:count],
+        time=rows(disks, "position/time", count),
         position=frames["position"],
         velocity=frames["velocity"],
         image=frames.get("image"),
         collisions=frames.get("collisions"),
-        mass=mass,
-        radius=checked(disks["radius"], len(mass), ())[:],
+        mass=positive(rows(disks, "mass", disk_count), "mass"),
+        radius=positive(rows(disks, "radius", disk_count), "radius"),
         species=species,
-        names=tuple(np.atleast_1d(names)) if names is not None else default_names(species),
-        lower=vector(box, "lower", np.zeros(2)),
-        edges=vector(box, "edges", None),
-        periodic=np.array([plain(b) == "periodic" for b in box.attrs["boundary"]]),
+        names=names_of(species, parameters.get("species", {}).get("names")),
+        lower=vector(box, "lower", (0.0, 0.0)),
+        edges=positive(vector(box, "edges"), "edges"),
+        periodic=pair(attribute(box, "boundary"), "boundary") == "periodic",
         obstacles=obstacles_of(parameters.get("obstacle", {})),
         walls=walls_of(parameters.get("wall", {})),
         parameters=parameters,
-        provenance=tree(file["provenance"]) if "provenance" in file else {},
+        provenance=provenance,
     )
 
 
 def committed(file: h5py.File, group: str, extent: int) -> int:
     """How many of the `extent` samples of a group are valid (a `.part` is allocated ahead)."""
-    counter = file[group].get("committed")
-    return extent if counter is None else max(0, min(extent, int(counter[()])))
+    counter = find(file, f"{group}/committed")
+    return extent if counter is None else max(0, min(extent, int(whole(counter))))
 
 
-def default_names(species: np.ndarray) -> tuple[str, ...]:
-    """Names for species that have none."""
-    return tuple(f"species {k + 1}" for k in range(species.max(initial=1)))
+def rows(
+    group: h5py.Group,
+    path: str,
+    count: int,
+    item: tuple[int, ...] | None = (),
+    kinds: str = "iuf",
+) -> np.ndarray:
+    """The first rows of a dataset."""
+    return finite(numbers(group, path, count, item, kinds)[:count], path)
+
+
+def finite(values: np.ndarray, what: str) -> np.ndarray:
+    """The values, those with a fraction in double precision."""
+    if values.dtype.kind != "f":
+        return values
+    if not np.isfinite(values).all():
+        raise Unsound(f"{what}: not all numbers are finite")
+    return values.astype(float, copy=False)
+
+
+def positive(values: np.ndarray, what: str) -> np.ndarray:
+    """The values, if all are above 0."""
+    if not np.all(values > 0):
+        raise Unsound(f"{what}: not all numbers are above 0")
+    return values
+
+
+def vector(group: h5py.Group, name: str, default: tuple | None = None) -> np.ndarray:
+    """(2,) numbers that are a dataset or an attribute."""
+    value = attribute(group, name) if find(group, name) is None else rows(group, name, 2)
+    return finite(pair(default if value is None else value, name), name)
+
+
+def pair(value: object, what: str) -> np.ndarray:
+    """The value, if it is two."""
+    if np.shape(value) != (2,):
+        raise Unsound(f"{what}: not one for each axis")
+    return np.asarray(value)
+
+
+def names_of(species: np.ndarray, names: object) -> tuple[str, ...]:
+    """The names of the species (N,), numbered where the file has none."""
+    there = np.unique(species)
+    if not np.array_equal(there, np.arange(1, len(there) + 1)):
+        raise Unsound(f"species from {there[0]} to {there[-1]}, not all from 1 on")
+    names = [f"species {k}" for k in there] if names is None else names
+    names = tuple(np.atleast_1d(names))
+    usual = all(isinstance(name, str) and name.isprintable() and name for name in names)
+    if not usual or len(names) != len(there) or max(map(len, names)) > LONGEST_NAME:
+        raise Unsound("species without a proper name, or names without disks")
+    return names
 
 
 def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
     """The circular walls in /parameters/obstacle."""
     if "centre" not in group:
         return ()
-    centres = np.reshape(group["centre"], (-1, 2)).astype(float)
-    radii, inside = np.atleast_1d(group["radius"]), np.atleast_1d(group["inside"])
+    centres = finite(np.reshape(group["centre"], (-1, 2)), "obstacle/centre")
+    radii = positive(finite(np.atleast_1d(group["radius"]), "obstacle/radius"), "obstacle/radius")
+    inside = np.atleast_1d(group["inside"])
     return tuple(
         Obstacle(c, float(r), bool(i)) for c, r, i in zip(centres, radii, inside, strict=True)
     )
@@ -360,33 +374,5 @@ def walls_of(group: dict) -> np.ndarray:
     """(W, 2, 2) the straight walls in /parameters/wall."""
     if "from" not in group:
         return np.empty((0, 2, 2))
-    ends = [np.reshape(group[end], (-1, 2)).astype(float) for end in ("from", "to")]
-    return np.stack(ends, axis=1)
-
-
-def vector(group: h5py.Group, name: str, default: np.ndarray | None) -> np.ndarray:
-    """A small vector that is a dataset or an attribute."""
-    if name in group:
-        return checked(group[name], 2, ())[:]
-    if name in group.attrs or default is None:
-        return np.asarray(group.attrs[name])
-    return default
-
-
-def tree(group: h5py.Group) -> dict:
-    """A group as a dictionary of plain values; attributes and datasets alike."""
-    values = {name: plain(value) for name, value in group.attrs.items()}
-    for name, item in group.items():
-        values[name] = tree(item) if isinstance(item, h5py.Group) else plain(item[()])
-    return values
-
-
-def plain(value: object) -> object:
-    """Text instead of bytes, Python numbers instead of arrays without an axis."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace").rstrip()
-    if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
-        return [plain(item) for item in value.ravel()]
-    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        return plain(value.item())
-    return value
+    ends = [np.reshape(group[end], (-1, 2)) for end in ("from", "to")]
+    return finite(np.stack(ends, axis=1), "wall")

@@ -7,6 +7,7 @@ import argparse
 import csv
 import re
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -16,7 +17,8 @@ import matplotlib
 import numpy as np
 
 from .drawing import LABELS, STYLE, plt, save
-from .reader import Run, RunError, did_you_mean, read_run
+from .files import did_you_mean, destination
+from .reader import Run, RunError, read_run
 from .statistics import Estimate
 from .thermodynamics import equilibrium_frames
 
@@ -238,8 +240,7 @@ def columns(table: Table) -> dict[str, Iterable]:
 def write_csv(path: Path, table: Table) -> None:
     """A table with one header line; numbers keep all their digits."""
     table = columns(table)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
+    with destination(path).open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table)
         writer.writerows(zip(*table.values(), strict=True))
@@ -269,13 +270,15 @@ def launch(main: Callable[[], None]) -> None:
     That includes numbers it can make no sense of: `python -X dev` shows where.
     """
     name = Path(sys.argv[0]).name
+    if not sys.flags.dev_mode:
+        warnings.simplefilter("ignore")
     try:
         main()
     except RunError as problem:
         give_up(name, str(problem))
     except OSError as problem:  # without a name: while writing, on a full disk
         give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
-    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as problem:
+    except Exception as problem:
         if sys.flags.dev_mode:
             raise
         give_up(name, f"cannot make sense of {' '.join(sys.argv[1:])}: {problem!r}")

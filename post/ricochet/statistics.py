@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
+MOST_WINDOWS = 10**6
 Law = Callable[[np.ndarray], np.ndarray]
 
 
@@ -46,15 +47,19 @@ def hold_against(
     Correlated values scatter as if there were fewer: `independent` is that number [all of them].
     """
     n = len(sample) if independent is None else independent
-    distance = float(stats.ks_1samp(sample, cdf).statistic)
+    distance = float(scipy.stats.ks_1samp(sample, cdf).statistic)
     counts, _ = np.histogram(cdf(np.asarray(sample)), bins=bins, range=(0, 1))
-    chi2 = stats.chisquare(counts, np.full(bins, counts.sum() / bins)).statistic * n / len(sample)
+    chi2 = (
+        scipy.stats.chisquare(counts, np.full(bins, counts.sum() / bins)).statistic
+        * n
+        / len(sample)
+    )
     return LawTest(
         n,
         distance,
-        float(stats.kstwo.sf(distance, n)),
+        float(scipy.stats.kstwo.sf(distance, n)),
         float(chi2) / (bins - 1),
-        float(stats.chi2.sf(chi2, bins - 1)),
+        float(scipy.stats.chi2.sf(chi2, bins - 1)),
     )
 
 
@@ -64,7 +69,7 @@ def estimate(values: np.ndarray, axis: int = 0) -> Estimate:
     mean = values.mean(axis=axis)
     if values.shape[axis] < 2:
         return Estimate(mean, np.full_like(mean, np.nan))
-    return Estimate(mean, stats.sem(values, axis=axis))
+    return Estimate(mean, values.std(axis=axis, ddof=1) / np.sqrt(values.shape[axis]))
 
 
 def combined(estimates: list[Estimate]) -> Estimate:
@@ -83,6 +88,8 @@ def ratio(amount: np.ndarray, per: np.ndarray, factor: float = 1.0) -> Estimate:
 def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Middles and means of the windows of a series (T,); an incomplete last one is left out."""
     count = max(1, int(np.floor((time[-1] - time[0]) / width + 1e-9)))
+    if count > MOST_WINDOWS:
+        raise ValueError(f"{count} windows of {width:g}")
     index = np.minimum(((time - time[0]) / width).astype(int), count)
     sums = np.bincount(index, value, count + 1)[:count]
     numbers = np.bincount(index, minlength=count + 1)[:count]

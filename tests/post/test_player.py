@@ -268,6 +268,64 @@ def test_it_loads_without_complaints_and_tells_what_it_shows(opened):
     assert "t = 3 · frame 4/40" in opened.run("return $('clock').textContent")
 
 
+#: Texts that would become part of a page which does not escape them.
+HOSTILE = (
+    "</title></script><script>document.title='taken'</script>",
+    "<img src=x onerror=\"document.title='taken'\">",
+    "<!--<script>",
+    "{{data}}&lt;b onload='x'",
+)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_texts_of_the_file_stay_texts(browser, tmp_path, rng, text):
+    name = text[:40]
+    path = bouncing_gas(
+        tmp_path / "gas.h5", rng, names=(name, "b"), parameters={"run": {"title": text}}
+    )
+    assert run_script("player", path, "-o", tmp_path / "gas.html") == 0
+    browser.open(tmp_path / "gas.html")
+    browser.run("step(0); trace([0]); $('colour').value = 'species'")
+    assert browser.complaints() == []
+    assert browser.run("return [document.title, document.querySelector('h1').textContent]") == [
+        text,
+        text,
+    ]
+    assert browser.run("return [kinds[0].name, $('energies').rows[1].cells[0].textContent]") == [
+        name,
+        name,
+    ]
+    assert name in browser.run("return $('disk').textContent")
+    assert browser.run("return document.querySelectorAll('img').length") == 0
+
+
+def test_the_policy_of_the_page_stops_what_is_not_its_own(opened):
+    opened.run(
+        """const body = document.body, create = tag => document.createElement(tag);
+        const add = (tag, more) => body.append(Object.assign(create(tag), more));
+        add('script', { textContent: 'document.title = "taken"' });
+        add('div', { innerHTML: '<b onclick="x" style="color: red">b</b>' });
+        add('img', { src: 'http://127.0.0.1:9/x.png' });
+        add('style', { textContent: 'h1 { color: rgb(1, 2, 3) }' });
+        window.refused = fetch('http://127.0.0.1:9/x').then(() => 0, () => 1);"""
+    )
+    said = [entry["message"] for entry in opened.complaints()]
+    for what in ("inline script", "inline event handler", "inline style", "image", "connect"):
+        assert any(what in line.lower() and "Content Security Policy" in line for line in said), (
+            what,
+            said,
+        )
+    assert opened.run("return document.title") == "A <gas> & more"
+
+
+def test_no_sign_of_the_data_opens_a_tag(tmp_path, rng):
+    path = bouncing_gas(tmp_path / "gas.h5", rng, names=("<a", "b</script>"))
+    run = read_run(path)
+    text = player.page(run, *player.film(run, [0, 1], "speed", []))
+    data = text.split('id="film">')[1].split("</script>")[0]
+    assert "<" not in data and json.loads(data)["species"][1]["name"] == "b</script>"
+
+
 def test_it_asks_nothing_of_the_network(opened):
     asked = opened.run("return performance.getEntriesByType('resource').map(r => r.name)")
     assert asked == []

@@ -209,3 +209,12 @@ def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
         for wall in walls:
             for i in (-1, 0, 1) if periodic[0] else (0,):
                 assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_python_without_packages_is_told_where_they_are(script):
+    command = [sys.executable, "-S", ROOT / "post" / f"{script}.py", "--help"]  # no site-packages
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 2 and run.stderr.count("\n") == 1
+    assert run.stderr.startswith(f"{script}.py: ") and "has no numpy, h5py" in run.stderr
+    assert f"{ROOT}/.venv/bin/python" in run.stderr

@@ -62,6 +62,7 @@ def ensemble(lab, *options, pause=0):
     return subprocess.run(
         command(lab, *options),
         env=environment(lab, pause),
+        cwd=lab,
         capture_output=True,
         text=True,
         timeout=60,
@@ -234,12 +235,159 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--seeds", "1", "--manifest", "x"], "either"),
         (["--manifest", "/nowhere"], "cannot read"),
         (["--seeds", "1,1"], "two members are called"),
+        (["--seeds", "1-1000000000"], "more than 100000 members"),
+        (["--seeds", "1-99999999999999999999"], "neither a number nor a range"),
+        (["--seeds", "1-1000", "--scan", "a.b=" + "1," * 200], "more than 100000 members"),
+        (["--seeds", "[0-9]*"], "'[0-9]*' is neither a number nor a range"),
+        (["--seeds", "08-10"], "'08-10' is neither a number nor a range"),
+        (["--seeds", "1,"], "'' is neither a number nor a range"),
+        (["--seeds", "1\n2"], "'1?2' holds control characters"),
+        (["--set", "run.title=a\tb", "--seeds", "1"], "control characters"),
+        (["--manifest", ""], "no members"),
+        (["--manifest", "."], "cannot read"),
+        (["--manifest", "/dev/zero"], "cannot read"),
+        (["--manifest", "fifo"], "cannot read"),
+        (["--seeds", "1", "--engine", "parallel", "--sshloginfile", "fifo"], "cannot read"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):
+    os.mkfifo(lab / "fifo")
+    for k in range(10):
+        (lab / str(k)).touch()
+    begin = time.monotonic()
     result = ensemble(lab, *options)
     assert result.returncode == 2
     assert message in result.stderr and result.stderr.count("\n") == 1
+    assert time.monotonic() - begin < 10, "at once"
+
+
+@pytest.mark.parametrize(
+    "name", ["", "  ", "-x", ".x", "a/b", "a\x01b", "x ", "x.chk", "slurm", "n" * 201]
+)
+def test_what_cannot_name_a_member_is_one_line(lab, name):
+    (lab / "members.txt").write_text(f"{name}\t--set run.seed=1\n")
+    result = ensemble(lab, "--manifest", str(lab / "members.txt"))
+    assert result.returncode == 2 and result.stderr.count("\n") == 1
+    assert "cannot name a member" in result.stderr
+    assert not (lab / "out").exists()
+
+
+def test_names_may_be_signs_of_the_shell(lab):
+    names = ["*", "@", "$HOME", "a;b", "[x]", "'", '"', "!", "~", "a&b", "%s", "\\n", "ü"]
+    (lab / "members.txt").write_text("".join(f"{name}\t--set run.seed=1\n" for name in names))
+    for _ in range(2):  # the second time from the folder's own list
+        assert ensemble(lab, "--manifest", str(lab / "members.txt")).returncode == 0
+    assert starts(lab) == {name: ["anew run.seed=1|"] for name in names}
+
+
+def test_a_folder_may_begin_with_a_dash(lab):
+    result = subprocess.run(
+        [SCRIPT, "gas.nml", "-d", "-out", "--seeds", "1"],
+        env=environment(lab),
+        cwd=lab,
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result.stderr
+    assert (lab / "-out" / "seed_1.h5").exists()
+
+
+def planted(path, how, precious):
+    """Something that the launcher must not write to, nor wait for."""
+    if how == "link":
+        path.symlink_to(precious)
+    elif how == "dangling link":
+        path.symlink_to(precious.with_name("nowhere"))
+    elif how == "hard link":
+        path.hardlink_to(precious)
+    elif how == "fifo":
+        os.mkfifo(path)
+    elif how == "folder":
+        path.mkdir()
+    else:
+        path.write_text("another's")
+
+
+@pytest.mark.parametrize("how", ["link", "dangling link", "hard link", "fifo", "folder", "file"])
+@pytest.mark.parametrize("name", ["seed_2.log", "input.nml", "manifest.txt"])
+def test_only_files_of_its_own_are_written(lab, name, how):
+    """Whatever stands in their place is named in one line, before any member runs."""
+    (lab / "out").mkdir()
+    precious = lab / "precious"
+    precious.write_text("precious")
+    planted(lab / "out" / name, how, precious)
+    result = ensemble(lab, "--seeds", "1-3")
+    if (name, how) in [("manifest.txt", "hard link"), ("manifest.txt", "file")]:
+        assert result.returncode == 0, "a list of members is replaced, not written to"
+    else:
+        assert result.returncode == 3 and result.stderr.count("\n") == 1
+        assert f"out/{name} is not" in result.stderr and starts(lab) == {}
+    assert precious.read_text() == "precious" and not (lab / "nowhere").exists()
+
+
+@pytest.mark.parametrize("how", ["link", "dangling link", "hard link", "fifo", "folder"])
+def test_a_log_that_is_planted_while_the_ensemble_runs_is_not_written(lab, how):
+    precious = lab / "precious"
+    precious.write_text("precious")
+    with subprocess.Popen(
+        command(lab, "--seeds", "1-2", "-j", "1"),
+        env=environment(lab, 20),
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        wait_for((lab / "out" / "seed_1.starts").exists)
+        planted(lab / "out" / "seed_2.log", how, precious)
+        said = process.communicate(timeout=30)[1]
+    assert process.returncode == 1
+    assert f"failed: seed_2: cannot write {lab}/out/seed_2.log" in said
+    assert precious.read_text() == "precious" and not (lab / "nowhere").exists()
+    assert list(starts(lab)) == ["seed_1"]
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(lab, small_disk):
+    full = small_disk(4)
+    (full / "filler").write_bytes(bytes(4096))
+
+    def start(*seeds):
+        line = [SCRIPT, lab / "gas.nml", "-d", full / "out", "--seeds", *seeds]
+        return subprocess.run(line, env=environment(lab), capture_output=True, text=True)
+
+    result = start("1-3")
+    assert result.returncode == 3 and result.stderr.count("\n") == 1
+    assert "No space left on device" in result.stderr
+    assert list((full / "out").iterdir()) == []
+    small_disk(400)
+    assert start("1-3").returncode == 0
+    small_disk(400, "ro")
+    assert start("1-3").returncode == 0, "nothing is left to write"
+    result = start("1-4")
+    assert result.returncode == 3 and result.stderr.count("\n") == 1
+    assert "Read-only file system" in result.stderr
+
+
+def test_two_commands_at_once_remember_the_members_of_both(lab):
+    lists = ["1-3", "4-6", "7-9"]
+    copies = [
+        subprocess.Popen(command(lab, "--seeds", seeds), env=environment(lab)) for seeds in lists
+    ]
+    assert [copy.wait(timeout=60) for copy in copies] == [0, 0, 0]
+    lines = (lab / "out" / "manifest.txt").read_text().splitlines()
+    assert lines == [f"seed_{k}\t--set run.seed={k}" for k in range(1, 10)]
+    assert ensemble(lab, "--seeds", "1-9").returncode == 0
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_stops_all_members_soon_and_it_is_said(real, tmp_path, how):
+    process = real("stopped", "-j", "2", "--set", "stop.time=1e6")
+    wait_for(lambda: len(list((tmp_path / "stopped").glob("*.part"))) == 2)
+    time.sleep(0.3)
+    begin = time.monotonic()
+    process.send_signal(how)
+    said = process.communicate(timeout=20)[1]
+    assert time.monotonic() - begin < 5, "two seconds, on a machine that has other work"
+    assert process.returncode == 75 and members_in(tmp_path / "stopped") == []
+    assert "0 of 6 members finished" in said and "stopped: the same command goes on" in said
+    assert len(list((tmp_path / "stopped").glob("*.chk.h5"))) == 2
 
 
 def test_dry_run_starts_nothing(lab):

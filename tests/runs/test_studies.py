@@ -66,6 +66,15 @@ def test_a_study_names_its_members_and_draws_its_figures(study, tmp_path, system
         assert set((tmp_path / "language.txt").read_text().split()) == {"C"}
 
 
+def test_a_list_of_members_is_not_written_through_a_link(study, tmp_path):
+    precious = tmp_path / "precious"
+    precious.write_text("precious")
+    (tmp_path / "runs" / "scattering").mkdir()
+    (tmp_path / "runs" / "scattering" / "members.txt").symlink_to(precious)
+    assert study("scattering", "--dry-run").returncode == 0
+    assert precious.read_text() == "precious"
+
+
 @pytest.mark.parametrize("script", [*SYSTEMS, "figures"])
 def test_help_says_what_a_study_does_and_starts_nothing(study, tmp_path, script):
     run = study(script, "--help")

@@ -1,0 +1,18 @@
+"""The packages of others that this one needs: all that are missing, and what to do about it.
+
+The scripts import `ricochet` before others, so that no script needs to look for itself.
+"""
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+missing = [name for name in ("numpy", "h5py", "matplotlib", "scipy", "tqdm") if not find_spec(name)]
+if missing:
+    script, root = Path(sys.argv[0]).resolve(), Path(__file__).resolve().parents[2]
+    way = f"`make demo` in {root} installs them for {root / '.venv/bin/python'}"
+    reason = f"{sys.executable} has no {', '.join(missing)}; {way}"
+    if script.parent != root / "post":
+        raise ImportError(reason)
+    print(f"{script.name}: {reason}", file=sys.stderr)
+    sys.exit(2)
