@@ -20,7 +20,7 @@ module output
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, &
-    remove_file, seconds, synchronize
+    record_signals, remove_file, seconds, synchronize
   use texts, only: written
   implicit none
   private
@@ -143,6 +143,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: made, taken
 
+    call record_signals()                         ! from here on there is something to lose
     self%path = path
     self%opened = seconds()
     call make_folders_of(path, made)
