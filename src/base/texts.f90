@@ -4,7 +4,7 @@ module texts
   use kinds, only: int64, real64
   implicit none
   private
-  public :: text_t, written, written_exactly, lower_case, shown, joined, place_of, nearest_word, suggestion
+  public :: text_t, written, written_exactly, lower_case, shown, joined, place_of, nearest_word, suggestion, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -192,5 +192,17 @@ contains
     end do
     distance = d(len(a), len(b))
   end function edit_distance
+
+  !> A number of bytes, for messages.
+  pure function size_text(bytes) result(text)
+    integer(int64), intent(in) :: bytes
+    character(len=:), allocatable :: text
+
+    if (bytes < 1000000) then
+      text = written((bytes + 999)/1000)//" kB"
+    else
+      text = written((bytes + 500000)/1000000)//" MB"
+    end if
+  end function size_text
 
 end module texts

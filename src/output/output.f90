@@ -7,13 +7,11 @@ module output
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use h5md_file, only: event_track, frame_track, h5md_file_t, n_tracks, observable_track
-  use h5md_layout, only: event_counter, frame_counter, observables_group, position, sample_counter, time_of, &
-    value_of
+  use h5md_layout, only: event_counter, frame_counter, observables_group, position, sample_counter, time_of, value_of
   use hdf5_objects, only: hdf5_file_t
   use observables, only: observed
   use run_description, only: describe_cost, describe_run
-  use run_files, only: current_checkpoint, is_file, is_hdf5_file, lock, remove_checkpoints, run_file, &
-    unfinished, unfinished_new
+  use run_files, only: current_checkpoint, is_file, is_hdf5_file, lock, remove_checkpoints, run_file, unfinished, unfinished_new
   use run_input, only: run_input_t
   use samples, only: event_series, frame_sample, frame_series, observable_sample, observable_series
   use settings, only: output_settings_t
@@ -24,8 +22,9 @@ module output
   use texts, only: written
   implicit none
   private
-  public :: output_t, progress_t
+  public :: output_t, planned_bytes, progress_t
 
+  integer(int64), parameter :: constants = 24            !! per disk: id, species, mass, radius [bytes]
   real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
 
   !> How far the output has come: with the state, all that is needed to go on.
@@ -94,7 +93,7 @@ contains
     if (.not. allocated(error)) then
       self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
-      call check_room(self%h5md, capacities, path, error)
+      call check_room(planned_bytes(input, sim), path, error)
     end if
     if (.not. allocated(error)) then
       call remove_checkpoints(path)
@@ -200,19 +199,29 @@ contains
     capacities = [self%progress%frames%planned(rule%limits), self%progress%observables%planned(rule%limits), 0_int64]
   end subroutine plan
 
+  !> Bytes that the output of a run needs at least: where the number of samples is unknown the first and the last count.
+  function planned_bytes(input, sim) result(bytes)
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: bytes, capacities(n_tracks)
+    type(output_t) :: output
+    real(real64) :: samples(2), rooms(2)
+
+    output%progress = progress_t(input%settings%output)
+    call output%plan(input, sim, capacities)
+    samples = real(max(capacities([frame_track, observable_track]), 2_int64), real64)
+    rooms = [output%h5md%track(frame_track)%room(), output%h5md%track(observable_track)%room()]
+    bytes = int(min(constants*sim%n_disks() + dot_product(samples, rooms), 9.0e18_real64), int64)
+  end function planned_bytes
+
   !> Refuses a run whose planned output does not fit onto the disk.
-  subroutine check_room(h5md, capacities, path, error)
-    type(h5md_file_t), intent(in) :: h5md
-    integer(int64), intent(in) :: capacities(n_tracks)
+  subroutine check_room(needed, path, error)
+    integer(int64), intent(in) :: needed          !! [bytes]
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    real(real64) :: needed
 
-    needed = real(max(capacities(frame_track), 2_int64), real64)*real(h5md%track(frame_track)%room(), real64) &
-      + real(max(capacities(observable_track), 2_int64), real64)*real(h5md%track(observable_track)%room(), real64)
-    if (needed > real(free_bytes(path), real64)) call fail(error, exit_files, path &
-      //": the output will have "//written(int(min(needed, 9.0e18_real64), int64))//" bytes, " &
-      //written(free_bytes(path))//" are free; choose fewer frames or make room")
+    if (needed > free_bytes(path)) call fail(error, exit_files, path//": the output will have "//written(needed) &
+      //" bytes, "//written(free_bytes(path))//" are free; choose fewer frames or make room")
   end subroutine check_room
 
   !> Creates a file under a temporary name, with everything but the tracks.
