@@ -9,20 +9,22 @@ module run
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
-  use output, only: output_t
+  use output, only: output_t, planned_bytes
   use progress_line, only: progress_line_t
   use run_files, only: current_checkpoint, is_file, run_file
   use run_input, only: run_input_t
   use run_setup, only: choose_evolution, new_simulation, read_input
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requests, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
-  use texts, only: written
+  use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
+  use system, only: folder_of, is_folder, print_text, seconds
+  use texts, only: size_text, written
   implicit none
   private
   public :: perform_run
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
+  integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
   character(len=1), parameter :: eol = new_line("a")
 
   type :: run_t
@@ -32,6 +34,7 @@ module run
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: stop_rule
     type(output_t) :: output
+    type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! by the clock of `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
   end type run_t
@@ -47,8 +50,10 @@ contains
     run%started = seconds()
     run%command = command
     call watch_signals()
+    call run%line%open(command%quiet)
+    call end_at_signals("stopped before the run began; nothing is lost: repeat the command")
     call read_input(command%input, command%overrides, run%input, error)
-    if (.not. allocated(error)) call check_memory(run%input%settings%species, error)
+    if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
     call choose_evolution(run%input%settings, run%evolution)
     if (command%resume) then
@@ -62,7 +67,10 @@ contains
     call follow(run, error)
     if (.not. allocated(error)) call run%output%finish(run%sim, seconds() - run%started, run%rate, error)
     if (allocated(error)) call rescue(run, error)
-    if (.not. allocated(error)) call print_text(summary(run), error)
+    if (.not. allocated(error)) then
+      call end_at_signals("stopped; the run is finished, only its summary is missing")
+      call print_text(summary(run), error)
+    end if
     call run%output%release()
   end subroutine perform_run
 
@@ -72,12 +80,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new
 
-    call new_simulation(run%input%settings, run%sim, error)
+    call new_simulation(run%input%settings, run%line, run%sim, error)
+    call run%line%clear()
     if (allocated(error)) return
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks", error)
+        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks; the output needs at least " &
+          //size_text(planned_bytes(run%input, run%sim)), error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
@@ -94,6 +104,8 @@ contains
 
     text = run%evolution%warning(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
+    if (planned_bytes(run%input, run%sim) > much .and. .not. run%command%check) write (error_unit, "(a)") &
+      "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn
@@ -117,10 +129,10 @@ contains
   subroutine main_loop(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
-    type(progress_line_t) :: line
     type(limits_t) :: limits
     integer(int64) :: turns
-    integer :: requests_served
+    integer :: requests, requests_served
+    logical :: stopping
     real(real64) :: now, before, next_checkpoint      ! [s]
     real(real64) :: first_time                        ! of the simulation [time]
 
@@ -129,7 +141,7 @@ contains
     first_time = run%sim%time()
     before = seconds()
     next_checkpoint = before + run%input%settings%output%checkpoint_every
-    call line%start(run%sim, run%stop_rule, run%started, run%command%quiet)
+    call run%line%start(run%sim, run%stop_rule, run%started)
     do while (.not. is_over(run))
       limits = run%stop_rule%limits
       limits%events = min(limits%events, run%stop_rule%next_check(run%sim))
@@ -141,25 +153,25 @@ contains
       call run%output%write_what_is_due(run%sim, error)
       if (allocated(error)) exit
       now = seconds()
+      stopping = stop_requested()
       ! However short the wall clock, each part of a run makes some progress.
-      if (stop_requested() .or. (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock)) then
-        call run%output%reserve%give_up()
+      if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
+      requests = checkpoint_requests()
+      if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
+        requests_served = requests
+        if (stopping) call run%output%reserve%give_up()
         call write_checkpoint(run%sim, run%output, error)
-        if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
-          //written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
-        exit
-      end if
-      if (checkpoint_requests() > requests_served .or. now > next_checkpoint) then
-        requests_served = checkpoint_requests()
-        call write_checkpoint(run%sim, run%output, error)
+        if (stop_requested()) stopping = .true.            ! while it was written
+        if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
+          written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
         if (allocated(error)) exit
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow
       end if
-      call line%report(run%sim, run%stop_rule)
+      call run%line%report(run%sim, run%stop_rule)
       turns = adapted(turns, now - before)
       before = now
     end do
-    call line%clear()
+    call run%line%clear()
   end subroutine main_loop
 
   !> Writes a checkpoint of a run that cannot write its output any more, and adds to the error how to go on.

@@ -1,4 +1,4 @@
-!> What the operating system offers and Fortran does not: signals, a monotonic clock, terminals, file locks,
+!> What the operating system offers and Fortran does not: a monotonic clock, terminals, file locks,
 !> atomic renames, free disk space, and an exit that prints nothing. Whatever needs a C header is in
 !> `system_calls.c`.
 module system
@@ -8,7 +8,6 @@ module system
   use kinds, only: int64
   implicit none
   private
-  public :: watch_signals, stop_requested, checkpoint_requests
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
   public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
@@ -71,12 +70,6 @@ module system
       import :: c_double
       real(c_double) :: t
     end function seconds
-
-    !> How many times USR1 has requested a checkpoint.
-    function checkpoint_requests() result(requests) bind(C, name="system_checkpoint_requests")
-      import :: c_int
-      integer(c_int) :: requests
-    end function checkpoint_requests
 
     ! The calls of system_calls.c, which says more.
     subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
@@ -154,11 +147,6 @@ module system
   !> would take their places, and messages would end up in them.
   procedure(plain_call), bind(C, name="system_fill_standard_streams") :: fill_standard_streams
 
-  !> From now on TERM, INT, HUP and XCPU request a stop with a checkpoint, USR1 a checkpoint; signals that the
-  !> caller chose to ignore (nohup) stay ignored. A file that grows beyond its limit is a failed write.
-  procedure(plain_call), bind(C, name="system_watch_signals") :: watch_signals
-
-  procedure(question), bind(C, name="system_stop_requested") :: stop_requested        !! by a signal
   procedure(question), bind(C, name="system_talks_to_terminal") :: talks_to_terminal  !! on standard error
 
   procedure(path_call), bind(C, name="system_synchronize") :: c_synchronize

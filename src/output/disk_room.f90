@@ -1,7 +1,7 @@
 !> Room on the disk: what the planned output needs, and what is kept for the end. A run that cannot write its
 !> output any more still writes a checkpoint, and in it the samples that have no room elsewhere.
 module disk_room
-  use kinds, only: int64, real64
+  use kinds, only: int64
   use errors, only: error_t, exit_files, fail
   use event_log, only: log_capacity
   use h5md_file, only: event_track, n_tracks
@@ -44,18 +44,15 @@ contains
   end subroutine keep_room
 
   !> Refuses a run whose planned output, and the room for its end, do not fit onto the disk.
-  subroutine check_room(track, capacities, kept, path, error)
-    type(track_t), intent(in) :: track(n_tracks)
-    integer(int64), intent(in) :: capacities(n_tracks)
+  subroutine check_room(planned, kept, path, error)
+    integer(int64), intent(in) :: planned         !! for the output [bytes]
     integer(int64), intent(in) :: kept            !! for the end [bytes]
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
-    real(real64) :: planned
 
-    planned = sum(real(max(capacities, 2_int64), real64)*real(track%room(), real64))
-    if (planned + kept > real(free_bytes(path), real64)) call fail(error, exit_files, path//": the output will have " &
-      //written(int(min(planned, 9.0e18_real64), int64))//" bytes, its end needs "//written(kept)//" more, " &
-      //written(free_bytes(path))//" are free; choose fewer frames or make room")
+    if (planned > free_bytes(path) - kept) call fail(error, exit_files, path//": the output will have " &
+      //written(planned)//" bytes, its end needs "//written(kept)//" more, "//written(free_bytes(path)) &
+      //" are free; choose fewer frames or make room")
   end subroutine check_room
 
   !> Bytes that a checkpoint of n disks needs.

@@ -20,12 +20,14 @@ module output
   use sample_track, only: samples_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, &
-    reserve_t, seconds, synchronize
+  use signals, only: record_signals
+  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, reserve_t, &
+    seconds, synchronize
   implicit none
   private
-  public :: output_t, progress_t
+  public :: output_t, planned_bytes, progress_t
 
+  integer(int64), parameter :: constants = 24            !! per disk: id, species, mass, radius [bytes]
   real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
 
   !> How far the output has come: with the state, all that is needed to go on.
@@ -108,7 +110,7 @@ contains
       self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
       kept = last_room(self%h5md%track, capacities, sim%n_disks())
-      call check_room(self%h5md%track, capacities, kept, path, error)
+      call check_room(planned_bytes(input, sim), kept, path, error)
     end if
     if (.not. allocated(error)) call keep_room(self%reserve, kept, path, error)
     if (.not. allocated(error)) then
@@ -166,6 +168,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
+    call record_signals()                         ! from here on there is something to lose
     self%path = path
     self%opened = seconds()
     call make_folders_of(path, made)
@@ -204,6 +207,21 @@ contains
     rule = stop_rule_t(input%settings%stop, sim)
     capacities = [self%progress%frames%planned(rule%limits), self%progress%observables%planned(rule%limits), 0_int64]
   end subroutine plan
+
+  !> Bytes that the output of a run needs at least: where the number of samples is unknown the first and the last count.
+  function planned_bytes(input, sim) result(bytes)
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: bytes, capacities(n_tracks)
+    type(output_t) :: output
+    real(real64) :: samples(2), rooms(2)
+
+    output%progress = progress_t(input%settings%output)
+    call output%plan(input, sim, capacities)
+    samples = real(max(capacities([frame_track, observable_track]), 2_int64), real64)
+    rooms = [output%h5md%track(frame_track)%room(), output%h5md%track(observable_track)%room()]
+    bytes = int(min(constants*sim%n_disks() + dot_product(samples, rooms), 9.0e18_real64), int64)
+  end function planned_bytes
 
   !> Creates a file under a temporary name, with everything but the tracks.
   subroutine create_file(self, file, sim)

@@ -11,7 +11,7 @@ module last_frame
   public :: read_last_frame
 
   integer, parameter :: name_length = 64
-  integer(int64), parameter :: most_disks = 100000000       !! of any run
+  integer(int64), parameter :: most_disks = 100000000       !! that a run can have written
 
 contains
 
@@ -27,14 +27,19 @@ contains
     type(hdf5_file_t) :: file
     character(len=name_length), allocatable :: names(:)
     integer(int32), allocatable :: species(:)
-    integer(int64) :: n
+    integer(int64) :: n_disks
     integer :: k
 
     call file%open(path, .false.)
+    n_disks = max(0_int64, file%length(disk_species))
+    if (max(n_disks, file%length(species_names)) > most_disks) then
+      call file%check(-1, "be read: its size is not that of a run's")
+      call file%close()
+      call file%report(error)
+      return
+    end if
     call file%fetch_texts(species_names, name_length, names)
-    n = file%length(disk_species)
-    if (n > most_disks) n = 0                               ! then it cannot be read
-    allocate (species(max(0_int64, n)))
+    allocate (species(n_disks))
     call file%fetch(disk_species, size(species), species)
     allocate (chosen, source=pack([(k, k=1, size(species))], species == findloc(names, name, dim=1)))
     if (size(chosen) == count) then
