@@ -335,7 +335,11 @@ contains
     place = address
     status = -1
     if (self%length(name) == n) then
-      call self%open_dataset(name, dataset, status, like=in_memory)
+      if (in_memory == h5t_native_double) then
+        call self%open_dataset(name, dataset, status)       ! integers make reals, too
+      else
+        call self%open_dataset(name, dataset, status, like=in_memory)
+      end if
       if (status >= 0) call h5dread_f(dataset, in_memory, place, status)
       call h5dclose_f(dataset, closed)
     end if

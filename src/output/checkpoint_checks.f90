@@ -94,7 +94,7 @@ contains
     flaw = ""
     do i = 1, sim%n_disks()
       associate (speed => sqrt(2*(sim%start_energy + fall)/sim%species(sim%tag(i)%species)%mass))
-        flaw = flaw_of_place(sim, i, speed, dt*speed + sunk)
+        call check_place(sim, i, speed, dt*speed + sunk, flaw)
       end associate
       if (flaw /= "") return
     end do
@@ -103,16 +103,15 @@ contains
       "start_energy less dissipated is "//written(sim%start_energy - sim%dissipated)//", but the disks have "//written(energy)
   end function flaw_of_motion
 
-  !> The same of one disk.
-  pure function flaw_of_place(sim, i, speed, beyond) result(flaw)
+  !> The same of one disk. Without a flaw the text is not touched, as there may be many disks.
+  pure subroutine check_place(sim, i, speed, beyond, flaw)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: speed             !! that it cannot have had [length/time]
     real(real64), intent(in) :: beyond(2)         !! how far it may be beyond a wall [length]
-    character(len=:), allocatable :: flaw
+    character(len=:), allocatable, intent(inout) :: flaw
     real(real64) :: x(2), reach(2), periods(2)
 
-    flaw = ""
     associate (disk => sim%disk(i), tag => sim%tag(i), edges => sim%box%edges())
       periods = merge(2 + speed*sim%time()/edges, 0.0_real64, sim%box%periodic)
       if (disk%clock > sim%now .or. disk%clock < -sim%epoch*(1 + rounding)) then
@@ -126,7 +125,7 @@ contains
           //": the disk is outside the box, at "//written(x(1))//", "//written(x(2))
       end if
     end associate
-  end function flaw_of_place
+  end subroutine check_place
 
   !> A row of a dataset of the disks.
   pure function in_row(name, i) result(text)

@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -28,7 +30,7 @@ from whole_runs import FILES, FINISHED, STOPPED, USAGE, committed, seal
 HARMLESS = {"finished", "stopped", "refused", "broke off"}
 CHECKPOINT, OUTPUT = "gas.chk.h5", "gas.h5.part"
 TIME_LIMIT = 20
-#: For a program with sanitizers: HDF5 itself asks for absurd sizes, and leaks, if a file is damaged.
+#: For a program with sanitizers: in damaged files HDF5 itself asks for absurd sizes, and leaks.
 SANITIZER = "detect_leaks=0:allocator_may_return_null=1:log_path=sanitizer"
 ENVIRONMENT = os.environ | {"ASAN_OPTIONS": SANITIZER, "UBSAN_OPTIONS": "log_path=sanitizer"}
 BROKEN = 4
@@ -45,7 +47,8 @@ SYSTEMS = {
     "pairs": """&box boundary = 'periodic', 'wall' / &stop events = 3000 /
         &obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 / &run search = 'pairs' /
         &output observables_every_events = 100 /""",
-    "steps": """&run dynamics = 'steps' dt = 2e-3 / &box gravity = 0, -1 boundary = 'periodic', 'wall' /
+    "steps": """&run dynamics = 'steps' dt = 2e-3 /
+        &box gravity = 0, -1 boundary = 'periodic', 'wall' /
         &contact restitution = 0.99 contact_time = 5e-3 / &stop time = 20 /
         &output frames_every_time = 1 /""",
 }
@@ -143,7 +146,8 @@ def edits(path: Path, rng: random.Random) -> list[tuple]:
         file.visititems(lambda name, item: names.append(name) if hasattr(item, "shape") else None)
         for name in names:
             item = file[name]
-            found += [(f"{name}: {kind}", partial(remake, name, how)) for kind, how in SHAPES.items()]
+            for kind, how in SHAPES.items():
+                found.append((f"{name}: {kind}", partial(remake, name, how)))
             if item.dtype.kind not in "if":
                 continue
             row = rng.randrange(len(item)) if item.shape else ()
@@ -234,11 +238,13 @@ def verdict_of(status: int, errors: str, folder: Path) -> tuple[str, str]:
     return known[status], errors
 
 
+@dataclass(repr=False)
 class Injury:
     """What is done to one of the files of a stopped run; its words tell it in a report."""
 
-    def __init__(self, file: str, words: str, edit):
-        self.file, self.words, self.edit = file, words, edit
+    file: str
+    words: str
+    edit: Callable | random.Random
 
     def __repr__(self) -> str:
         return f"{self.file}: {self.words}"
