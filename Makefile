@@ -38,7 +38,8 @@ flags = $(FFLAGS) -ffp-contract=off $(if $(gnu),$(CHECKS) -ffpe-summary=none)
 # gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
 c_compiler = $(if $(gnu),$(FC),$(CC))
 c_flags = -Wall -Wextra $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
-hints = $(if $(HINTS),-Wl$(comma)--wrap=malloc)
+wrapped := -Wl,--wrap=malloc,--wrap=realloc
+hints = $(if $(HINTS),$(wrapped))
 
 PYTHON := $(if $(wildcard .venv/bin/python),.venv/bin/python,python3)
 Q := $(if $(V),,@)
@@ -107,7 +108,7 @@ $(BUILD)/deps.mk: FORCE
 # Whether compiler, linker and system know what the hints are made of.
 $(BUILD)/hints.mk: src/base/memory_hints.c
 	@echo 'int main(void) { return 0; }' > $@.c; \
-	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c -Wl,--wrap=malloc -o $@.out 2>/dev/null; \
+	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c $(wrapped) -o $@.out 2>/dev/null; \
 	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
 
 $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects)

@@ -16,7 +16,8 @@ module run
   use run_setup, only: choose_evolution, new_simulation, read_input
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: checkpoint_requests, folder_of, is_folder, print_text, seconds, stop_requested, watch_signals
+  use system, only: checkpoint_requests, end_at_signals, folder_of, is_folder, print_text, seconds, stop_requested, &
+    watch_signals
   use texts, only: written
   implicit none
   private
@@ -32,6 +33,7 @@ module run
     class(evolution_t), allocatable :: evolution
     type(stop_rule_t) :: stop_rule
     type(output_t) :: output
+    type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! by the clock of `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
   end type run_t
@@ -47,6 +49,8 @@ contains
     run%started = seconds()
     run%command = command
     call watch_signals()
+    call run%line%open(command%quiet)
+    call end_at_signals("stopped before the run began; nothing is lost: repeat the command")
     call read_input(command%input, command%overrides, run%input, error)
     if (.not. allocated(error)) call check_memory(run%input%settings%species, error)
     if (allocated(error)) return
@@ -72,7 +76,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new
 
-    call new_simulation(run%input%settings, run%sim, error)
+    call new_simulation(run%input%settings, run%line, run%sim, error)
+    call run%line%clear()
     if (allocated(error)) return
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
@@ -117,10 +122,10 @@ contains
   subroutine main_loop(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
-    type(progress_line_t) :: line
     type(limits_t) :: limits
     integer(int64) :: turns
-    integer :: requests_served
+    integer :: requests, requests_served
+    logical :: stopping
     real(real64) :: now, before, next_checkpoint      ! [s]
     real(real64) :: first_time                        ! of the simulation [time]
 
@@ -129,7 +134,7 @@ contains
     first_time = run%sim%time()
     before = seconds()
     next_checkpoint = before + run%input%settings%output%checkpoint_every
-    call line%start(run%sim, run%stop_rule, run%started, run%command%quiet)
+    call run%line%start(run%sim, run%stop_rule, run%started)
     do while (.not. is_over(run))
       limits = run%stop_rule%limits
       limits%events = min(limits%events, run%stop_rule%next_check(run%sim))
@@ -141,25 +146,25 @@ contains
       call run%output%write_what_is_due(run%sim, error)
       if (allocated(error)) exit
       now = seconds()
+      stopping = stop_requested()
       ! However short the wall clock, each part of a run makes some progress.
-      if (stop_requested() .or. (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock)) then
-        call run%output%reserve%give_up()
+      if (run%sim%time() > first_time .and. now - run%started > run%stop_rule%wall_clock) stopping = .true.
+      requests = checkpoint_requests()
+      if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
+        requests_served = requests
+        if (stopping) call run%output%reserve%give_up()
         call write_checkpoint(run%sim, run%output, error)
-        if (.not. allocated(error)) call fail(error, exit_stopped, "stopped at time " &
-          //written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
-        exit
-      end if
-      if (checkpoint_requests() > requests_served .or. now > next_checkpoint) then
-        requests_served = checkpoint_requests()
-        call write_checkpoint(run%sim, run%output, error)
+        if (stop_requested()) stopping = .true.            ! while it was written
+        if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
+          written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
         if (allocated(error)) exit
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow
       end if
-      call line%report(run%sim, run%stop_rule)
+      call run%line%report(run%sim, run%stop_rule)
       turns = adapted(turns, now - before)
       before = now
     end do
-    call line%clear()
+    call run%line%clear()
   end subroutine main_loop
 
   !> Writes a checkpoint of a run that cannot write its output any more, and adds to the error how to go on.

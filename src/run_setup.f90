@@ -17,6 +17,7 @@ module run_setup
   use run_input, only: run_input_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
   use texts, only: text_t
   use time_stepped, only: time_stepped_t
   implicit none
@@ -54,12 +55,13 @@ contains
   end subroutine settings_from_text
 
   !> The state at the start of a run, the disks in an order that suits the memory.
-  subroutine new_simulation(settings, sim, error)
+  subroutine new_simulation(settings, line, sim, error)
     type(settings_t), intent(in) :: settings
+    class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
 
-    call create_simulation(settings, sim, error)
+    call create_simulation(settings, line, sim, error)
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 

@@ -3,12 +3,32 @@
 #include <stdint.h>
 
 #ifdef MEMORY_HINTS
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 #ifdef __linux__
+#include <malloc.h>
 #include <sys/mman.h>
 #endif
 
 #define PREFETCH(address) __builtin_prefetch(address)
+
+static const size_t line = 64, large = 128*1024, page = 2*1024*1024;
+
+/* The answer to every `allocate`, and to every temporary array, that finds no memory: one line and the exit code of
+   files and system. What is committed in files stays as it is. */
+static void *obtained(void *memory, size_t bytes)
+{
+    if (!memory && bytes) {
+        char text[160];
+        snprintf(text, sizeof text, "%sout of memory: %zu bytes are not to be had; use fewer disks, or raise the limit\n",
+                 isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "", bytes);
+        (void)!write(STDERR_FILENO, text, strlen(text));
+        _exit(3);
+    }
+    return memory;
+}
 
 /* Large arrays start on a cache line, so that a record as long as a line lies in one. Larger ones lie on huge pages, if
    the system has any to spare: the TLB covers few pages. The linker redirects malloc here (--wrap=malloc) because
@@ -16,14 +36,28 @@
 void *__real_malloc(size_t bytes);
 __attribute__((used)) void *__wrap_malloc(size_t bytes)
 {
-    const size_t line = 64, large = 128*1024, page = 2*1024*1024;
     void *memory;
-    if (bytes < large) return __real_malloc(bytes);
-    if (posix_memalign(&memory, bytes < page ? line : page, bytes)) return NULL;
+    if (bytes < large) return obtained(__real_malloc(bytes), bytes);
+    if (posix_memalign(&memory, bytes < page ? line : page, bytes)) memory = NULL;
 #ifdef MADV_HUGEPAGE
-    if (bytes >= page) madvise(memory, bytes / page * page, MADV_HUGEPAGE);
+    if (memory && bytes >= page) madvise(memory, bytes / page * page, MADV_HUGEPAGE);
 #endif
-    return memory;
+    return obtained(memory, bytes);
+}
+
+void *__real_realloc(void *memory, size_t bytes);
+__attribute__((used)) void *__wrap_realloc(void *memory, size_t bytes)
+{
+    return obtained(__real_realloc(memory, bytes), bytes);
+}
+
+/* Large arrays that come and go are mapped and unmapped. Otherwise the C library raises the size from which it does so,
+   and each new one may end up behind the last one: the heap of a long run grows without end. */
+__attribute__((constructor, used)) static void map_large_arrays(void)
+{
+#ifdef M_MMAP_THRESHOLD
+    mallopt(M_MMAP_THRESHOLD, (int)large);
+#endif
 }
 
 #else

@@ -28,8 +28,10 @@ contains
       place(k) = first(key(k))
       first(key(k)) = first(key(k)) + 1
     end do
-    ! Each entry has moved on to the first item of the next key.
-    first = eoshift(first, -1, boundary=1_int32)
+    do k = n_keys, 1, -1                                  ! each has moved on to the first item of the next key
+      first(k + 1) = first(k)
+    end do
+    first(1) = 1
   end subroutine sort_by_count
 
 end module sorting

@@ -26,14 +26,24 @@ double system_seconds(void)
 static volatile sig_atomic_t stop_signal, checkpoint_signals;
 static volatile double first_stop_at;
 
-/* Only records the signal; the main loop acts. Launchers often send a signal twice within moments; a second
-   stop signal that comes later than that ends the program at once. */
+/* How the program ends at a stop signal while there is nothing to lose. */
+static struct {
+    volatile sig_atomic_t code;  /* 0: there is something to lose */
+    char message[256];
+} ending;
+
+/* Ends the program at once while there is nothing to lose. Else it only records the signal, and the main loop
+   acts. Launchers often send a signal twice within moments; a second stop signal that comes later than that ends
+   the program at once. */
 static void note_signal(int number)
 {
     const double moments = 0.5;
     const int kept = errno;
     if (number == SIGUSR1) {
         checkpoint_signals++;
+    } else if (ending.code) {
+        (void)!write(STDERR_FILENO, ending.message, strlen(ending.message));
+        _exit(ending.code);
     } else if (!stop_signal) {
         first_stop_at = system_seconds();
         stop_signal = number;
@@ -53,6 +63,13 @@ void system_watch_signals(void)
         if (sigaction(watched[k], NULL, &previous) == 0 && previous.sa_handler != SIG_IGN)
             sigaction(watched[k], &action, NULL);
     signal(SIGXFSZ, SIG_IGN);
+}
+
+void system_end_at_signals(const char *message, int code)
+{
+    ending.code = 0;
+    strncpy(ending.message, message, sizeof ending.message - 1);
+    ending.code = code;
 }
 
 bool system_stop_requested(void) { return stop_signal != 0; }

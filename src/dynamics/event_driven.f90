@@ -15,6 +15,7 @@ module event_driven
   use partners, only: is_wall
   use renumbering, only: renumber
   use simulation_state, only: simulation_t
+  use system, only: stop_requested
   implicit none
   private
   public :: event_driven_t, events_per_epoch
@@ -72,6 +73,7 @@ contains
 
     call self%search%build(sim)
     do i = 1, sim%n_disks()
+      if (stop_requested()) return                 ! see `advance`
       call self%search%predict(sim, i)
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
@@ -93,7 +95,8 @@ contains
     n = max(events_per_check, events_per_check_and_disk*sim%n_disks())
   end function check_interval
 
-  !> Executes events until a limit is met.
+  !> Executes events until a limit is met. None after a stop has been requested: many predictions take long and are
+  !> then left unfinished; the state itself is whole.
   subroutine advance(self, sim, limits, error)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -101,16 +104,19 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_t) :: event
     real(real64) :: t_limit
-    integer(int64) :: turns, pause_at
+    integer(int64) :: turns, pause_at, events
 
     turns = limits%turns
     do while (turns > 0)
       if (limits%reached(sim) .or. self%log%is_full()) return
       if (sim%events >= sim%next_epoch) call move_epoch(self, sim)
+      if (stop_requested()) return
       t_limit = min(limits%time - sim%epoch, last_time)
       pause_at = next_pause(self, sim, limits)
       if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
+      events = sim%events
       call self%run_events(sim, t_limit, pause_at, turns, event)
+      if (self%search%everyone .and. sim%events > events) call self%predict_all(sim)
       if (.not. event%time <= t_limit) then
         if (event%time /= event%time) &
           call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
@@ -133,7 +139,6 @@ contains
     integer(int64), intent(inout) :: turns         !! that are left
     type(event_t), intent(out) :: event            !! the last one; beyond the limit of time: not executed
     real(real64) :: t
-    integer(int64) :: events                       !! before this one
     integer(int32) :: i, code
 
     do while (turns > 0)
@@ -144,9 +149,7 @@ contains
       if (.not. t <= t_limit) exit
       call self%queue%drop_first(i)
       sim%now = max(sim%now, t)
-      events = sim%events
       call execute(self, sim, i, code, t)
-      if (self%search%everyone .and. sim%events > events) call self%predict_all(sim)
       if (sim%events >= pause_at) exit
     end do
     event = event_t(t, i, code)
@@ -161,7 +164,8 @@ contains
 
     events = min(sim%next_epoch, self%next_check, limits%events, &
       sim%events + min(limits%collisions - sim%collisions, events_per_check))
-    if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on()) events = sim%events + 1
+    if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on() .or. self%search%everyone) &
+      events = sim%events + 1
   end function next_pause
 
   !> Prefetches what the next events will read, and pauses soon to do so again.
@@ -226,6 +230,7 @@ contains
     integer(int32) :: i
 
     do i = 1, sim%n_disks()
+      if (stop_requested()) return                 ! see `advance`
       call predict(self, sim, i)
     end do
   end subroutine predict_all

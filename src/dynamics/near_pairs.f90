@@ -8,6 +8,7 @@ module near_pairs
   use box_geometry, only: box_t, obstacle_gap
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
+  use system, only: stop_requested
   implicit none
   private
   public :: near_pairs_t, pair_list_t, find_all_contacts
@@ -61,8 +62,9 @@ contains
     self%skin = -1
   end subroutine start
 
-  !> Lists the overlaps when the disks are at x, testing all pairs.
-  pure subroutine find_all_contacts(sim, x, contacts)
+  !> Lists the overlaps when the disks are at x, testing all pairs. After a stop has been requested the list is not
+  !> complete.
+  subroutine find_all_contacts(sim, x, contacts)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)        !! (2,disks) [length]
     type(pair_list_t), intent(inout) :: contacts
@@ -95,7 +97,7 @@ contains
   end subroutine shift
 
   !> Adds the overlaps among all pairs of disks.
-  pure subroutine add_overlaps(contacts, sim, x)
+  subroutine add_overlaps(contacts, sim, x)
     type(pair_list_t), intent(inout) :: contacts
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
@@ -104,6 +106,7 @@ contains
 
     period = sim%box%periods()
     do i = 1, sim%n_disks() - 1
+      if (stop_requested()) return
       do j = i + 1, sim%n_disks()
         sigma = sim%disk(i)%radius + sim%disk(j)%radius
         if (distance2(x(:, i), x(:, j), period) < sigma*sigma) call append(contacts, pair_t(i, j, sigma))

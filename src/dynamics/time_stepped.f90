@@ -15,6 +15,7 @@ module time_stepped
   use partners, only: axis_of, n_sides, nothing, sense_of
   use shapes, only: nearest_image
   use simulation_state, only: simulation_t
+  use system, only: stop_requested
   use texts, only: written
   implicit none
   private
@@ -23,6 +24,7 @@ module time_stepped
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
   integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
+  integer(int32), parameter :: many = 5000            !! disks: to test all pairs takes long
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
@@ -57,8 +59,12 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
+    type(simulation_t) :: before
     integer(int64) :: k, turn
+    integer :: logged
+    logical :: slow
 
+    slow = self%every_pair .and. sim%n_disks() > many
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
       if (limits%reached(sim) .or. self%log%is_full()) return
@@ -67,10 +73,18 @@ contains
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
         return
       end if
+      if (slow) before = sim
+      logged = self%log%n
       k = k + 1
       sim%now = k*self%dt
       call take_step(self, sim, error)
       if (allocated(error)) return
+      if (.not. slow) cycle
+      if (stop_requested()) then                    ! the step is not complete
+        sim = before
+        self%log%n = logged
+        return
+      end if
     end do
   end subroutine advance
 

@@ -20,8 +20,8 @@ module output
   use sample_track, only: samples_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, &
-    reserve_t, seconds, synchronize
+  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, record_signals, &
+    remove_file, reserve_t, seconds, synchronize
   implicit none
   private
   public :: output_t, progress_t
@@ -166,6 +166,7 @@ contains
     character(len=:), allocatable :: problem
     logical :: made
 
+    call record_signals()                         ! from here on there is something to lose
     self%path = path
     self%opened = seconds()
     call make_folders_of(path, made)

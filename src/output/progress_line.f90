@@ -1,26 +1,19 @@
-!> Shows how far a run is: on a terminal a line that is updated in place, elsewhere a line every half minute.
+!> Shows how far a run is, at which rate, and when it will be done.
 module progress_line
-  use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int64, never, real64
   use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
   use stop_rules, only: stop_rule_t
-  use system, only: seconds, talks_to_terminal
+  use system, only: seconds
   implicit none
   private
   public :: progress_line_t
 
-  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
   integer, parameter :: window = 20                !! reports over which rates are taken
-  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! of the terminal's line
-    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line
 
-  type :: progress_line_t
+  type, extends(status_line_t) :: progress_line_t
     private
-    logical :: quiet = .false.
-    logical :: terminal = .false.
-    real(real64) :: pause = file_pause             !! between reports [s]
     real(real64) :: started = 0.0_real64           !! when the program started [s]
-    real(real64) :: next_report = 0.0_real64       !! [s]
     integer :: n = 0                               !! reports so far
     ! At the last reports
     real(real64) :: clock(0:window - 1) = 0.0_real64       !! [s]
@@ -29,24 +22,18 @@ module progress_line
   contains
     procedure :: start
     procedure :: report
-    procedure :: clear
   end type progress_line_t
 
 contains
 
   !> Prepares for a run, or for the next part of one.
-  subroutine start(self, sim, stop_rule, started, quiet)
+  subroutine start(self, sim, stop_rule, started)
     class(progress_line_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t), intent(in) :: stop_rule
     real(real64), intent(in) :: started            !! when the program started [s]
-    logical, intent(in) :: quiet
 
-    self%quiet = quiet
     self%started = started
-    self%terminal = talks_to_terminal()
-    self%pause = merge(terminal_pause, file_pause, self%terminal)
-    self%next_report = seconds() + self%pause
     self%n = 0
     call remember(self, sim, stop_rule)
   end subroutine start
@@ -60,9 +47,7 @@ contains
     real(real64) :: span, rate, left
     integer :: first, last
 
-    if (self%quiet) return
-    if (seconds() < self%next_report) return
-    self%next_report = seconds() + self%pause
+    if (.not. self%is_due()) return
     call remember(self, sim, stop_rule)
     last = modulo(self%n - 1, window)
     first = modulo(max(self%n - window, 0), window)
@@ -72,21 +57,8 @@ contains
     if (self%share(last) > self%share(first)) left = (1 - self%share(last))*span/(self%share(last) - self%share(first))
     write (line, "(""t "",g0.6,""  "",f5.1,"" %  "",i0,"" collisions  "",a,"" per s  ETA "",a)") sim%time(), &
       100*self%share(last), sim%collisions, short_number(rate), clock_text(left)
-    if (self%terminal) then
-      write (error_unit, "(a)", advance="no") achar(13)//no_wrap//trim(line)//erase_rest//wrap
-    else
-      write (error_unit, "(a)") trim(line)
-    end if
-    flush (error_unit)
+    call self%show(trim(line))
   end subroutine report
-
-  !> Erases the line on the terminal, so that what follows stands alone.
-  subroutine clear(self)
-    class(progress_line_t), intent(in) :: self
-
-    if (self%terminal .and. self%n > 1) write (error_unit, "(a)", advance="no") achar(13)//erase_rest
-    flush (error_unit)
-  end subroutine clear
 
   !> Records the present state, for rates over the last reports.
   subroutine remember(self, sim, stop_rule)

@@ -2,7 +2,7 @@
 !> and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in jumps between short runs, each disk into the gap
 !> around it at that moment, so that the event-driven dynamics serves unchanged.
 module dense_growth
-  use kinds, only: int32, never, pi, real64
+  use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
   use cell_grid, only: cell_grid_t
   use disks, only: species_t
@@ -13,6 +13,7 @@ module dense_growth
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
   use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
   use texts, only: written
   implicit none
   private
@@ -28,10 +29,11 @@ module dense_growth
 contains
 
   !> Places disks of several species, side by side, in a box.
-  subroutine grow_disks(box, species, stream, x, error)
+  subroutine grow_disks(box, species, stream, line, x, error)
     type(box_t), intent(in) :: box                      !! with its obstacles; gravity is not felt
     type(species_t), intent(in) :: species(:)           !! counts and radii to reach
     type(random_stream_t), intent(inout) :: stream
+    class(status_line_t), intent(inout) :: line         !! shows how far it is
     real(real64), allocatable, intent(out) :: x(:, :)   !! (2,n) species by species [length]
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim
@@ -40,7 +42,7 @@ contains
     integer(int32) :: i
     integer :: jump
 
-    call scatter(box, species, stream, sim, error)
+    call scatter(box, species, stream, line, sim, error)
     if (allocated(error)) return
     allocate (evolution)
     allocate (cell_grid_t :: evolution%search)
@@ -51,6 +53,7 @@ contains
       if (allocated(error)) return
       lack = 1 - minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
       if (lack <= 0) exit
+      call line%show_share("growing disks to their full size", 1 - lack)
       jump = jump + 1
       if (modulo(jump, jumps_per_check) == 0) then
         if (lack > 0.9_real64*lack_before) then
@@ -81,10 +84,11 @@ contains
   end subroutine fail_to_grow
 
   !> Small disks at random places, with random velocities.
-  subroutine scatter(box, species, stream, sim, error)
+  subroutine scatter(box, species, stream, line, sim, error)
     type(box_t), intent(in) :: box
     type(species_t), intent(in) :: species(:)
     type(random_stream_t), intent(inout) :: stream
+    class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
@@ -103,7 +107,7 @@ contains
     scale = sqrt(min(1.0_real64, loose/wanted))
     do
       packing = packing_t(box, n, size(species))
-      call fill(packing, species, scale, stream, complete)
+      call fill(packing, species, scale, stream, line, complete)
       if (complete) exit
       scale = caution*scale
       if (scale < 1.0e-3_real64) then
@@ -121,11 +125,12 @@ contains
   end subroutine scatter
 
   !> Inserts all disks at random places, the largest first.
-  subroutine fill(packing, species, scale, stream, complete)
+  subroutine fill(packing, species, scale, stream, line, complete)
     type(packing_t), intent(inout) :: packing
     type(species_t), intent(in) :: species(:)
     real(real64), intent(in) :: scale
     type(random_stream_t), intent(inout) :: stream
+    class(status_line_t), intent(inout) :: line
     logical, intent(out) :: complete
     logical :: waiting(size(species))
     real(real64) :: radius, inset(2)
@@ -140,7 +145,7 @@ contains
       inset = merge(0.0_real64, radius, packing%box%periodic)
       first = 1 + sum(species(:s - 1)%count)
       call packing%open_species(s, radius, species(s)%count, packing%box%lower + inset, packing%box%upper - inset)
-      call insert_at_random(packing, s, first, stream, placed)
+      call insert_at_random(packing, s, first, stream, line, placed)
       complete = placed == species(s)%count
       if (.not. complete) return
     end do
@@ -153,11 +158,13 @@ contains
     integer, intent(in) :: length                       !! collisions per disk
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
+    integer(int64) :: to_come                           ! collisions per disk, times disks
     integer(int32) :: i
 
     call evolution%start(sim)
-    limits%collisions = sim%collisions + (length*sim%n_disks() + 1)/2
-    limits%events = sim%events + 4*length*sim%n_disks() ! one may rattle in a hole between obstacles
+    to_come = int(length, int64)*sim%n_disks()
+    limits%collisions = sim%collisions + (to_come + 1)/2
+    limits%events = sim%events + 4*to_come              ! one may rattle in a hole between obstacles
     limits%time = sim%time() + maxval(sim%box%edges())  ! few disks may never collide
     call evolution%advance(sim, limits, error)
     do i = 1, sim%n_disks()

@@ -8,6 +8,7 @@ module initial_state
   use random_stream, only: random_stream_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
   use starting_velocities, only: draw_velocities, remove_drift
   implicit none
   private
@@ -18,14 +19,15 @@ module initial_state
 contains
 
   !> Builds the simulation that the settings describe.
-  subroutine create_simulation(settings, sim, error)
+  subroutine create_simulation(settings, line, sim, error)
     type(settings_t), intent(in) :: settings
+    class(status_line_t), intent(inout) :: line             !! shows how far the placement is
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
 
     call describe_system(settings, sim)
     call list_disks(sim)
-    call place_disks(settings%species, sim%box, settings%run%seed, sim%disk, error)
+    call place_disks(settings%species, sim%box, settings%run%seed, line, sim%disk, error)
     if (allocated(error)) return
     call set_in_motion(settings, sim)
     sim%start_energy = sim%kinetic_energy()

@@ -21,6 +21,7 @@ module placement
   use random_stream, only: random_stream_t
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
+  use status_line, only: status_line_t
   use texts, only: written
   implicit none
   private
@@ -35,10 +36,11 @@ module placement
 contains
 
   !> Writes positions into the disks; with them come the velocities that a file holds.
-  subroutine place_disks(species, box, seed, disk, error)
+  subroutine place_disks(species, box, seed, line, disk, error)
     type(species_settings_t), intent(in) :: species(:)
     type(box_t), intent(in) :: box
     integer(int64), intent(in) :: seed
+    class(status_line_t), intent(inout) :: line             !! shows how far it is
     type(disk_t), intent(inout) :: disk(:)                  !! (n) in the order of the input
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
@@ -54,7 +56,7 @@ contains
     end do
     do while (any(random))
       s = maxloc(species%radius, dim=1, mask=random)
-      call place_at_random(packing, species, s, seed, error)
+      call place_at_random(packing, species, s, seed, line, error)
       if (allocated(error)) return
       random(s) = .false.
     end do
@@ -62,7 +64,7 @@ contains
       if (.not. dense(s)) cycle
       together = dense .and. [(all(species(k)%region <= species(s)%region .and. &
         species(k)%region >= species(s)%region), k=1, size(species))]
-      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, error)
+      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, line, error)
       if (allocated(error)) return
       dense = dense .and. .not. together
     end do
@@ -173,11 +175,12 @@ contains
   end subroutine add_checked
 
   !> Places a species by random sequential insertion.
-  subroutine place_at_random(packing, species, s, seed, error)
+  subroutine place_at_random(packing, species, s, seed, line, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
     integer(int64), intent(in) :: seed
+    class(status_line_t), intent(inout) :: line
     type(error_t), allocatable, intent(out) :: error
     type(random_stream_t) :: stream
     real(real64) :: lower(2), upper(2), disk_packing
@@ -190,7 +193,7 @@ contains
       ! The fewer the disks, the more the number that fits varies from trial to trial.
       do trial = 1, max(1, many_trials/me%count)
         call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
-        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), stream, placed)
+        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), stream, line, placed)
         if (placed == me%count) return
         if (me%count > nearly*placed + few) exit
       end do
@@ -204,11 +207,12 @@ contains
   end subroutine place_at_random
 
   !> Grows species that share a region, in a box of its shape.
-  subroutine place_densely(packing, species, group, seed, error)
+  subroutine place_densely(packing, species, group, seed, line, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: group(:)                         !! their numbers
     integer(int64), intent(in) :: seed
+    class(status_line_t), intent(inout) :: line
     type(error_t), allocatable, intent(out) :: error
     type(random_stream_t) :: stream
     real(real64), allocatable :: x(:, :)
@@ -221,7 +225,7 @@ contains
       member(k)%radius = species(group(k))%radius
     end do
     call stream%seed(seed, [group(1), purpose])
-    call grow_disks(growth_box(packing, species(group(1))%region), member, stream, x, error)
+    call grow_disks(growth_box(packing, species(group(1))%region), member, stream, line, x, error)
     first = 1
     do k = 1, size(group)
       if (allocated(error)) return

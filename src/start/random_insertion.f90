@@ -7,9 +7,12 @@ module random_insertion
   use kinds, only: int32, real64
   use packing, only: packing_t
   use random_stream, only: random_stream_t
+  use status_line, only: status_line_t
   implicit none
   private
   public :: insert_at_random
+
+  integer(int32), parameter :: disks_per_look = 1024    !! at the clock
 
   !> Where a centre may still fit.
   type :: voxels_t
@@ -22,11 +25,12 @@ module random_insertion
 contains
 
   !> Inserts the disks of a species, numbered from `first`, until all are placed or no room is left.
-  pure subroutine insert_at_random(packing, s, first, stream, placed)
+  subroutine insert_at_random(packing, s, first, stream, line, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! a species that is open
     integer(int32), intent(in) :: first
     type(random_stream_t), intent(inout) :: stream
+    class(status_line_t), intent(inout) :: line     !! shows how far it is
     integer(int32), intent(out) :: placed           !! how many
     type(voxels_t) :: voxels
     integer(int32) :: k, blocker, failures, count
@@ -47,6 +51,7 @@ contains
         blocker = first + placed
         call packing%add(blocker, s, p)
         placed = placed + 1
+        if (modulo(placed, disks_per_look) == 0) call line%show_share("placing disks", real(placed, real64)/count)
       else
         failures = failures + 1
       end if
@@ -54,6 +59,7 @@ contains
       ! Halving costs four searches per voxel; it pays when half as many attempts have failed.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
+        call line%show_share("placing disks", real(placed, real64)/count)
         failures = 0
       end if
     end do

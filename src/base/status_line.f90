@@ -1,0 +1,87 @@
+!> One line on standard error that says what the program is doing: on a terminal it is updated in place, elsewhere a
+!> new one is written every half minute.
+module status_line
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use kinds, only: real64
+  use system, only: seconds, talks_to_terminal
+  implicit none
+  private
+  public :: status_line_t
+
+  real(real64), parameter :: terminal_pause = 0.2_real64, file_pause = 30.0_real64   !! [s]
+  character(len=*), parameter :: erase_rest = achar(27)//"[K", &   !! of the terminal's line
+    no_wrap = achar(27)//"[?7l", wrap = achar(27)//"[?7h"          !! a narrow terminal cuts the line
+
+  type :: status_line_t
+    logical, private :: quiet = .true.
+    logical, private :: terminal = .false.
+    logical, private :: shown = .false.
+    real(real64), private :: pause = file_pause    !! between updates [s]
+    real(real64), private :: next_update = 0.0_real64    !! [s]
+  contains
+    procedure :: open => open_line
+    procedure :: is_due
+    procedure :: show
+    procedure :: show_share
+    procedure :: clear
+  end type status_line_t
+
+contains
+
+  !> Makes the line ready. One that was never opened shows nothing.
+  subroutine open_line(self, quiet)
+    class(status_line_t), intent(inout) :: self
+    logical, intent(in) :: quiet
+
+    self%quiet = quiet
+    self%terminal = talks_to_terminal()
+    self%pause = merge(terminal_pause, file_pause, self%terminal)
+    self%next_update = seconds() + self%pause
+  end subroutine open_line
+
+  !> Whether it is time to show something new.
+  function is_due(self) result(yes)
+    class(status_line_t), intent(in) :: self
+    logical :: yes
+
+    yes = .false.
+    if (.not. self%quiet) yes = seconds() >= self%next_update
+  end function is_due
+
+  !> Shows a text.
+  subroutine show(self, text)
+    class(status_line_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+
+    self%next_update = seconds() + self%pause
+    self%shown = .true.
+    if (self%terminal) then
+      write (error_unit, "(a)", advance="no") achar(13)//no_wrap//text//erase_rest//wrap
+    else
+      write (error_unit, "(a)") text
+    end if
+    flush (error_unit)
+  end subroutine show
+
+  !> Shows, if it is time, which part of a task is done.
+  subroutine show_share(self, task, share)
+    class(status_line_t), intent(inout) :: self
+    character(len=*), intent(in) :: task
+    real(real64), intent(in) :: share              !! from 0 to 1
+    character(len=8) :: percent
+
+    if (.not. self%is_due()) return
+    write (percent, "(f5.1,a)") 100*share, " %"
+    call self%show(task//": "//trim(adjustl(percent)))
+  end subroutine show_share
+
+  !> Erases the line on the terminal, so that what follows stands alone.
+  subroutine clear(self)
+    class(status_line_t), intent(inout) :: self
+
+    if (self%terminal .and. self%shown) write (error_unit, "(a)", advance="no") achar(13)//erase_rest
+    self%shown = .false.
+    flush (error_unit)
+  end subroutine clear
+
+end module status_line
