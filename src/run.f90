@@ -9,7 +9,7 @@ module run
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
-  use output, only: output_t
+  use output, only: output_t, planned_bytes
   use progress_line, only: progress_line_t
   use run_files, only: current_checkpoint, is_file, run_file
   use run_input, only: run_input_t
@@ -18,12 +18,13 @@ module run
   use stop_rules, only: stop_rule_t
   use system, only: checkpoint_requests, end_at_signals, folder_of, is_folder, print_text, seconds, stop_requested, &
     watch_signals
-  use texts, only: written
+  use texts, only: size_text, written
   implicit none
   private
   public :: perform_run
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
+  integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
   character(len=1), parameter :: eol = new_line("a")
 
   type :: run_t
@@ -52,7 +53,7 @@ contains
     call run%line%open(command%quiet)
     call end_at_signals("stopped before the run began; nothing is lost: repeat the command")
     call read_input(command%input, command%overrides, run%input, error)
-    if (.not. allocated(error)) call check_memory(run%input%settings%species, error)
+    if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
     call choose_evolution(run%input%settings, run%evolution)
     if (command%resume) then
@@ -82,7 +83,8 @@ contains
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks", error)
+        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks; the output needs at least " &
+          //size_text(planned_bytes(run%input, run%sim)), error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
@@ -99,6 +101,8 @@ contains
 
     text = run%evolution%warning(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
+    if (planned_bytes(run%input, run%sim) > much .and. .not. run%command%check) write (error_unit, "(a)") &
+      "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn

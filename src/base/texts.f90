@@ -5,6 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
+  public :: size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -201,5 +202,17 @@ contains
     end do
     distance = d(len(a), len(b))
   end function edit_distance
+
+  !> A number of bytes, for messages.
+  pure function size_text(bytes) result(text)
+    integer(int64), intent(in) :: bytes
+    character(len=:), allocatable :: text
+
+    if (bytes < 1000000) then
+      text = written((bytes + 999)/1000)//" kB"
+    else
+      text = written((bytes + 500000)/1000000)//" MB"
+    end if
+  end function size_text
 
 end module texts

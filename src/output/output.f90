@@ -4,7 +4,7 @@ module output
   use kinds, only: int64, real64
   use cadence, only: cadence_t
   use errors, only: error_t, exit_files, fail
-  use disk_room, only: check_room, keep_room, last_room
+  use disk_room, only: check_room, keep_room, last_room, planned_room
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use h5md_file, only: event_track, frame_track, h5md_file_t, n_tracks, observable_track
@@ -24,7 +24,7 @@ module output
     remove_file, reserve_t, seconds, synchronize
   implicit none
   private
-  public :: output_t, progress_t
+  public :: output_t, planned_bytes, progress_t
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
 
@@ -108,7 +108,7 @@ contains
       self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
       kept = last_room(self%h5md%track, capacities, sim%n_disks())
-      call check_room(self%h5md%track, capacities, kept, path, error)
+      call check_room(planned_bytes(input, sim), kept, path, error)
     end if
     if (.not. allocated(error)) call keep_room(self%reserve, kept, path, error)
     if (.not. allocated(error)) then
@@ -205,6 +205,18 @@ contains
     rule = stop_rule_t(input%settings%stop, sim)
     capacities = [self%progress%frames%planned(rule%limits), self%progress%observables%planned(rule%limits), 0_int64]
   end subroutine plan
+
+  !> Bytes that the output of a run needs at least: where the number of samples is unknown the first and the last count.
+  function planned_bytes(input, sim) result(bytes)
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: bytes, capacities(n_tracks)
+    type(output_t) :: output
+
+    output%progress = progress_t(input%settings%output)
+    call output%plan(input, sim, capacities)
+    bytes = planned_room(output%h5md%track, capacities, sim%n_disks())
+  end function planned_bytes
 
   !> Creates a file under a temporary name, with everything but the tracks.
   subroutine create_file(self, file, sim)

@@ -1,16 +1,16 @@
 !> How much memory a run may use: a run that cannot fit is refused before it starts. On Linux; elsewhere no
 !> limit is known.
 module memory
-  use kinds, only: int64, real64
+  use kinds, only: int64
   use errors, only: error_t, exit_usage, fail
-  use settings, only: species_settings_t
-  use texts, only: written
+  use settings, only: settings_t
+  use texts, only: size_text, written
   implicit none
   private
   public :: check_memory, available_memory, number_after
 
-  ! Measured with 200 000 and a million disks; a test compares them with real runs. [bytes]
-  integer(int64), parameter :: per_disk = 240, per_growing_disk = 340, besides = 20000000
+  ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
+  integer(int64), parameter :: per_disk = 270, per_growing_disk = 400, per_stepped_disk = 400, besides = 25000000
   integer(int64), parameter :: unlimited = huge(1_int64)
   ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.
   integer, parameter :: most_lines = 1000
@@ -18,18 +18,23 @@ module memory
 contains
 
   !> Refuses more disks than fit in memory.
-  subroutine check_memory(species, error)
-    type(species_settings_t), intent(in) :: species(:)
+  subroutine check_memory(settings, error)
+    type(settings_t), intent(in) :: settings
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: limit
-    integer(int64) :: n, needed, available
+    integer(int64) :: n, each, needed, available
     integer :: k
 
-    n = sum(int(species%count, int64))
-    needed = n*merge(per_growing_disk, per_disk, any([(species(k)%placement == "dense", k=1, size(species))])) + besides
+    n = sum(int(settings%species%count, int64))
+    each = per_disk
+    do k = 1, size(settings%species)
+      if (settings%species(k)%placement == "dense") each = per_growing_disk
+    end do
+    if (settings%run%dynamics == "steps") each = max(each, per_stepped_disk)
+    needed = n*each + besides
     call available_memory("", available, limit)
     if (needed > available) call fail(error, exit_usage, "species.count: "//written(n)//" disks need about " &
-      //megabytes(needed)//" of memory; "//limit//" leaves "//megabytes(available)//"; use fewer disks")
+      //size_text(needed)//" of memory; "//limit//" leaves "//size_text(available)//"; use fewer disks")
   end subroutine check_memory
 
   !> The tightest of all limits: free memory of the machine, ulimit, control groups.
@@ -43,9 +48,8 @@ contains
     limit = ""
     candidate = number_after("MemAvailable:", root//"/proc/meminfo")
     if (candidate < unlimited) call consider(1024*candidate, "the machine")
-    candidate = number_after("Max address space", root//"/proc/self/limits")
-    if (candidate < unlimited) &
-      call consider(candidate - 1024*number_after("VmSize:", root//"/proc/self/status"), "ulimit -v")
+    call consider(process_limit("Max address space", "VmSize:"), "ulimit -v")
+    call consider(process_limit("Max data size", "VmData:"), "ulimit -d")
     call consider(group_limit(root), "the control group")
   contains
     !> Keeps the tighter limit.
@@ -54,17 +58,27 @@ contains
       character(len=*), intent(in) :: name
 
       if (value >= bytes) return
-      bytes = value
+      bytes = max(value, 0_int64)
       limit = name
     end subroutine consider
+
+    !> What a limit of this process leaves, by the names of the limit and of what is in use.
+    function process_limit(most, used) result(left)
+      character(len=*), intent(in) :: most, used
+      integer(int64) :: left
+
+      left = number_after(most, root//"/proc/self/limits")
+      if (left < unlimited) left = left - 1024*number_after(used, root//"/proc/self/status")
+    end function process_limit
   end subroutine available_memory
 
-  !> The tightest limit of the control groups around this process, version 1 or 2.
+  !> What the tightest of the control groups around this process leaves, version 1 or 2.
   function group_limit(root) result(bytes)
     character(len=*), intent(in) :: root
     integer(int64) :: bytes
     character(len=1024) :: line                           !! NUMBER:CONTROLLERS:PATH
-    character(len=:), allocatable :: folder, name
+    character(len=:), allocatable :: folder, group
+    logical :: old
     integer :: unit, status, first, last, length, k
 
     bytes = unlimited
@@ -75,21 +89,35 @@ contains
       if (status /= 0) exit
       first = index(line, ":")
       last = first + index(line(first + 1:), ":")
-      folder = root//"/sys/fs/cgroup"
-      name = "/memory.max"
-      if (index(","//line(first + 1:last - 1)//",", ",memory,") > 0) then
-        folder = folder//"/memory"
-        name = "/memory.limit_in_bytes"
-      else if (last > first + 1) then
-        cycle
-      end if
+      old = index(","//line(first + 1:last - 1)//",", ",memory,") > 0
+      if (last > first + 1 .and. .not. old) cycle
+      folder = root//"/sys/fs/cgroup"//trim(merge("/memory", "       ", old))
       length = len_trim(line)
       do while (length >= last)
-        bytes = min(bytes, number_after("", folder//line(last + 1:length)//name))
+        group = folder//line(last + 1:length)
+        if (old) then
+          bytes = min(bytes, left("/memory.limit_in_bytes", "/memory.usage_in_bytes", "total_inactive_file"))
+        else
+          bytes = min(bytes, left("/memory.max", "/memory.current", "inactive_file"))
+        end if
         length = last - 1 + index(line(last + 1:length), "/", back=.true.)
       end do
     end do
     close (unit)
+  contains
+    !> What a group leaves, by the names of its limit, of what is in use, and of the files held in memory among it,
+    !> which give way.
+    function left(most, used, files) result(rest)
+      character(len=*), intent(in) :: most, used, files
+      integer(int64) :: rest, in_use, held
+
+      rest = number_after("", group//most)
+      in_use = number_after("", group//used)
+      held = number_after(files//" ", group//"/memory.stat")
+      if (rest == unlimited .or. in_use == unlimited) return
+      if (held == unlimited) held = 0
+      rest = rest - max(in_use - held, 0_int64)
+    end function left
   end function group_limit
 
   !> The number that follows a label at the beginning of a line of a file; huge if there is none.
@@ -112,13 +140,5 @@ contains
     end do
     close (unit)
   end function number_after
-
-  !> A size for messages.
-  pure function megabytes(bytes) result(text)
-    integer(int64), intent(in) :: bytes
-    character(len=:), allocatable :: text
-
-    text = written(nint(bytes/1.0e6_real64, int64))//" MB"
-  end function megabytes
 
 end module memory
