@@ -1,5 +1,6 @@
-/* Hints about memory that Fortran cannot express. They change nothing but the time that a run takes. Everything here
-   depends on the compiler, the linker and the system; without MEMORY_HINTS (see HINTS in the Makefile) nothing is left. */
+/* What Fortran cannot express about memory: hints, which change nothing but the time and the room that a run takes, and
+   an answer when there is none left. Everything here depends on the compiler, the linker and the system; without
+   MEMORY_HINTS (see HINTS in the Makefile) nothing is left, and a failed `allocate` is answered by the compiler. */
 #include <stdint.h>
 
 #ifdef MEMORY_HINTS
@@ -22,7 +23,7 @@ static void *obtained(void *memory, size_t bytes)
 {
     if (!memory && bytes) {
         char text[160];
-        snprintf(text, sizeof text, "%sout of memory: %zu bytes are not to be had; use fewer disks, or raise the limit\n",
+        snprintf(text, sizeof text, "%sout of memory: there is no room for %zu bytes; use fewer disks, or raise the limit\n",
                  isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "", bytes);
         (void)!write(STDERR_FILENO, text, strlen(text));
         _exit(3);

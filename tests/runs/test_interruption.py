@@ -179,16 +179,133 @@ def test_usr1_makes_a_checkpoint_and_the_run_goes_on(started, tmp_path):
     assert process.poll() is None
 
 
-def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
-    """Also a program that has no time to look: here it compares all pairs of many disks."""
-    write_input(tmp_path, BUSY.replace("100", "20000").replace("0.02", "0.002"))
-    process = started("gas.nml", "-o", "gas.h5", "--set", "run.search='rescan'")
+def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
+    """Also a program that has no time to look: here it waits for a disk that does not answer."""
+    library = tmp_path / "slow.so"
+    code = "#include <unistd.h>\nint fsync(int d) { (void)d; while (1) usleep(100000); }"
+    compiler = ["gcc", "-x", "c", "-shared", "-fPIC", "-o", library, "-"]
+    subprocess.run(compiler, input=code, text=True, check=True)
+    command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
+    environment = {**os.environ, "LD_PRELOAD": str(library)}
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment)
     wait_for((tmp_path / "gas.h5.part").exists)
     process.send_signal(signal.SIGTERM)
     time.sleep(0.6)
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=1)
-    assert process.returncode == -signal.SIGTERM
+    assert process.wait(timeout=1) == -signal.SIGTERM
+
+
+def stopped_in_time(process):
+    """TERM ends the process within a second; returns what it said."""
+    process.send_signal(signal.SIGTERM)
+    begin = time.monotonic()
+    message = process.communicate(timeout=20)[1]
+    assert time.monotonic() - begin < 1
+    assert process.returncode == STOPPED, message
+    return message
+
+
+@pytest.mark.parametrize("options", [[], ["--check"]], ids=["run", "check"])
+@pytest.mark.parametrize(
+    ("count", "packing", "placement"), [(3_000_000, 0.5, "random"), (100_000, 0.75, "dense")]
+)
+def test_a_signal_ends_a_run_that_is_still_being_set_up(
+    started, tmp_path, count, packing, placement, options
+):
+    """Nothing is lost: no disk has moved yet."""
+    text = f"""&species count = {count} packing_fraction = {packing} placement = '{placement}' /
+    &stop collisions = 1 /"""
+    write_input(tmp_path, text)
+    process = started("gas.nml", "-o", "gas.h5", *options)
+    time.sleep(1)
+    message = stopped_in_time(process)
+    assert message == "stopped before the run began; nothing is lost: repeat the command\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+def test_the_terminal_shows_how_far_the_disks_are_placed(program, tmp_path):
+    """And what a signal has to say stands on a line of its own."""
+    write_input(tmp_path, "&species count = 3000000 packing_fraction = .5 / &stop events = 1 /")
+    screen, keyboard = pty.openpty()
+    run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
+    time.sleep(3)
+    run.send_signal(signal.SIGTERM)
+    assert run.wait(timeout=5) == STOPPED
+    os.close(keyboard)
+    shown = os.read(screen, 65536).decode()
+    os.close(screen)
+    shares = [float(share) for share in re.findall(r"\rplacing disks: ([\d.]+) %", plain(shown))]
+    assert len(shares) >= 2 and 0 <= shares[0] < shares[-1] < 100
+    assert shown.split("\r\x1b[K")[-1].startswith("stopped before the run began")
+
+
+def plain(shown) -> str:
+    """What a terminal gets, without the sequences that it acts on."""
+    return re.sub(r"\x1b\[\??\d*[A-Za-z]", "", shown)
+
+
+@pytest.mark.parametrize(
+    "method",
+    ["search='rescan'", "search='pairs'", "search='pairs' dynamics='steps' dt=1e-3"],
+)
+@pytest.mark.parametrize("count", [6000, pytest.param(100_000, marks=pytest.mark.check)])
+def test_a_signal_does_not_wait_until_all_pairs_are_compared(
+    ricochet, started, tmp_path, method, count
+):
+    """A run that is stopped between them goes on as if it had not been."""
+    text = f"""&run {method} /
+    &species count = {count} packing_fraction = 0.3 speed = 1 /
+    &stop events = 20 /
+    &output observables_every_events = 2 event_log = .true. checkpoint_every = 1e6 /"""
+    write_input(tmp_path, text)
+    for wait in (0.0, 0.2, 0.5):
+        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+        process = started("gas.nml", "-o", "gas.h5", *resume)
+        wait_for(lambda: frames_in(tmp_path / "gas.h5.part") or (tmp_path / "gas.h5").exists())
+        time.sleep(wait)
+        if process.poll() is None and not (tmp_path / "gas.h5").exists():
+            stopped_in_time(process)
+            assert (tmp_path / "gas.chk.h5").exists()
+    if count > 6000:
+        return
+    if not (tmp_path / "gas.h5").exists():
+        assert ricochet("gas.nml", "-o", "gas.h5", "--resume").returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("dynamics", ["'events'", "'steps' dt = 1e-5"])
+def test_a_million_disks_stop_in_time(started, tmp_path, dynamics):
+    """While they are searched, sorted, moved, written, and read again."""
+    text = f"""&run dynamics = {dynamics} /
+    &species grid = 1000, 1000 packing_fraction = 0.3 temperature = 1 /
+    &stop events = 1000000000 /"""
+    write_input(tmp_path, text)
+    for wait in (0.0, 0.5, 1.0, 2.0):
+        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+        process = started("gas.nml", "-o", "gas.h5", *resume)
+        wait_for((tmp_path / "gas.h5.part").exists)
+        time.sleep(wait + 0.1)
+        stopped_in_time(process)
+
+
+def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
+    """Whoever reads its standard output may have stopped reading."""
+    outlet, inlet = os.pipe()
+    os.set_blocking(inlet, False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(inlet, b"x" * 4096)
+    os.set_blocking(inlet, True)
+    write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
+    command = [program, "gas.nml", "-o", "gas.h5"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True)
+    wait_for((tmp_path / "gas.h5").exists)
+    time.sleep(0.2)
+    assert "finished" in stopped_in_time(process)
+    os.close(inlet)
+    os.close(outlet)
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):

@@ -7,7 +7,7 @@ import subprocess
 import h5py
 import pytest
 
-USAGE = 2
+USAGE, FILES = 2, 3
 GAS = """&species name = 'gas' count = {count} packing_fraction = 0.3 temperature = 1 /
 &stop collisions = {collisions} /
 """
@@ -19,11 +19,12 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"""
 
 @pytest.fixture
 def limited(program, tmp_path):
-    """`limited(count, *options, address_space=, stack=)` runs a gas under limits of the shell."""
+    """`limited(count, *options, address_space=, ...)` runs a gas under limits of the shell."""
 
-    def run(count, *options, collisions=1000, address_space=None, stack=None):
+    def run(count, *options, collisions=1000, address_space=None, data=None, stack=None):
         (tmp_path / "gas.nml").write_text(GAS.format(count=count, collisions=collisions))
-        limits = {resource.RLIMIT_AS: address_space, resource.RLIMIT_STACK: stack}
+        limits = {resource.RLIMIT_AS: address_space, resource.RLIMIT_DATA: data}
+        limits[resource.RLIMIT_STACK] = stack
 
         def set_limits():
             for kind, limit in limits.items():
@@ -47,7 +48,7 @@ def needed_megabytes(run) -> int:
     assert run.returncode == USAGE
     found = re.fullmatch(
         r"species\.count: (\d+) disks need about (\d+) MB of memory; "
-        r"(?:ulimit -v|the machine|the control group) leaves \d+ MB; use fewer disks\n",
+        r"(?:ulimit -[vd]|the machine|the control group) leaves \d+ MB; use fewer disks\n",
         run.stderr,
     )
     assert found, run.stderr
@@ -58,6 +59,103 @@ def test_more_disks_than_memory_are_refused_in_one_line(limited):
     run = limited(100_000_000, "--check", address_space=2**30)
     assert needed_megabytes(run) > 10_000
     assert limited(1000, address_space=2**30).returncode == 0
+    assert needed_megabytes(limited(1_000_000, data=100_000 * 1024)) > 200
+
+
+def sweep(limited, count, megabytes, *words):
+    """A run under each of these limits: a right result or one line; both must occur."""
+    options = [part for word in words for part in ("--set", word)]
+    codes = set()
+    for size in megabytes:
+        for kind in ("data", "address_space"):
+            run = limited(count, *options, **{kind: size * 1_000_000})
+            if run.returncode == 127 and kind == "address_space":
+                continue  # not even the libraries fit
+            assert run.returncode in (0, USAGE, FILES), run
+            lines = run.stderr.splitlines()
+            assert len(lines) == (run.returncode > 0) and "runtime" not in run.stderr, run
+            assert (run.returncode == 0) == ("collisions = " in run.stdout), run
+            codes.add(run.returncode > 0)
+    assert codes == {True, False}
+
+
+def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(limited):
+    sweep(limited, 1000, (10, 14, 20, 30, 60))
+    steps = ("run.dynamics=steps", "run.dt=1e-5", "stop.collisions=", "stop.events=1000")
+    sweep(limited, 50_000, (20, 45, 60, 90), *steps)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    "words",
+    [
+        "",
+        "box.boundary=periodic,periodic output.event_log=T output.frames_every_collisions=500",
+        "run.queue=heap output.precision=single",
+        "run.dynamics=steps run.dt=1e-5 stop.collisions= stop.events=1000",
+        "species.gas.placement=dense species.gas.packing_fraction=0.42",
+        "run.search=pairs stop.collisions=100",
+    ],
+)
+@pytest.mark.parametrize("count", [1000, 10_000, 100_000, 1_000_000])
+def test_every_kind_of_run_under_every_limit_is_right_or_one_line(limited, words, count):
+    if count > 10_000 and "pairs" in words or count > 100_000 and "dense" in words:
+        pytest.skip("takes long")
+    sweep(limited, count, [*range(10, 100, 6), *range(100, 501, 40)], *words.split())
+
+
+@pytest.mark.parametrize("count", [10**9, 10**12])
+def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, tmp_path, count):
+    """Its datasets take no room on the disk."""
+    with h5py.File(tmp_path / "many.h5", "w") as file:
+        species = {"shape": (count,), "dtype": "i4", "chunks": (2**20,)}
+        file.create_dataset("particles/disks/species", **species)
+        file["parameters/species/names"] = [b"gas"]
+    text = GAS.format(count=1000, collisions=1).replace("temperature = 1", "file = 'many.h5'")
+    (tmp_path / "gas.nml").write_text(text)
+    small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_AS, (2**28, 2**28))}
+    run = ricochet("gas.nml", "--check", timeout=2, **small)
+    assert run.returncode == FILES
+    assert run.stderr == "many.h5: cannot be read: its size is not that of a run's\n"
+
+
+def test_an_array_without_room_is_one_line(limited, ricochet, tmp_path):
+    """Also where nobody foresaw it: here a file holds many more disks than are wanted."""
+    with h5py.File(tmp_path / "many.h5", "w") as file:
+        species = {"shape": (10**8,), "dtype": "i4", "chunks": (2**20,)}
+        file.create_dataset("particles/disks/species", **species)
+        file["parameters/species/names"] = [b"gas"]
+    options = ["--set", "species.gas.file=many.h5", "--set", "species.gas.temperature="]
+    run = limited(1000, *options, data=10**8)
+    assert run.returncode == FILES
+    assert run.stderr == "out of memory: there is no room for 400000000 bytes; " \
+        "use fewer disks, or raise the limit\n"
+
+
+def test_the_memory_of_a_run_does_not_grow(program, tmp_path):
+    """Arrays that come and go at every sample, sorting and checkpoint leave no gaps behind."""
+    text = GAS.format(count=1000, collisions=10**9)
+    (tmp_path / "gas.nml").write_text(f"&box upper = 1000, 0.001 / {text}")
+    options = ["--set", "output.checkpoint_every=1e-3", "--set", "species.gas.packing_fraction=1e-4"]
+    used = []
+    for seconds in ("0.5", "3"):
+        command = [program, "gas.nml", "-o", "gas.h5", "--force", "--quiet", *options]
+        command = ["python3", "-c", MEASURE.replace("check=True", "stderr=subprocess.DEVNULL"), *command]
+        command += ["--set", f"stop.wall_clock={seconds}"]
+        used.append(int(subprocess.check_output(command, cwd=tmp_path, text=True)))
+    assert used[1] < used[0] + 5000  # kB
+
+
+def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
+    """Two frames: positions, velocities and a count, 36 bytes, and 24 bytes that are written once."""
+    (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
+    grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
+    run = ricochet("gas.nml", "--check", *grid)
+    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 96 MB\n"
+    assert run.stderr == ""
+    many = ["--set", "output.frames_every_collisions=50000", "--set", "stop.collisions=500000"]
+    run = ricochet("gas.nml", *grid, *many, "--set", "stop.wall_clock=1e-9")
+    assert run.stderr.splitlines()[0] == "note: the output needs at least 420 MB"
 
 
 @pytest.mark.parametrize(
