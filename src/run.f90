@@ -66,8 +66,9 @@ contains
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
     if (.not. allocated(error)) call run%output%finish(run%sim, seconds() - run%started, run%rate, error)
-    if (allocated(error)) call rescue(run, error)
-    if (.not. allocated(error)) then
+    if (allocated(error)) then
+      call rescue(run, error)
+    else
       call end_at_signals("stopped; the run is finished, only its summary is missing")
       call print_text(summary(run), error)
     end if

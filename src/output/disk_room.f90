@@ -1,7 +1,7 @@
 !> Room on the disk: what the planned output needs, and what is kept for the end. A run that cannot write its
 !> output any more still writes a checkpoint, and in it the samples that have no room elsewhere.
 module disk_room
-  use kinds, only: int64
+  use kinds, only: int64, real64
   use errors, only: error_t, exit_files, fail
   use event_log, only: log_capacity
   use h5md_file, only: event_track, n_tracks
@@ -11,7 +11,7 @@ module disk_room
   use texts, only: written
   implicit none
   private
-  public :: check_room, checkpoint_room, keep_room, last_room
+  public :: check_room, checkpoint_room, keep_room, last_room, planned_room
 
 contains
 
@@ -43,6 +43,18 @@ contains
       //last_problem()//": "//written(bytes)//" bytes needed, "//written(free_bytes(path))//" bytes free")
   end subroutine keep_room
 
+  !> Bytes that the output of n disks needs at least: of unknown samples the first and the last count.
+  pure function planned_room(track, capacities, n) result(bytes)
+    type(track_t), intent(in) :: track(n_tracks)
+    integer(int64), intent(in) :: capacities(n_tracks)
+    integer, intent(in) :: n
+    integer(int64) :: bytes
+    integer(int64), parameter :: constants = 24   !! per disk: id, species, mass, radius [bytes]
+
+    bytes = int(min(9.0e18_real64, &
+      constants*n + sum(real(max(capacities, 2_int64), real64)*real(track%room(), real64))), int64)
+  end function planned_room
+
   !> Refuses a run whose planned output, and the room for its end, do not fit onto the disk.
   subroutine check_room(planned, kept, path, error)
     integer(int64), intent(in) :: planned         !! for the output [bytes]
@@ -50,7 +62,7 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(out) :: error
 
-    if (planned > free_bytes(path) - kept) call fail(error, exit_files, path//": the output will have " &
+    if (real(planned, real64) + kept > free_bytes(path)) call fail(error, exit_files, path//": the output will have " &
       //written(planned)//" bytes, its end needs "//written(kept)//" more, "//written(free_bytes(path)) &
       //" are free; choose fewer frames or make room")
   end subroutine check_room

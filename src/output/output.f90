@@ -4,7 +4,7 @@ module output
   use kinds, only: int64, real64
   use cadence, only: cadence_t
   use errors, only: error_t, exit_files, fail
-  use disk_room, only: check_room, keep_room, last_room
+  use disk_room, only: check_room, keep_room, last_room, planned_room
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use h5md_file, only: event_track, frame_track, h5md_file_t, n_tracks, observable_track
@@ -214,13 +214,10 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int64) :: bytes, capacities(n_tracks)
     type(output_t) :: output
-    real(real64) :: samples(2), rooms(2)
 
     output%progress = progress_t(input%settings%output)
     call output%plan(input, sim, capacities)
-    samples = real(max(capacities([frame_track, observable_track]), 2_int64), real64)
-    rooms = [output%h5md%track(frame_track)%room(), output%h5md%track(observable_track)%room()]
-    bytes = int(min(constants*sim%n_disks() + dot_product(samples, rooms), 9.0e18_real64), int64)
+    bytes = planned_room(output%h5md%track, capacities, sim%n_disks())
   end function planned_bytes
 
   !> Creates a file under a temporary name, with everything but the tracks.

@@ -187,12 +187,15 @@ def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
     subprocess.run(compiler, input=code, text=True, check=True)
     command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
     environment = {**os.environ, "LD_PRELOAD": str(library)}
-    process = subprocess.Popen(command, cwd=tmp_path, env=environment)
-    wait_for((tmp_path / "gas.h5.part").exists)
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.6)
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=1) == -signal.SIGTERM
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL)
+    try:
+        wait_for((tmp_path / "gas.h5.part").exists)
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.6)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=1) == -signal.SIGTERM
+    finally:
+        process.kill()
 
 
 def stopped_in_time(process):
@@ -230,7 +233,10 @@ def test_the_terminal_shows_how_far_the_disks_are_placed(program, tmp_path):
     run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
     time.sleep(3)
     run.send_signal(signal.SIGTERM)
-    assert run.wait(timeout=5) == STOPPED
+    try:
+        assert run.wait(timeout=5) == STOPPED
+    finally:
+        run.kill()
     os.close(keyboard)
     shown = os.read(screen, 65536).decode()
     os.close(screen)
@@ -301,9 +307,12 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
     command = [program, "gas.nml", "-o", "gas.h5"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True)
-    wait_for((tmp_path / "gas.h5").exists)
-    time.sleep(0.2)
-    assert "finished" in stopped_in_time(process)
+    try:
+        wait_for((tmp_path / "gas.h5").exists)
+        time.sleep(0.2)
+        assert "finished" in stopped_in_time(process)
+    finally:
+        process.kill()
     os.close(inlet)
     os.close(outlet)
 

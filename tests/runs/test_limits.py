@@ -82,7 +82,7 @@ def sweep(limited, count, megabytes, *words):
 def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(limited):
     sweep(limited, 1000, (10, 14, 20, 30, 60))
     steps = ("run.dynamics=steps", "run.dt=1e-5", "stop.collisions=", "stop.events=1000")
-    sweep(limited, 50_000, (20, 45, 60, 90), *steps)
+    sweep(limited, 50_000, (12, 20, 45, 60, 90), *steps)
 
 
 @pytest.mark.check
