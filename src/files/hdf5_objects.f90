@@ -233,7 +233,7 @@ contains
     type(c_ptr), intent(in) :: address
     integer(hid_t) :: dataset
     integer(size_t) :: bytes
-    integer :: status, closed
+    integer :: status
 
     if (allocated(self%failure)) return
     call h5tget_size_f(stored_as, bytes, status)
@@ -245,7 +245,8 @@ contains
     call self%make_dataset(name, stored_as, int(extents, hsize_t), dataset)
     call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, closed)
+    call h5dclose_f(dataset, status)              ! writes what has been buffered
+    call self%check(status, "write "//name)
   end subroutine put_values
 
   !> Writes an attribute, new or not, of an object that exists.
@@ -281,13 +282,14 @@ contains
     character(len=*), intent(in) :: name
     integer(int64), intent(in), target :: value
     integer(hid_t) :: dataset
-    integer :: status, closed
+    integer :: status
 
     if (allocated(self%failure)) return
     call self%open_dataset(name, dataset, status)
     if (status >= 0) call h5dwrite_f(dataset, h5kind_to_type(int64, h5_integer_kind), c_loc(value), status)
     call self%check(status, "write "//name)
-    call h5dclose_f(dataset, closed)
+    call h5dclose_f(dataset, status)              ! writes what has been buffered
+    call self%check(status, "write "//name)
   end subroutine replace
 
   !> Reads a dataset of n reals.

@@ -8,6 +8,7 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import h5py
 import pytest
 
 from whole_runs import (
@@ -74,7 +75,7 @@ def stage(program, tmp_path_factory):
         assert run.returncode == code, run.stderr
     try:
         for option in OPTIONS:
-            shutil.copytree(stage / option, stage / "count")
+            copy_folder(stage / option, stage / "count")
             run = traced(program, stage / "count", option, "-e", f"trace={','.join(WAYS)}")
             if run.returncode != FINISHED:
                 pytest.skip("strace cannot trace here: " + run.stderr.strip()[-80:])
@@ -83,6 +84,11 @@ def stage(program, tmp_path_factory):
         yield stage
     finally:
         shutil.rmtree(stage)
+
+
+def copy_folder(source, target):
+    """Unlike Python's own functions `cp` leaves the holes of a file what they are."""
+    subprocess.run(["cp", "-a", source, target], check=True)
 
 
 def started(*command, folder):
@@ -109,7 +115,7 @@ def positions(stage, option, call, first="gas.nml") -> range:
 def outcome(program, stage, option, call, inject) -> str:
     """What is wrong after a run in which calls failed; empty if nothing is."""
     folder = stage / f"{option} {inject}"
-    shutil.copytree(stage / option, folder)
+    copy_folder(stage / option, folder)
     try:
         check_outcome(program, stage, folder, option, call, inject)
     except (AssertionError, OSError, KeyError) as problem:
@@ -120,9 +126,18 @@ def outcome(program, stage, option, call, inject) -> str:
 
 
 def same_results(stage, result) -> bool:
-    """A resumed run may have been stopped by another limit of the wall clock."""
-    found = differences(stage / "whole" / "gas.h5", result)
-    return [name for name in found if "wall_clock" not in name and "overrides" not in name] == []
+    """As the same bytes but for times: a hundred times faster than a comparison of all objects."""
+    whole = stage / "whole" / "gas.h5"
+    return timeless(whole) == timeless(result) or differences(whole, result) == []
+
+
+def timeless(path) -> bytes:
+    """A file without how long the run took."""
+    content = path.read_bytes()
+    with h5py.File(path, locking=False) as file:
+        for name in ("wall_time", "collisions_per_second"):
+            content = content.replace(file["provenance"].attrs[name].tobytes(), bytes(8))
+    return content
 
 
 def check_outcome(program, stage, folder, option, call, inject):
@@ -168,7 +183,7 @@ def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step
 def test_a_reluctant_standard_output_is_no_failure(program, stage, error, forever):
     """The result is there."""
     folder = stage / f"{error}{forever}"
-    shutil.copytree(stage / "--force", folder)
+    copy_folder(stage / "--force", folder)
     (number,) = positions(stage, "--force", "write", first="write(1<")
     inject = f"inject=write:error={error}:when={number}{forever}"
     run = traced(program, folder, "--force", "-e", "trace=write", "-e", inject)
