@@ -4,7 +4,7 @@
 module system
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use errors, only: error_t, exit_files, exit_stopped, fail
+  use errors, only: error_t, exit_files, fail
   use kinds, only: int64
   implicit none
   private
@@ -137,12 +137,6 @@ module system
       integer(c_int), value :: descriptor
     end subroutine c_release
 
-    subroutine c_end_at_signals(message, code) bind(C, name="system_end_at_signals")
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: message(*)
-      integer(c_int), value :: code                    ! 0: the signals are recorded
-    end subroutine c_end_at_signals
-
     subroutine c_exit(code) bind(C, name="exit")
       import :: c_int
       integer(c_int), value :: code
@@ -183,24 +177,6 @@ contains
     flush (error_unit)
     call c_exit(int(code, c_int))
   end subroutine end_program
-
-  !> From now on a signal that requests a stop ends the program at once, with this message: there is nothing to
-  !> lose yet.
-  subroutine end_at_signals(message)
-    character(len=*), intent(in) :: message
-    character(len=*), parameter :: erase_line = achar(13)//achar(27)//"[K"
-
-    if (talks_to_terminal()) then
-      call c_end_at_signals(erase_line//message//new_line("a")//c_null_char, int(exit_stopped, c_int))
-    else
-      call c_end_at_signals(message//new_line("a")//c_null_char, int(exit_stopped, c_int))
-    end if
-  end subroutine end_at_signals
-
-  !> From now on a signal that requests a stop is only recorded: see `stop_requested`.
-  subroutine record_signals()
-    call c_end_at_signals(c_null_char, 0_c_int)
-  end subroutine record_signals
 
   !> The name of this machine.
   function host_name() result(name)
