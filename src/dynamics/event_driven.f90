@@ -6,6 +6,7 @@
 module event_driven
   use kinds, only: int32, int64, never, real64
   use calendar, only: most_coming, stages
+  use disks, only: of_same_collision
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
@@ -14,6 +15,7 @@ module event_driven
   use neighbour_search, only: neighbour_search_t
   use partners, only: is_wall
   use renumbering, only: renumber
+  use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   implicit none
@@ -54,7 +56,7 @@ contains
     real(real64) :: fastest
 
     call rebuild(self, sim)
-    fastest = norm2(sim%box%gravity)*minval(sim%disk%radius)
+    fastest = magnitude(sim%box%gravity)*minval(sim%disk%radius)
     do i = 1, sim%n_disks()
       fastest = max(fastest, dot_product(sim%disk(i)%v, sim%disk(i)%v))
     end do
@@ -191,7 +193,7 @@ contains
 
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        if (self%log%is_on()) then                 ! apart, as the log is rare and costs registers
+        if (self%log%is_on() .or. of_same_collision(sim%disk(i)%stamp, sim%tag(i)%partner_stamp)) then  ! seldom
           call collide(sim, i, code, t, self%log)
         else
           call collide_pair(sim, min(i, code), max(i, code), t)
@@ -241,18 +243,30 @@ contains
     type(simulation_t), intent(in) :: sim
     type(event_t), intent(in) :: event
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: remedy
 
-    remedy = ""
-    if (event%partner <= 0 .and. sim%box%falling()) remedy = "; a disk that starts at rest on a wall never leaves it: " &
-      //"start it higher, or take run.dynamics = 'steps'"
     if (sim%now - self%last_check < self%blink) call fail(error, exit_broken, &
       "inelastic collapse, time no longer advances: "//encounter_text(sim, event%disk, event%partner) &
-      //"; set contact.contact_time (TC model), well below the mean time between collisions, or raise " &
-      //trim(merge("contact.restitution     ", "contact.wall_restitution", event%partner > 0))//remedy)
+      //remedy(sim, event%disk, event%partner))
     self%next_check = sim%events + check_interval(sim)
     self%last_check = sim%now
   end subroutine check_for_collapse
+
+  !> What helps against the collapse of disk i with its partner, as far as it has not been done.
+  pure function remedy(sim, i, code) result(text)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, code
+    character(len=:), allocatable :: text
+    real(real64) :: restitution
+
+    restitution = sim%law%wall_restitution
+    if (code > 0) restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+    text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
+      //" contact.contact_time (TC model), well below the mean time between collisions"
+    if (restitution < 1) text = text//", or raise " &
+      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
+    if (code <= 0 .and. sim%box%falling()) text = text//"; a disk that starts at rest on a wall never leaves it: " &
+      //"start it higher, or take run.dynamics = 'steps'"
+  end function remedy
 
   !> Moves the origin of time to about now, so that times stay small and keep their digits. As everything is
   !> predicted again then, it also sorts the disks by cell.

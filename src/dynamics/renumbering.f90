@@ -29,6 +29,7 @@ contains
     call sort_by_count(cell, product(n), first, place)
     sim%disk(place) = sim%disk
     sim%tag(place) = sim%tag
+    if (any(sim%box%periodic)) sim%image(:, place) = sim%image
   end subroutine renumber
 
 end module renumbering

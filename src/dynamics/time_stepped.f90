@@ -13,7 +13,7 @@ module time_stepped
   use free_flight, only: flight, slowest
   use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
   use partners, only: axis_of, n_sides, nothing, sense_of
-  use shapes, only: nearest_image
+  use shapes, only: magnitude, nearest_image
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use texts, only: written
@@ -237,7 +237,7 @@ contains
     text = ""
     speed = 0
     do i = 1, sim%n_disks()
-      speed = max(speed, norm2(sim%velocity(i)))
+      speed = max(speed, magnitude(sim%velocity(i)))
     end do
     speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges()))
     radius = minval(sim%disk%radius)

@@ -5,7 +5,7 @@
 !> moment. The file begins with a checksum of all that follows, which is verified before anything is read.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use checkpoint_checks, only: flaw_of_progress, flaw_of_state
@@ -15,6 +15,7 @@ module checkpoint
   use hdf5_objects, only: hdf5_file_t
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
+  use partners, only: obstacle_code
   use run_files, only: check_places, current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
   use run_input, only: run_input_t
   use sample_track, only: samples_t
@@ -29,7 +30,7 @@ module checkpoint
   public :: write_checkpoint, read_checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
-  character(len=*), parameter :: title = "ricochet checkpoint 2"
+  character(len=*), parameter :: title = "ricochet checkpoint 3"
   character(len=*), parameter :: eol = new_line("a")
 
   !> Variables that change how a run is done but not its result: they may differ when it goes on.
@@ -244,7 +245,10 @@ contains
     call file%exchange("dissipated", sim%dissipated, sums)
     call file%exchange("start_energy", sim%start_energy, not_negative)
     n = sum(int(sim%species%count, int64))
-    if (.not. allocated(sim%disk)) allocate (sim%disk(n), sim%tag(n))
+    if (.not. allocated(sim%disk)) then
+      allocate (sim%disk(n), sim%tag(n))
+      allocate (sim%image(2, n), source=0_int64)
+    end if
     call file%exchange("disks/x1", sim%disk%x(1), places)
     call file%exchange("disks/x2", sim%disk%x(2), places)
     call file%exchange("disks/v1", sim%disk%v(1), speeds)
@@ -253,8 +257,10 @@ contains
     call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
     call file%exchange("disks/id", sim%tag%id, [1_int64, n])
     call file%exchange("disks/collisions", sim%tag%collisions, counts)
-    call file%exchange("disks/image1", sim%tag%image(1), [-counts(2), counts(2)])
-    call file%exchange("disks/image2", sim%tag%image(2), [-counts(2), counts(2)])
+    call file%exchange("disks/stamp", sim%disk%stamp, [-huge(0_int32) - 1_int64, int(huge(0_int32), int64)])
+    call file%exchange("disks/obstacle", sim%tag%obstacle, [int(obstacle_code(sim%box%n_obstacles()), int64), 0_int64])
+    call file%exchange("disks/image1", sim%image(1, :), [-counts(2), counts(2)])
+    call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
   end subroutine exchange_state
 
   !> Writes or reads how far the output has come.

@@ -112,11 +112,11 @@ contains
     character(len=:), allocatable, intent(inout) :: flaw
     real(real64) :: x(2), reach(2), periods(2)
 
-    associate (disk => sim%disk(i), tag => sim%tag(i), edges => sim%box%edges())
+    associate (disk => sim%disk(i), edges => sim%box%edges())
       periods = merge(2 + speed*sim%time()/edges, 0.0_real64, sim%box%periodic)
       if (disk%clock > sim%now .or. disk%clock < -sim%epoch*(1 + rounding)) then
         flaw = in_row("clock", i)//" is "//written(disk%clock)//"; possible: "//written(-sim%epoch)//" to "//written(sim%now)
-      else if (any(abs(real(tag%image, real64)) > periods)) then
+      else if (any(abs(real(sim%image(:, i), real64)) > periods)) then
         flaw = in_row("image1, image2", i)//": the disk cannot have gone so far"
       else
         x = sim%position(i)

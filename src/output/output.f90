@@ -15,7 +15,7 @@ module output
   use run_files, only: check_places, check_start, is_file, lock, remove_checkpoints, remove_temporaries, run_file, &
     unfinished, unfinished_new
   use run_input, only: run_input_t
-  use samples, only: event_series, frame_sample, frame_series, observable_sample, observable_series
+  use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
   use settings, only: output_settings_t
   use sample_track, only: samples_t
   use simulation_state, only: simulation_t
@@ -62,13 +62,7 @@ module output
     procedure :: finish
     procedure :: save
     procedure :: release
-    procedure, private :: claim
-    procedure, private :: plan
-    procedure, private :: create_file
-    procedure, private :: append
-    procedure, private :: rebuild
-    procedure, private :: write_frame
-    procedure, private :: write_observables
+    procedure, private :: claim, plan, create_file, append, rebuild, write_frame, write_observables
   end type output_t
 
 contains
@@ -244,9 +238,13 @@ contains
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
+    logical :: due(2)
 
-    if (self%progress%frames%is_due(sim)) call self%write_frame(sim)
-    if (self%progress%observables%is_due(sim)) call self%write_observables(sim)
+    due = [self%progress%frames%is_due(sim), self%progress%observables%is_due(sim)]
+    if (any(due)) call check_counts(sim, error)
+    if (allocated(error)) return
+    if (due(1)) call self%write_frame(sim)
+    if (due(2)) call self%write_observables(sim)
     call self%h5md%write_buffers(longest_wait)
     call self%h5md%file%report(error)
   end subroutine write_what_is_due

@@ -3,6 +3,7 @@
 module samples
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
+  use errors, only: error_t, exit_broken, fail
   use h5md_layout, only: disk_collisions, events_group, image, observables_group, position, step_of, time_of, &
     value_of, velocity
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
@@ -10,7 +11,7 @@ module samples
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: frame_series, frame_sample, observable_series, observable_sample, event_series
+  public :: frame_series, frame_sample, observable_series, observable_sample, event_series, check_counts
 
 contains
 
@@ -24,8 +25,8 @@ contains
 
     reals = merge(single_precision, double_precision, single)
     series = [step_and_time(position), series_t(position//value_of, reals, 2, [2, n]), &
-      series_t(velocity//value_of, reals, 2, [2, n]), series_t(disk_collisions//value_of, short_integer, 1, [n, 1])]
-    if (periodic) series = [series, series_t(image//value_of, short_integer, 2, [2, n])]
+      series_t(velocity//value_of, reals, 2, [2, n]), series_t(disk_collisions//value_of, long_integer, 1, [n, 1])]
+    if (periodic) series = [series, series_t(image//value_of, long_integer, 2, [2, n])]
   end function frame_series
 
   !> The frame of this moment, disks in the order of the input.
@@ -33,7 +34,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the frame, from 0
     real(real64), allocatable :: sample(:, :)     !! (width,1)
-    integer(int32) :: periods(2)
+    integer(int64) :: periods(2)
     integer(int32) :: i, k, n
 
     n = sim%n_disks()
@@ -47,7 +48,7 @@ contains
         v(2*k - 1:2*k) = sim%velocity(i)
         collisions(k) = sim%tag(i)%collisions
         if (size(images) == 0) cycle
-        periods = sim%tag(i)%image
+        periods = sim%image(:, i)
         call wrap(sim%box, x(2*k - 1:2*k), periods)
         images(2*k - 1:2*k) = periods
       end do
@@ -58,11 +59,11 @@ contains
   pure subroutine wrap(box, x, image)
     type(box_t), intent(in) :: box
     real(real64), intent(inout) :: x(2)           !! [length]
-    integer(int32), intent(inout) :: image(2)     !! periods travelled
-    integer(int32) :: periods(2)
+    integer(int64), intent(inout) :: image(2)     !! periods travelled
+    integer(int64) :: periods(2)
 
     associate (edges => box%edges())
-      periods = merge(floor((x - box%lower)/edges), 0, box%periodic)
+      periods = merge(floor((x - box%lower)/edges, int64), 0_int64, box%periodic)
       where (box%periodic .and. x - periods*edges >= box%upper) periods = periods + 1
       image = image + periods
       x = x - periods*edges
@@ -106,6 +107,16 @@ contains
     series = [series_t(events_group//"time", double_precision), series_t(events_group//"i", short_integer), &
       series_t(events_group//"j", short_integer), series_t(events_group//"impulse", double_precision)]
   end function event_series
+
+  !> Fails if a count of a simulation is too large for samples, which hold it as a real.
+  subroutine check_counts(sim, error)
+    type(simulation_t), intent(in) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), parameter :: most = 2_int64**digits(1.0_real64)
+
+    if (sim%events > most .or. any(abs(sim%image) >= most)) & ! a frame may have to count one period more
+      call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")
+  end subroutine check_counts
 
   !> Step and time of an H5MD element.
   pure function step_and_time(element) result(series)

@@ -106,24 +106,29 @@ contains
 
   !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
   !> passes a periodic side, so the images of an obstacle one period away are enough; what encloses the disks has none.
-  pure subroutine next_obstacle(box, disk, list, t, code)
+  !> What is met from outside is convex: a disk that leaves it on a straight line does not return, whatever rounding says.
+  pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
+    integer(int32), intent(in) :: last          !! code of the obstacle that it left last, if nothing has happened since
     integer(int32), intent(in) :: list(:)       !! numbers of the obstacles in question, ascending
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
-    real(real64) :: t_m, shift(2)
+    real(real64) :: t_m, d(2), left(2)
     integer :: k, image_x, image_y, reach(2)
 
     do k = 1, size(list)
       associate (shape => box%obstacle(list(k))%shape)
         reach = merge(1, 0, box%periodic .and. .not. shape%encloses)
         t_m = never
+        left = never                            ! the image that it leaves
+        if (last == obstacle_code(list(k)) .and. .not. (shape%encloses .or. box%falling())) &
+          left = shape%from_nearest(disk%x, box%periods())
         do image_y = -reach(2), reach(2)
           do image_x = -reach(1), reach(1)
-            shift = [image_x, image_y]*box%edges()
-            t_m = min(t_m, disk%clock + &
-              shape%contact_time(disk%x - (shape%middle + shift), disk%v, box%gravity, disk%radius))
+            d = disk%x - (shape%middle + [image_x, image_y]*box%edges())
+            if (all(abs(d - left) < 0.5_real64*box%edges())) cycle
+            t_m = min(t_m, disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius))
           end do
         end do
       end associate

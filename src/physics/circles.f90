@@ -2,7 +2,7 @@
 module circles
   use free_flight, only: time_to_circle
   use kinds, only: pi, real64
-  use shapes, only: shape_t, spare
+  use shapes, only: magnitude, shape_t, spare
   implicit none
   private
   public :: circle_t, new_circle
@@ -59,7 +59,7 @@ contains
     real(real64), intent(in) :: d(2), radius
     real(real64) :: length
 
-    length = norm2(d) - self%distance_at_contact(radius)
+    length = magnitude(d) - self%distance_at_contact(radius)
     if (self%encloses) length = -length
   end function gap
 
@@ -69,7 +69,7 @@ contains
     real(real64), intent(in) :: d(2)
     real(real64) :: direction(2)
 
-    direction = merge(-d, d, self%encloses)/norm2(d)
+    direction = merge(-d, d, self%encloses)/magnitude(d)
   end function normal
 
   !> Whether a disk with its centre in a rectangle can touch the circle.
@@ -79,9 +79,9 @@ contains
     logical :: yes
 
     if (self%encloses) then
-      yes = norm2(abs(d) + half) >= self%distance_at_contact(radius)/(1 + spare)
+      yes = magnitude(abs(d) + half) >= self%distance_at_contact(radius)/(1 + spare)
     else
-      yes = norm2(max(abs(d) - half, 0.0_real64)) <= self%distance_at_contact(radius)*(1 + spare)
+      yes = magnitude(max(abs(d) - half, 0.0_real64)) <= self%distance_at_contact(radius)*(1 + spare)
     end if
   end function reaches
 
@@ -127,7 +127,7 @@ contains
     integer :: axis
 
     problem = ""
-    if (norm2(min(max(self%middle, lower), upper) - self%middle) >= self%radius) &
+    if (magnitude(min(max(self%middle, lower), upper) - self%middle) >= self%radius) &
       problem = "centre: the obstacle is outside the box"
     do axis = 1, 2
       if (periodic(axis) .and. 2*self%radius > upper(axis) - lower(axis)) problem = &

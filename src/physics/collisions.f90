@@ -1,6 +1,6 @@
 !> The contact law: restitution by pair of species and for walls, the wall rules, the TC model.
 module collisions
-  use kinds, only: int32, real64
+  use kinds, only: int64, real64
   implicit none
   private
   public :: contact_law_t, pair_impulse, still_in_contact, wall_rebound, wall_rules
@@ -23,7 +23,7 @@ contains
   !> Whether the last contact of a disk is not over yet, so that the next one is elastic (TC model).
   elemental function still_in_contact(law, collisions, elapsed) result(yes)
     type(contact_law_t), intent(in) :: law
-    integer(int32), intent(in) :: collisions         !! of the disk, so far
+    integer(int64), intent(in) :: collisions         !! of the disk, so far
     real(real64), intent(in) :: elapsed              !! since the last of them [time]
     logical :: yes
 

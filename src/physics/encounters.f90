@@ -4,11 +4,11 @@ module encounters
   use kinds, only: int32, real64
   use box_geometry, only: wall_normal
   use collisions, only: pair_impulse, still_in_contact, wall_rebound
-  use disks, only: disk_t
+  use disks, only: disk_t, of_same_collision, stamp_after_passing, stamp_of
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
-  use shapes, only: nearest_image
+  use shapes, only: magnitude, nearest_image
   use simulation_state, only: simulation_t
   use texts, only: written
   implicit none
@@ -17,8 +17,8 @@ module encounters
 
 contains
 
-  !> Collides disk i at the time t with what `code` names, and logs the collision if the log is on: the same entry
-  !> whichever of two disks expected it.
+  !> Collides disk i at the time t with what `code` names, unless they are together already, and logs the collision if the
+  !> log is on: the same entry whichever of two disks expected it.
   subroutine collide(sim, i, code, t, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -29,14 +29,20 @@ contains
     integer(int32) :: first
 
     first = merge(min(i, code), i, code > 0)
-    if (log%is_on()) v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
+    if (code > 0) then
+      if (are_together(sim, first, max(i, code), t)) then
+        call keep_apart(sim, first, max(i, code), t)
+        return
+      end if
+    end if
+    v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
     if (code > 0) then
       call collide_pair(sim, first, max(i, code), t)
     else
       call collide_wall(sim, i, code, t)
     end if
     if (.not. log%is_on()) return
-    associate (impulse => sim%species(sim%tag(first)%species)%mass*norm2(sim%disk(first)%v - v))
+    associate (impulse => sim%species(sim%tag(first)%species)%mass*magnitude(sim%disk(first)%v - v))
       if (code > 0) then
         call log%append(sim%epoch + t, min(sim%tag(i)%id, sim%tag(code)%id), &
           max(sim%tag(i)%id, sim%tag(code)%id), impulse)
@@ -56,7 +62,6 @@ contains
     disk%x = flight(disk%x, disk%v, gravity, s)
     disk%v = flight_velocity(disk%v, gravity, s)
     disk%clock = t
-    disk%stamp = disk%stamp + 1
   end subroutine land
 
   !> Whether disk i is still in contact at the time t, by the contact law.
@@ -97,11 +102,62 @@ contains
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
+    sim%tag(i)%obstacle = 0
+    sim%tag(j)%obstacle = 0
     sim%events = sim%events + 1
+    sim%disk(i)%stamp = stamp_of(sim%events)
+    sim%disk(j)%stamp = stamp_of(sim%events)
     sim%collisions = sim%collisions + 1
     sim%virial = sim%virial - q*distance2
     sim%dissipated = sim%dissipated + 0.5_real64*(1 - restitution)*q*b
   end subroutine collide_pair
+
+  !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
+  !> between them: only rounding can have made them approach again.
+  pure function are_together(sim, i, j, t) result(yes)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    logical :: yes
+    real(real64) :: then(2), dx(2)
+
+    yes = of_same_collision(sim%disk(i)%stamp, sim%disk(j)%stamp)
+    if (.not. yes) return
+    associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity, period => sim%box%periods())
+      then = q%x - p%x
+      dx = flight(q%x, q%v, g, t - q%clock) - flight(p%x, p%v, g, t - p%clock)
+      yes = .not. (p%clock < q%clock .or. p%clock > q%clock) &
+        .and. all(abs(nearest_image(then, period) - nearest_image(dx, period)) <= 0)
+    end associate
+  end function are_together
+
+  !> Takes from two disks that are together the approach that is left by rounding, in the very expression by which a
+  !> contact is predicted: then none is. This is no collision.
+  pure subroutine keep_apart(sim, i, j, t)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    real(real64) :: dx(2), dv(2), step, mass_i, mass_j
+
+    associate (p => sim%disk(i), q => sim%disk(j))
+      call land(p, sim%box%gravity, t)
+      call land(q, sim%box%gravity, t)
+      p%stamp = stamp_after_passing(p%stamp)
+      q%stamp = stamp_after_passing(q%stamp)
+      dx = q%x - p%x
+      dx = dx - nearest_image(dx, sim%box%periods())
+      mass_i = sim%species(sim%tag(i)%species)%mass
+      mass_j = sim%species(sim%tag(j)%species)%mass
+      step = epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j))
+      do
+        dv = q%v - p%v
+        if (dx(1)*dv(1) + dx(2)*dv(2) >= 0) exit
+        p%v = p%v - (step/mass_i)*dx
+        q%v = q%v + (step/mass_j)*dx
+        step = 2*step
+      end do
+    end associate
+  end subroutine keep_apart
 
   !> Whether the code names a periodic side.
   pure function passes(sim, code) result(yes)
@@ -121,10 +177,10 @@ contains
 
     axis = axis_of(code)
     period = sense_of(code)
-    associate (d => sim%disk(i), tag => sim%tag(i), edges => sim%box%edges())
+    associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
-      d%stamp = d%stamp + 1
-      tag%image(axis) = tag%image(axis) + period
+      d%stamp = stamp_after_passing(d%stamp)
+      sim%image(axis, i) = sim%image(axis, i) + period
     end associate
   end subroutine pass_side
 
@@ -147,7 +203,9 @@ contains
     mass = sim%species(sim%tag(i)%species)%mass
     sim%dissipated = sim%dissipated + 0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v))
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
+    sim%tag(i)%obstacle = merge(0, code, is_side(code))
     sim%events = sim%events + 1
+    sim%disk(i)%stamp = stamp_of(sim%events)
     if (is_side(code)) then
       k = wall_index(code)
       sim%wall_collisions(k) = sim%wall_collisions(k) + 1

@@ -90,18 +90,16 @@ contains
 
   !> The same on a parabola. F(s) = |d + v s + g s**2/2|**2 - rho**2 is a quartic; between the roots of F'
   !> it is monotone, and those are bracketed in turn by the roots of the quadratic F''. So every root is
-  !> found by bisection in a bracket that holds exactly one: no first contact can be missed.
+  !> found by bisection in a bracket that holds exactly one: no first contact can be missed. F itself is taken from
+  !> where the disk is, so that a small circle is not lost in the square of its distance.
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
-    real(real64) :: s, quartic(0:4), cubic(0:3), edge(0:4), a, b, c, disc, bend(2), sense, bound
+    real(real64) :: s, cubic(0:3), edge(0:4), a, b, c, disc, bend(2), bound
     integer :: k, n
 
-    sense = merge(-1.0_real64, 1.0_real64, inside)     ! contact: sense*F falls through zero
-    quartic = sense*[dot_product(d, d) - rho**2, 2*dot_product(d, v), &
-      dot_product(v, v) + dot_product(d, g), dot_product(v, g), 0.25_real64*dot_product(g, g)]
-    cubic = [quartic(1), 2*quartic(2), 3*quartic(3), 4*quartic(4)]
-    bound = 1 + maxval(abs(cubic(0:2)))/abs(cubic(3))  ! Cauchy: beyond it F' has no root
+    cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
+    bound = root_bound(cubic, rho/sqrt(cubic(3)))
     a = 3*cubic(3); b = cubic(2); c = cubic(1)         ! F'' = a s**2 + 2 b s + c
     disc = max(b*b - a*c, 0.0_real64)
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
@@ -113,16 +111,42 @@ contains
     call add_root(cubic, min(max(bend(2), 0.0_real64), bound), bound, edge, n)
     n = n + 1
     edge(n) = edge(n - 1) + bound
-    do while (inside .and. value(quartic, edge(n)) > 0)
+    do while (inside .and. apart(edge(n)) > 0)
       edge(n) = 2*edge(n)
     end do
     s = never
     do k = 1, n
-      if (value(quartic, edge(k)) > 0 .or. value(quartic, edge(k)) >= value(quartic, edge(k - 1))) cycle
+      if (apart(edge(k)) > 0 .or. apart(edge(k)) >= apart(edge(k - 1))) cycle
       s = last_apart(d, v, g, rho, inside, edge(k - 1), edge(k))
       return
     end do
+
+  contains
+
+    !> F, or from inside -F: contact is where it falls through zero.
+    pure function apart(s) result(f)
+      real(real64), intent(in) :: s
+      real(real64) :: f, x(2)
+
+      x = flight(d, v, g, s)
+      f = x(1)*x(1) + x(2)*x(2) - rho*rho
+      if (inside) f = -f
+    end function apart
   end function time_to_circle_falling
+
+  !> A power of two beyond all roots of a cubic (Fujiwara's bound), and beyond a time squared that is given in case it
+  !> has none but zero. With powers of two, other units give scaled bits.
+  pure function root_bound(cubic, time2) result(bound)
+    real(real64), intent(in) :: cubic(0:3), time2
+    real(real64) :: bound
+    integer :: k, power
+
+    power = ceiling(exponent(time2)/2.0_real64)
+    do k = 1, 3
+      if (abs(cubic(3 - k)) > 0) power = max(power, ceiling(exponent(cubic(3 - k)/cubic(3))/real(k, real64)))
+    end do
+    bound = scale(2.0_real64, power)
+  end function root_bound
 
   !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
   !> to the last bit of the distance itself, which is sharper than the polynomial.

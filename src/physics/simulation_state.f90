@@ -19,6 +19,7 @@ module simulation_state
     ! Stored in a checkpoint
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
+    integer(int64), allocatable :: image(:, :)    !! (2,n) periods travelled: true position = x + image*edges
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     integer(int64) :: next_epoch = 0              !! number of events at which the epoch moves

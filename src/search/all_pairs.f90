@@ -39,7 +39,7 @@ contains
     integer(int32) :: first, k, image_x, image_y, reach(2)
 
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), self%obstacle, near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%obstacle, self%obstacle, near%time, near%partner)
     reach = merge(1, 0, sim%box%periodic)
     do first = 0, sim%n_disks() - 1, list_capacity
       near%n = min(list_capacity, sim%n_disks() - first)

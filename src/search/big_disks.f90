@@ -6,6 +6,7 @@ module big_disks
   use kinds, only: int32, real64
   use cell_faces, only: cell_faces_t
   use disks, only: disk_t
+  use shapes, only: magnitude
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -141,8 +142,8 @@ contains
     do iy = low(2), high(2)
       do ix = low(1), high(1)
         to_middle = abs(sim%box%lower + ([ix, iy] - 0.5_real64)*self%width - self%centre(:, k))
-        if (norm2(max(to_middle - self%half, 0.0_real64)) > outer) cycle
-        if (norm2(to_middle + self%half) < inner) cycle
+        if (magnitude(max(to_middle - self%half, 0.0_real64)) > outer) cycle
+        if (magnitude(to_middle + self%half) < inner) cycle
         period = floor(real([ix, iy] - 1, real64)/n)
         m = m + 1
         found(m) = ring_cell_t([ix, iy] - period*n, -period)

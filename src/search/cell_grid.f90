@@ -290,7 +290,7 @@ contains
     associate (cell => sim%tag(i)%cell)
       call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
       near%cell = self%cells%number(cell)
-      call self%obstacles%next_contact(sim%box, sim%disk(i), cell, near%time, near%partner)
+      call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
       if (at_periodic_edge(self, cell)) then
         call scan_around_edge(self%cells, self%n, sim, i, near)
       else
@@ -321,7 +321,8 @@ contains
 
     number = self%big%number_of(i)
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), [(m, m=1, sim%box%n_obstacles())], near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%obstacle, [(m, m=1, sim%box%n_obstacles())], &
+      near%time, near%partner)
     t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
       sim%box%gravity, self%big%margin, inside=.true.)
     if (t_margin < near%time) near%partner = leaves_margin

@@ -3,7 +3,7 @@ module obstacle_lists
   use kinds, only: int16, int32, real64
   use box_geometry, only: box_t, next_obstacle
   use cell_faces, only: cell_faces_t
-  use disks, only: disk_t
+  use disks, only: disk_t, tag_t
   use shapes, only: shape_t, spare
   use sorting, only: sort_by_count
   implicit none
@@ -30,18 +30,18 @@ module obstacle_lists
 contains
 
   !> The earlier of a known event and the contacts with the obstacles in reach of the disk's cell.
-  pure subroutine next_contact(self, box, disk, cell, t, code)
+  pure subroutine next_contact(self, box, disk, tag, t, code)
     class(obstacle_lists_t), intent(in) :: self
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
-    integer(int16), intent(in) :: cell(2)          !! column and row, from 1
+    type(tag_t), intent(in) :: tag                 !! of the disk
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     integer(int32) :: c
 
     if (.not. allocated(self%first)) return
-    c = cell(1) + self%columns*(cell(2) - 1)
-    call next_obstacle(box, disk, self%list(self%first(c):self%first(c + 1) - 1), t, code)
+    c = tag%cell(1) + self%columns*(tag%cell(2) - 1)
+    call next_obstacle(box, disk, tag%obstacle, self%list(self%first(c):self%first(c + 1) - 1), t, code)
   end subroutine next_contact
 
   !> Whether there are obstacles in reach of a cell.

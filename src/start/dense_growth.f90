@@ -12,6 +12,7 @@ module dense_growth
   use packing, only: packing_t
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
+  use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
@@ -103,6 +104,7 @@ contains
     sim%species%mass = 1
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     allocate (sim%disk(n), sim%tag(n))
+    allocate (sim%image(2, n), source=0_int64)
     wanted = pi*sum(species%count*species%radius**2)/product(box%edges())
     scale = sqrt(min(1.0_real64, loose/wanted))
     do
@@ -170,6 +172,8 @@ contains
     do i = 1, sim%n_disks()
       sim%disk(i)%x = sim%position(i)
       sim%disk(i)%clock = sim%now
+      sim%disk(i)%stamp = 0                             ! neighbours grow towards each other
+      sim%tag(i)%obstacle = 0
     end do
   end subroutine move
 
@@ -221,7 +225,7 @@ contains
       associate (j => list(k))
         if (j == i) cycle
         full_j = sim%species(sim%tag(j)%species)%radius
-        distance = norm2(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
+        distance = magnitude(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
         shared = distance/(full_i + full_j)
         if (scale(j) > shared) shared = (distance - scale(j)*full_j)/full_i
         room = min(room, shared)

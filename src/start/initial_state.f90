@@ -2,7 +2,7 @@
 !> Positions and velocities of each species have random streams of their own, so that a change of one
 !> does not change what the others draw.
 module initial_state
-  use kinds, only: int32
+  use kinds, only: int32, int64
   use errors, only: error_t
   use placement, only: place_disks
   use random_stream, only: random_stream_t
@@ -52,7 +52,9 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: s, i, k
 
-    allocate (sim%disk(sum(sim%species%count)), sim%tag(sum(sim%species%count)))
+    k = sum(sim%species%count)
+    allocate (sim%disk(k), sim%tag(k))
+    allocate (sim%image(2, k), source=0_int64)
     k = 0
     do s = 1, size(sim%species, kind=int32)
       do i = 1, sim%species(s)%count

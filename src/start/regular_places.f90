@@ -4,6 +4,7 @@ module regular_places
   use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
   use settings, only: species_settings_t
+  use shapes, only: magnitude
   use texts, only: written
   implicit none
   private
@@ -106,7 +107,7 @@ contains
     where (gaps > 0) step = extent/gaps
     if (columns > 1 .or. periodic(1)) distance = step(1)
     if (rows > 1) then
-      distance = min(distance, norm2([0.5_real64*step(1), step(2)]))
+      distance = min(distance, magnitude([0.5_real64*step(1), step(2)]))
       if (rows > 2) distance = min(distance, 2*step(2))
     else if (periodic(2)) then
       distance = min(distance, step(2))

@@ -41,6 +41,7 @@ contains
     integer(int32) :: i, n
     n = size(radius, kind=int32)
     allocate (sim%disk(n), sim%tag(n), sim%species(n), sim%law%restitution(n, n))
+    allocate (sim%image(2, n), source=0_int64)
     sim%law%restitution = 1
     do i = 1, n
       sim%disk(i)%x = x(2*i - 1:2*i)
@@ -174,6 +175,7 @@ contains
         sim%tag = [sim%tag, tag]
       end do
     end do
+    allocate (sim%image(2, size(sim%disk)), source=0_int64)
   end subroutine fill_lattice
 
   pure subroutine lay_to_rest(disk)
@@ -253,7 +255,7 @@ contains
       if (text /= "") return
       associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
         if (s%id /= t%id) text = "order of the disks"
-        if (s%collisions /= t%collisions .or. any(s%image /= t%image)) text = "counts of a disk"
+        if (s%collisions /= t%collisions .or. any(a%image(:, i) /= b%image(:, i))) text = "counts of a disk"
         if (any(differ([p%x, p%v, p%clock, p%radius], [q%x, q%v, q%clock, q%radius]))) &
           text = "state of a disk"
       end associate
