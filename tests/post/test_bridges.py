@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_run import ROOT, run_script
 
 from ricochet import Run, mdanalysis_universe, read_run
+from synthetic_run import ROOT, run_script
 
 
 def reader(module: str):

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_run import maxwell_velocities, run_script, write_run
 
 import player
 from ricochet import read_run
+from synthetic_run import maxwell_velocities, run_script, write_run
 
 FLAGS = [
     "--headless",

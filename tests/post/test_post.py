@@ -5,7 +5,6 @@ import warnings
 
 import numpy as np
 import pytest
-from synthetic_run import maxwell_velocities, run_script, text, write_run
 
 import cooling
 import cost
@@ -22,6 +21,7 @@ import speeds
 import trajectory
 from ricochet import RunError, crater, read_run, statistics, theory, thermodynamics
 from ricochet.script import chosen_frames, frame_list
+from synthetic_run import maxwell_velocities, run_script, text, write_run
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_run import run_script, write_run
 
 import correlations
 import equation_of_state
@@ -13,6 +12,7 @@ import haff
 import rates
 from ricochet import Events, RunError, read_run, statistics, thermodynamics
 from ricochet import hard_disks as hd
+from synthetic_run import run_script, write_run
 from validation.estimators import force, hit_rate
 from validation.laws import cooling_ratio, luding, mixture_rates, mixture_z
 

@@ -12,11 +12,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 from ricochet import RunError, read_run
+from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 from whole_runs import FINISHED, MIXTURE, STOPPED, frames_in, wait_for, write_input
-
 
 #: All kinds of objects in a small file.
 TINY = re.sub(r"count = \d+", "count = 2", MIXTURE).replace("time = 4", "time = 0.3")

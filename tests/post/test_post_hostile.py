@@ -13,9 +13,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 from ricochet import RunError, read_run
+from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 SECONDS, MEGABYTES = 0.5, 200  # of processor time, to which the start of Python adds its own
 MANY = 10**9

@@ -8,10 +8,10 @@ import venv
 import h5py
 import numpy as np
 import pytest
-from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 from ricochet import Obstacle, RunError, read_run
 from ricochet.drawing import draw_box, plt
+from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 
 
 @pytest.fixture

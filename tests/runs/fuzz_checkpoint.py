@@ -19,10 +19,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import fuzzing
 import h5py
 import numpy as np
-
-import fuzzing
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from whole_runs import FILES, FINISHED, STOPPED, USAGE, committed, seal

@@ -15,10 +15,9 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
+import fuzzing
 import h5py
 import numpy as np
-
-import fuzzing
 
 TIME_LIMIT = 5
 HARMLESS = {"accepted", "refused"}

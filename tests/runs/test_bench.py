@@ -4,6 +4,7 @@ import os
 import subprocess
 
 import pytest
+
 from synthetic_run import ROOT
 
 VALGRIND = """#!/bin/sh

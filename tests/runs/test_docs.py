@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
 from synthetic_run import ROOT, write_run
 
 PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")

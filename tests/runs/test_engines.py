@@ -15,6 +15,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+
 from synthetic_run import ROOT
 
 # Daemons, ports and signals across hosts: a minute that `.ci/run` and `make check` have.

@@ -6,9 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import fuzz_input
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))

@@ -99,7 +99,7 @@ def test_whatever_the_limit_of_memory_the_result_is_right_or_one_line(limited):
 )
 @pytest.mark.parametrize("count", [1000, 10_000, 100_000, 1_000_000])
 def test_every_kind_of_run_under_every_limit_is_right_or_one_line(limited, words, count):
-    if count > 10_000 and "pairs" in words or count > 100_000 and "dense" in words:
+    if (count > 10_000 and "pairs" in words) or (count > 100_000 and "dense" in words):
         pytest.skip("takes long")
     sweep(limited, count, [*range(10, 100, 6), *range(100, 501, 40)], *words.split())
 
@@ -128,26 +128,38 @@ def test_an_array_without_room_is_one_line(limited, ricochet, tmp_path):
     options = ["--set", "species.gas.file=many.h5", "--set", "species.gas.temperature="]
     run = limited(1000, *options, data=10**8)
     assert run.returncode == FILES
-    assert run.stderr == "out of memory: there is no room for 400000000 bytes; " \
+    assert (
+        run.stderr == "out of memory: there is no room for 400000000 bytes; "
         "use fewer disks, or raise the limit\n"
+    )
 
 
 def test_the_memory_of_a_run_does_not_grow(program, tmp_path):
     """Arrays that come and go at every sample, sorting and checkpoint leave no gaps behind."""
     text = GAS.format(count=1000, collisions=10**9)
     (tmp_path / "gas.nml").write_text(f"&box upper = 1000, 0.001 / {text}")
-    options = ["--set", "output.checkpoint_every=1e-3", "--set", "species.gas.packing_fraction=1e-4"]
+    options = [
+        "--set",
+        "output.checkpoint_every=1e-3",
+        "--set",
+        "species.gas.packing_fraction=1e-4",
+    ]
     used = []
     for seconds in ("0.5", "3"):
         command = [program, "gas.nml", "-o", "gas.h5", "--force", "--quiet", *options]
-        command = ["python3", "-c", MEASURE.replace("check=True", "stderr=subprocess.DEVNULL"), *command]
+        command = [
+            "python3",
+            "-c",
+            MEASURE.replace("check=True", "stderr=subprocess.DEVNULL"),
+            *command,
+        ]
         command += ["--set", f"stop.wall_clock={seconds}"]
         used.append(int(subprocess.check_output(command, cwd=tmp_path, text=True)))
     assert used[1] < used[0] + 5000  # kB
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
-    """Two frames: positions, velocities and a count, 36 bytes, and 24 bytes that are written once."""
+    """Two frames: positions, velocities and a count, 36 bytes, and 24 bytes that are written once."""  # noqa: E501
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)

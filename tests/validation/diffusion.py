@@ -5,9 +5,9 @@ Frames in single precision: seven digits of a velocity are more than enough here
 
 import numpy as np
 
-from ricochet import hard_disks as hd
 from correlations import velocity_memory
 from ricochet import Run
+from ricochet import hard_disks as hd
 from ricochet.statistics import estimate
 
 from .case import Case, Member, within
