@@ -15,6 +15,7 @@ from input_page import GROUPS, explained
 SECTIONS = ("SYNOPSIS", "OPTIONS", "EXIT STATUS", "EXAMPLES")
 FILES = """\
 .SH FILES
+.ad l
 .TP
 .I {prefix}/share/ricochet/input
 Experiments, ready to run; reference.nml shows every variable.

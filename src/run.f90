@@ -93,7 +93,10 @@ contains
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
       call run%output%open(command%output, run%input, run%sim, command%force, error)
-      if (folder_is_new .and. .not. (allocated(error) .or. command%quiet)) write (error_unit, "(a)") &
+      if (allocated(error) .or. command%quiet) return
+      if (planned_bytes(run%input, run%sim) > much) write (error_unit, "(a)") &
+        "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
+      if (folder_is_new) write (error_unit, "(a)") &
         "note: folder "//folder_of(command%output)//" has been created for the output"
     end associate
   end subroutine begin
@@ -105,8 +108,6 @@ contains
 
     text = run%evolution%warning(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
-    if (planned_bytes(run%input, run%sim) > much .and. .not. run%command%check) write (error_unit, "(a)") &
-      "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
   end subroutine warn

@@ -64,14 +64,15 @@ contains
 
   !> Lists the overlaps when the disks are at x, testing all pairs. After a stop has been requested the list is not
   !> complete.
-  subroutine find_all_contacts(sim, x, contacts)
+  subroutine find_all_contacts(sim, x, interruptible, contacts)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)        !! (2,disks) [length]
+    logical, intent(in) :: interruptible       !! a request to stop ends the search: the caller discards the step
     type(pair_list_t), intent(inout) :: contacts
 
     call empty(contacts)
     call add_obstacles(contacts, sim, x, 0.0_real64)
-    call add_overlaps(contacts, sim, x)
+    call add_overlaps(contacts, sim, x, interruptible)
   end subroutine find_all_contacts
 
   !> The same from the list of near pairs.
@@ -97,16 +98,19 @@ contains
   end subroutine shift
 
   !> Adds the overlaps among all pairs of disks.
-  subroutine add_overlaps(contacts, sim, x)
+  subroutine add_overlaps(contacts, sim, x, interruptible)
     type(pair_list_t), intent(inout) :: contacts
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
+    logical, intent(in) :: interruptible
     real(real64) :: period(2), sigma
     integer(int32) :: i, j
 
     period = sim%box%periods()
     do i = 1, sim%n_disks() - 1
-      if (stop_requested()) return
+      if (interruptible) then
+        if (stop_requested()) return
+      end if
       do j = i + 1, sim%n_disks()
         sigma = sim%disk(i)%radius + sim%disk(j)%radius
         if (distance2(x(:, i), x(:, j), period) < sigma*sigma) call append(contacts, pair_t(i, j, sigma))

@@ -62,9 +62,7 @@ contains
     type(simulation_t) :: before
     integer(int64) :: k, turn
     integer :: logged
-    logical :: slow
 
-    slow = self%every_pair .and. sim%n_disks() > many
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
       if (limits%reached(sim) .or. self%log%is_full()) return
@@ -73,13 +71,13 @@ contains
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
         return
       end if
-      if (slow) before = sim
+      if (slow(self, sim)) before = sim
       logged = self%log%n
       k = k + 1
       sim%now = k*self%dt
       call take_step(self, sim, error)
       if (allocated(error)) return
-      if (.not. slow) cycle
+      if (.not. slow(self, sim)) cycle
       if (stop_requested()) then                    ! the step is not complete
         sim = before
         self%log%n = logged
@@ -87,6 +85,15 @@ contains
       end if
     end do
   end subroutine advance
+
+  !> Whether a step takes so long that a request to stop cannot wait for its end.
+  pure function slow(self, sim) result(yes)
+    class(time_stepped_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = self%every_pair .and. sim%n_disks() > many
+  end function slow
 
   !> The largest k with k*dt <= now: it follows from the state alone.
   pure function steps_taken(now, dt) result(k)
@@ -131,7 +138,7 @@ contains
       call meet_sides(self, sim, i)
     end do
     if (self%every_pair) then
-      call find_all_contacts(sim, self%x, self%contacts)
+      call find_all_contacts(sim, self%x, slow(self, sim), self%contacts)
     else
       call self%near%find_contacts(sim, self%x, self%dt, self%contacts)
     end if

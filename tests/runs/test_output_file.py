@@ -60,7 +60,7 @@ def test_the_layout_is_h5md(ran):
     for name, kind, shape in [
         ("position", np.float64, (frames, 80, 2)),
         ("velocity", np.float64, (frames, 80, 2)),
-        ("collisions", np.int32, (frames, 80)),
+        ("collisions", np.int64, (frames, 80)),
     ]:
         assert disks[name]["value"].shape == shape and disks[name]["value"].dtype == kind
         assert disks[name]["step"] == disks["position/step"], "a hard link"
