@@ -199,13 +199,13 @@ def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
         process.kill()
 
 
-def stopped_in_time(process):
-    """TERM ends the process within a second; returns what it said."""
+def stopped_in_time(process, *codes):
+    """TERM ends the process within a second, as stopped or with one of the codes; what it said."""
     process.send_signal(signal.SIGTERM)
     begin = time.monotonic()
     message = process.communicate(timeout=20)[1]
     assert time.monotonic() - begin < 1
-    assert process.returncode == STOPPED, message
+    assert process.returncode in {STOPPED, *codes}, message
     return message
 
 
@@ -271,8 +271,8 @@ def test_a_signal_does_not_wait_until_all_pairs_are_compared(
         wait_for(lambda: frames_in(tmp_path / "gas.h5.part") or (tmp_path / "gas.h5").exists())
         time.sleep(wait)
         if process.poll() is None and not (tmp_path / "gas.h5").exists():
-            stopped_in_time(process)
-            assert (tmp_path / "gas.chk.h5").exists()
+            stopped_in_time(process, FINISHED)  # the last events may just have happened
+            assert process.returncode == FINISHED or (tmp_path / "gas.chk.h5").exists()
     if count > 6000:
         return
     if not (tmp_path / "gas.h5").exists():
