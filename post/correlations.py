@@ -3,8 +3,8 @@
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
 Runs are combined by packing fraction; lines are means over the runs.  Frames must be equally far
-apart in time; lags are logarithmic, every frame is an origin.  The first --skip collisions per disk
-count for a2 alone (all frames count if the run is not twice as long).  Times are in units of the
+apart in time; lags are logarithmic, every frame is an origin.  Frames before equilibrium, which is
+found or begins after --skip, count for a2 alone.  Times are in units of the
 mean free time 1/w, lengths of the mean diameter.  At first the VACF falls as exp(-w t); the
 displacement is compared with Enskog's D; a2 = <v^4> / (2 <v^2>^2) - 1 is 0 in equilibrium and -1/2
 for equal speeds; psi6 = mean of exp(6 i theta) over the Delaunay neighbours, its modulus for single
@@ -18,7 +18,7 @@ from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis
 from ricochet.theory import RELAXATION
-from ricochet.thermodynamics import SKIP, packing, settled, temperature
+from ricochet.thermodynamics import packing, start_of_equilibrium, temperature
 
 import numpy as np
 import scipy
@@ -48,18 +48,21 @@ def check_frames(run: Run) -> None:
         raise RunError(f"{run.path}: needs 10 frames and more, written by frames_every_time")
 
 
-def later(run: Run, skip: float) -> slice:
-    """Frames after the first collisions, without the last, which may be out of step."""
-    return slice(settled(run.collisions_per_disk_at(run.time), skip), run.frames - 1)
+def later(run: Run, skip: float | None) -> slice:
+    """Frames in equilibrium, without the last, which may be out of step."""
+    first = int(np.searchsorted(run.time, start_of_equilibrium(run, skip)))
+    if run.frames - 1 - first < 2:
+        raise RunError(f"{run.path}: needs more frames in equilibrium")
+    return slice(first, run.frames - 1)
 
 
-def velocity_memory(run: Run, at: np.ndarray, skip: float = SKIP) -> np.ndarray:
+def velocity_memory(run: Run, at: np.ndarray, skip: float | None = None) -> np.ndarray:
     """Normalised velocity autocorrelation at lags in frames."""
     v = run.velocity[later(run, skip)]
     return np.array([np.mean(v[k:] * v[: len(v) - k]) for k in at]) / np.mean(v**2)
 
 
-def displacement(run: Run, at: np.ndarray, skip: float = SKIP) -> np.ndarray:
+def displacement(run: Run, at: np.ndarray, skip: float | None = None) -> np.ndarray:
     """Mean square displacement at lags in frames, relative to the centre of mass."""
     x = run.unwrapped(later(run, skip))
     x = x - np.average(x, axis=1, weights=run.mass, keepdims=True)
@@ -141,7 +144,7 @@ def mean_over(runs: list[Run], measure: Callable[[Run], np.ndarray]) -> np.ndarr
     return estimate([measure(run) for run in runs]).mean
 
 
-def analysed(runs: list[Run], skip: float) -> dict[str, np.ndarray]:
+def analysed(runs: list[Run], skip: float | None) -> dict[str, np.ndarray]:
     """All curves of runs at one packing fraction."""
     for run in runs:
         check_frames(run)
@@ -153,7 +156,7 @@ def analysed(runs: list[Run], skip: float) -> dict[str, np.ndarray]:
     free = float(np.mean([mean_free_time(run) for run in runs]))
     diameter = 2 * first.radius.mean()
     tau, _ = kurtosis(first)
-    tau = tau[tau <= skip]
+    tau = tau[: max(1, *(later(run, skip).start + 1 for run in runs))]
     return {
         "wt": time / free,
         "vacf": mean_over(runs, lambda run: velocity_memory(run, at, skip)),
@@ -227,7 +230,7 @@ def table(groups: list, results: list[dict]) -> list[dict]:
 
 
 def main() -> None:
-    args = command_line(__doc__, "correlations.png", skip=SKIP).parse_args()
+    args = command_line(__doc__, "correlations.png", skip=None).parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: round(packing(run), 6))
     results = [analysed(members, args.skip) for _, members in groups]

@@ -3,33 +3,33 @@
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
 By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
-(walls).  Errors come from 20 blocks of each run, after its first --skip collisions per disk (of the
-whole run, if it is not twice as long).  Runs at equal packing fraction are combined.  Elastic runs
-only.  Disks between walls are denser away from them: the wall pressure belongs to the area open to
-the centres, and differs from the bulk by about 1/sqrt(N).
+(walls).  Means are taken in equilibrium: from where nothing drifts any more, or after --skip.
+Errors take the memory of the pressure into account; `samples` is how many independent ones the
+virial is worth.  Runs at equal packing fraction are combined.  Elastic runs only.  Disks between
+walls are denser away from them: the wall pressure belongs to the area open to the centres, and
+differs from the bulk by about 1/sqrt(N).
 """
 
 from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import columns, command_line, grouped, launch, measured, read_all, report
-from ricochet.statistics import Estimate, combined
-from ricochet.thermodynamics import SKIP, packing, z_rate, z_virial, z_wall
+from ricochet.statistics import SeriesMean, combined, doubts
+from ricochet.thermodynamics import packing, z_rate, z_virial, z_wall
 
 import numpy as np
 
-NONE = Estimate(float("nan"), float("nan"))
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
-def pressures(run: Run, skip: float = SKIP) -> list[Estimate]:
-    """Z by virial, rate, walls; NaN where a way does not apply."""
+def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
+    """Z by virial, rate, walls, where they apply."""
     if run.restitution != 1:
         raise RunError(f"{run.path}: is not elastic, it has no equation of state")
     equal = np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0
     empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
     walled = empty and np.ptp(run.radius) == 0
-    ways = ((z_virial, True), (z_rate, equal), (z_wall, walled))
-    return [way(run, skip) if applies else NONE for way, applies in ways]
+    ways = {"virial": (z_virial, True), "rate": (z_rate, equal), "walls": (z_wall, walled)}
+    return {name: way(run, skip) for name, (way, applies) in ways.items() if applies}
 
 
 def reference(eta: float, count: int, periodic: bool) -> float:
@@ -41,17 +41,23 @@ def reference(eta: float, count: int, periodic: bool) -> float:
     return float(hard_disks.crystal(eta, count) if eta >= 0.72 else hard_disks.simulated(eta))
 
 
-def table(groups: list[tuple[float, list[Run]]], skip: float) -> list[dict]:
-    """A row per packing fraction."""
-    rows = []
+def table(
+    groups: list[tuple[float, list[Run]]], skip: float | None
+) -> tuple[list[dict], list[str]]:
+    """A row per packing fraction, empty where a way does not apply; and what speaks against it."""
+    rows, notes = [], []
     for eta, runs in groups:
         row = {"packing": eta, "runs": len(runs)}
-        found = zip(*(pressures(run, skip) for run in runs), strict=True)
-        for name, way in zip(WAYS, found, strict=True):
-            row |= measured(f"Z_{name}", combined(list(way)))
+        found = [pressures(run, skip) for run in runs]
+        for name in WAYS:
+            members = [one[name] for one in found if name in one]
+            row |= measured(f"Z_{name}", combined(members) if len(members) == len(runs) else None)
+            notes += doubts(f"η = {eta:g}, {WAYS[name]}", members) if members else []
+        row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
         periodic = bool(runs[0].periodic.all())
-        rows.append(row | {"Z_reference": reference(eta, runs[0].count, periodic)})
-    return rows
+        expected = reference(eta, runs[0].count, periodic)
+        rows.append(row | {"Z_reference": expected if np.isfinite(expected) else None})
+    return rows, notes
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
@@ -68,7 +74,7 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
         solid, hard_disks.crystal(solid), color="black", lw=1, ls="--",
         label="crystal, Alder, Hoover and Young 1968",
     )  # fmt: skip
-    found = {name: np.array(values) for name, values in columns(rows).items()}
+    found = {name: np.array(values, dtype=float) for name, values in columns(rows).items()}
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
         z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
@@ -93,10 +99,11 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "equation_of_state.png", skip=SKIP).parse_args()
+    args = command_line(__doc__, "equation_of_state.png", skip=None).parse_args()
     runs = read_all(args.runs)
-    rows = table(grouped(runs, lambda run: round(packing(run), 6)), args.skip)
-    report(args, runs, "Equation of state of hard disks", draw(rows, runs), rows)
+    rows, notes = table(grouped(runs, lambda run: round(packing(run), 6)), args.skip)
+    title = "Equation of state of hard disks"
+    report(args, runs, title, draw(rows, runs), rows, notes=notes)
 
 
 if __name__ == "__main__":

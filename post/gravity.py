@@ -2,12 +2,12 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean kinetic energy per disk after the first --skip collisions per disk.  Laws, drawn
-solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of the
-centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
-fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i
-is kept out of the area pi s_ij^2 about each other disk, which multiplies its density by
-exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near the floor.
+kT is the mean kinetic energy per disk in equilibrium, which is found or begins after --skip.  Laws,
+drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of
+the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
+fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i is
+kept out of the area pi s_ij^2 about each other disk, which multiplies its density by exp(-sum_j pi
+s_ij^2 n_j(h)) to first order: a few per cent, near the floor.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -203,13 +203,11 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
 
 
 def main() -> None:
-    args = command_line(__doc__, "gravity.png", one=True, skip=40.0).parse_args()
+    args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
     run = read_run(args.run)
     frames = equilibrium_frames(run, args.skip)
     if not run.gravity[1] or not frames:
-        raise RunError(
-            f"{run.path}: needs gravity along y and frames after {args.skip:g} collisions per disk"
-        )
+        raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in run.by_species]
     energy = [0.5 * s.mass * s.square for s in species]
     temperature = float(np.sum([e.sum() for e in energy]) / np.sum([e.size for e in energy]))

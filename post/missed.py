@@ -28,6 +28,7 @@ from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
+from ricochet.thermodynamics import start_of_equilibrium
 
 import numpy as np
 
@@ -76,17 +77,17 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
     return float(np.average(shares, weights=rates))
 
 
-def rate_and_temperature(run: Run, skip: float) -> tuple[float, float]:
-    """Pair collisions per disk and time, both disks counted, and kT; after `skip`."""
+def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
+    """Pair collisions per disk and time, both disks counted, and kT; in equilibrium."""
     time, tau = run.collisions_per_disk
-    first = int(np.searchsorted(tau, skip))
+    first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
-        raise RunError(f"{run.path}: ends before two samples after {skip:g} collisions per disk")
+        raise RunError(f"{run.path}: needs two samples of the observables in equilibrium")
     energy = run.observable("all/kinetic_energy").value[first:]
     return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(energy.mean())
 
 
-def compare(runs: list[Run], skip: float) -> list[Missed]:
+def compare(runs: list[Run], skip: float | None) -> list[Missed]:
     """A row per step; the event-driven runs come first, with dt = 0."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
@@ -158,7 +159,7 @@ def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "missed.png", skip=40.0).parse_args()
+    args = command_line(__doc__, "missed.png", skip=None).parse_args()
     runs = read_all(args.runs)
     rows = compare(runs, args.skip)
     report(args, runs, "Missed collisions", draw(runs, rows), table(rows))

@@ -2,16 +2,16 @@
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-Equilibrium takes the frames after --skip collisions per disk that are at least --apart collisions
-per disk from each other, of --frames.  Errors are standard errors over the runs (over the frames if
-there is one run).
+Equilibrium is found, or begins after --skip; it takes the frames of --frames that are at least
+--apart collisions per disk from each other.  Errors are standard errors over the runs (of a single
+run: from the autocorrelation over its frames).
 Theory: each species has <K> = kT = E / N and <v> = sqrt(pi kT / 2 m).
 """
 
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
-from ricochet.statistics import Estimate, estimate, hold_against
+from ricochet.statistics import Estimate, estimate, hold_against, series_mean
 from ricochet.theory import maxwell_cdf, maxwell_pdf
 
 import numpy as np
@@ -26,8 +26,11 @@ def means(run: Run, frames: list[int], name: str) -> np.ndarray:
 
 
 def over_members(members: list[np.ndarray]) -> Estimate:
-    """Mean and error over runs; over the frames of the only run."""
-    return estimate(members[0]) if len(members) == 1 else estimate([m.mean(0) for m in members])
+    """Mean and error over runs; over the frames of the only run, which remember each other."""
+    if len(members) > 1:
+        return estimate([m.mean(axis=0) for m in members])
+    means = [series_mean(column) for column in members[0].T]
+    return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
 
 
 def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
@@ -124,7 +127,7 @@ def moments(row: dict, when: str) -> str:
 
 
 def main() -> None:
-    args = command_line(__doc__, "mixture.png", frames=None, skip=15.0, apart=5.0).parse_args()
+    args = command_line(__doc__, "mixture.png", frames=None, skip=None, apart=5.0).parse_args()
     runs = read_all(args.runs)
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames)

@@ -2,27 +2,26 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-Runs are combined; all must be of one system, elastic, without gravity.  Means and errors come from
-20 blocks of each run, after its first --skip collisions per disk (of the whole run, if it is not
-twice as long).  Pressure: by the virial of the pair collisions, and by the impulses on each side (a
-little larger: centres keep a radius away from sides).  With an event log also w_ij, the collisions
-of a disk of species i with disks of species j per time, and the free paths: in a frame each disk is
-on one, as long as its speed times the time between its collisions before and after.  Frames meet
-long paths more often; therefore each counts 1 over its time.  The line is for disks that meet
-without memory (Boltzmann, Enskog).
+Runs are combined; all must be of one system, elastic, without gravity.  Means are taken in
+equilibrium: from where nothing drifts any more, or after --skip.  Errors take the memory of each
+quantity into account, `samples` is how many independent ones it is worth, and what speaks against
+an error is a warning.  All is scaled to the mean temperature of the runs.  Pressure: by the virial
+of the pair collisions, and by the impulses on each side (a little larger: centres keep a radius
+away from sides).  With an event log also w_ij, the collisions of a disk of species i with disks of
+species j per time, and the free paths: in a frame each disk is on one, as long as its speed times
+the time between its collisions before and after.  Frames meet long paths more often; therefore each
+counts 1 over its time.  The line is for disks that meet without memory (Boltzmann, Enskog).
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, launch, read_all, report
-from ricochet.statistics import Estimate, combined, ratio
+from ricochet.statistics import FINE, SeriesMean, combined, doubts, estimate, series_mean
 from ricochet.thermodynamics import (
-    BLOCKS,
-    SKIP,
-    blocks,
     collision_rate,
     packing,
-    settled,
+    start_of_equilibrium,
+    steps,
     temperature,
     z_virial,
 )
@@ -44,22 +43,22 @@ def check(runs: list[Run]) -> None:
             raise RunError(f"{run.path}: not the same system as {first.path}")
 
 
-def pressures(run: Run, skip: float) -> dict[str, Estimate]:
+def pressures(run: Run, skip: float | None) -> dict[str, SeriesMean]:
     """By the virial, and by the sides that are walls; a side feels force per length."""
-    area, z, kt = np.prod(run.edges), z_virial(run, skip), run.count * temperature(run)
-    found = {"pressure_virial": Estimate(z.mean * kt / area, z.error * kt / area)}
-    b = blocks(run, skip)
+    area, kt = np.prod(run.edges), run.count * temperature(run)
+    found = {"pressure_virial": z_virial(run, skip).scaled(kt / area)}
+    s = steps(run, skip)
     for k, side in enumerate(SIDES):
         if not run.periodic[k // 2]:
-            found[f"pressure_{side}"] = ratio(b.impulse[:, k], b.time, 1 / run.edges[1 - k // 2])
+            force = series_mean(s.impulse[:, k], s.time)
+            found[f"pressure_{side}"] = force.scaled(1 / run.edges[1 - k // 2])
     return found
 
 
-def pair_rates(run: Run, skip: float) -> dict[str, Estimate]:
+def pair_rates(run: Run, skip: float | None) -> dict[str, SeriesMean]:
     """w_ij from the event log."""
     log, species = run.events, run.species - 1
-    time, tau = run.collisions_per_disk
-    cuts = np.linspace(time[settled(tau, skip)], run.time[-1], BLOCKS + 1)
+    cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
     pairs = log.j > 0
     one, other = species[log.i[pairs] - 1], species[log.j[pairs] - 1]
     found = {}
@@ -67,18 +66,24 @@ def pair_rates(run: Run, skip: float) -> dict[str, Estimate]:
         for b, second in enumerate(run.names):
             weight = ((one == a) & (other == b)) * 1.0 + ((one == b) & (other == a))
             counts, _ = np.histogram(log.time[pairs], cuts, weights=weight)
-            rate = ratio(counts, np.diff(cuts), 1 / first.disks.sum())
-            found[f"w_{first.name}_{second}"] = rate
+            rate = series_mean(counts, np.diff(cuts))
+            found[f"w_{first.name}_{second}"] = rate.scaled(1 / first.disks.sum())
     return found
 
 
-def quantities(run: Run, skip: float = SKIP) -> dict[str, Estimate]:
+def quantities(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """Everything that has an error, by name."""
     found = pressures(run, skip) | {"collisions_per_disk_and_time": collision_rate(run, skip)}
     if not run.periodic.all():
-        b = blocks(run, skip)
-        found["side_hits_per_time"] = ratio(b.hits, b.time)
+        s = steps(run, skip)
+        found["side_hits_per_time"] = series_mean(s.hits, s.time)
     return found | (pair_rates(run, skip) if has_log(run) else {})
+
+
+def at_temperature(found: dict[str, SeriesMean], ratio: float) -> dict[str, SeriesMean]:
+    """What they would be at another temperature: hard disks only move faster."""
+    powers = {name: 1.0 if name.startswith("pressure") else 0.5 for name in found}
+    return {name: one.scaled(ratio ** powers[name]) for name, one in found.items()}
 
 
 def has_log(run: Run) -> bool:
@@ -88,7 +93,7 @@ def has_log(run: Run) -> bool:
 # --- free paths ---
 
 
-def free_paths(run: Run, skip: float = SKIP) -> tuple[np.ndarray, np.ndarray]:
+def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Lengths of the paths that the disks of all frames are on, and the weight of each."""
     log = run.events
     disk = np.concatenate([log.i, log.j[log.j > 0]])
@@ -101,7 +106,7 @@ def free_paths(run: Run, skip: float = SKIP) -> tuple[np.ndarray, np.ndarray]:
         after = np.searchsorted(own, run.time, side="right")
         inside = (after > 0) & (after < len(own))
         duration[inside, k] = own[after[inside]] - own[after[inside] - 1]
-    duration[: settled(run.collisions_per_disk_at(run.time), skip)] = np.nan
+    duration[run.time < start_of_equilibrium(run, skip)] = np.nan
     known = duration > 0
     return (run.speed(slice(None)) * duration)[known], 1 / duration[known]
 
@@ -121,7 +126,7 @@ def path_density(x: np.ndarray) -> np.ndarray:
     return np.array([np.sum(weight * rate * np.exp(-rate * value)) for value in x])
 
 
-def histogram(runs: list[Run], skip: float = SKIP) -> tuple[float, np.ndarray] | None:
+def histogram(runs: list[Run], skip: float | None = None) -> tuple[float, np.ndarray] | None:
     """The mean free path, and the density of the paths in units of it."""
     parts = [free_paths(run, skip) for run in runs if has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
@@ -135,27 +140,47 @@ def histogram(runs: list[Run], skip: float = SKIP) -> tuple[float, np.ndarray] |
 # --- figure ---
 
 
-def draw_blocks(axes: plt.Axes, runs: list[Run], skip: float) -> None:
-    """The pressure block by block."""
-    for run, style in zip(runs, ("-", "--", ":", "-."), strict=False):
-        b = blocks(run, skip)
-        kt, middle = temperature(run), np.cumsum(b.time) - b.time / 2
-        virial = (run.count * kt + b.virial / b.time / 2) / np.prod(run.edges)
-        axes.plot(middle, virial, color=COLOURS[0], marker=".", ls=style, lw=0.8, label="virial")
-        if not run.periodic.any():
-            length = run.edges[[1, 1, 0, 0]]
-            sides = np.mean(b.impulse / length, axis=1) / b.time
-            axes.plot(middle, sides, color=COLOURS[1], marker=".", ls=style, lw=0.8, label="sides")
-    handles, names = axes.get_legend_handles_labels()
-    known = dict(zip(names, handles, strict=True))
-    axes.legend(known.values(), known.keys())
-    axes.set(xlabel="time t (reduced units)", ylabel="pressure of a block")
+def pressures_in_time(runs: list[Run], cuts: np.ndarray) -> dict[str, np.ndarray]:
+    """(R, C) the pressure of each run between the times `cuts`, at the mean kT of the runs."""
+    kts = np.array([[temperature(run)] for run in runs])
+
+    def rates(name: str, scale: np.ndarray | float) -> np.ndarray:
+        found = []
+        for run in runs:
+            time, value = run.observable(name)
+            total = np.sum(value.reshape(len(time), -1) * scale, axis=1)
+            found.append(np.diff(np.interp(cuts, time, total)) / np.diff(cuts))
+        return np.array(found) * np.mean(kts) / kts
+
+    area, length = np.prod(runs[0].edges), runs[0].edges[[1, 1, 0, 0]]
+    ideal = runs[0].count * np.mean(kts) / area
+    ways = {"virial": ideal + rates("virial", 1 / (2 * area))}
+    if not runs[0].periodic.any():
+        ways["sides"] = rates("wall_impulse", 1 / (4 * length))
+    return ways
 
 
-def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None, skip: float) -> plt.Figure:
-    """The pressure by blocks; with an event log also the free paths."""
+def draw_pressure(axes: plt.Axes, runs: list[Run], means: dict, start: float) -> None:
+    """The pressure in time, mean over the runs with its error; its mean in equilibrium."""
+    cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
+    middle, colours = (cuts[1:] + cuts[:-1]) / 2, iter(COLOURS)
+    for way, values in pressures_in_time(runs, cuts).items():
+        band(axes, middle, *estimate(values), color=next(colours), label=way)
+    mean, error, *_ = means["pressure_virial"]
+    label = f"virial in equilibrium, {mean:.5g} ± {error:.2g}"
+    ends = np.array([start, cuts[-1]])
+    band(axes, ends, np.full(2, mean), error, color="black", lw=1, label=label)
+    axes.axvspan(0, start, color="0.9", lw=0, zorder=0, label="left out")
+    axes.set(xlabel="time t (reduced units)", ylabel="pressure", xlim=(0, cuts[-1]))
+    axes.legend()
+
+
+def draw(
+    runs: list[Run], means: dict, start: float, paths: tuple[float, np.ndarray] | None
+) -> plt.Figure:
+    """The pressure in time; with an event log also the free paths."""
     figure, panels = plt.subplots(1, 2 if paths else 1, figsize=(10 if paths else 6, 4.5))
-    draw_blocks(np.atleast_1d(panels)[0], runs, skip)
+    draw_pressure(np.atleast_1d(panels)[0], runs, means, start)
     if paths:
         mean, density = paths
         axes = panels[1]
@@ -170,34 +195,41 @@ def draw(runs: list[Run], paths: tuple[float, np.ndarray] | None, skip: float) -
     return figure
 
 
-def table(runs: list[Run], skip: float, path: float | None) -> dict[str, list]:
+def table(runs: list[Run], means: dict, start: float, path: float | None) -> dict[str, list]:
     """A row per quantity: exact ones first, then those with an error."""
-    found = [quantities(run, skip) for run in runs]
-    means = {key: combined([one[key] for one in found]) for key in found[0]}
     momentum = np.mean([run.observable("momentum").value for run in runs], axis=(0, 1))
     exact = {
         "packing": packing(runs[0]),
         "kT": float(np.mean([temperature(run) for run in runs])),
         "momentum_x": float(momentum[0]),
         "momentum_y": float(momentum[1]),
+        "equilibrium_from": start,
     }
     if path is not None:
         exact["mean_free_path"] = path
     return {
         "quantity": [*exact, *means],
-        "mean": [*exact.values(), *(float(one.mean) for one in means.values())],
-        "error": [*[float("nan")] * len(exact), *(float(one.error) for one in means.values())],
+        "mean": [*exact.values(), *(one.mean for one in means.values())],
+        "error": ["exact" if name != "mean_free_path" else "" for name in exact]
+        + [one.error for one in means.values()],
+        "samples": [""] * len(exact) + [round(one.samples, 1) for one in means.values()],
     }
 
 
 def main() -> None:
-    args = command_line(__doc__, "rates.png", skip=SKIP).parse_args()
+    args = command_line(__doc__, "rates.png", skip=None).parse_args()
     runs = read_all(args.runs)
     check(runs)
+    kt = float(np.mean([temperature(run) for run in runs]))
+    found = [at_temperature(quantities(run, args.skip), kt / temperature(run)) for run in runs]
+    members = {name: [one[name] for one in found] for name in found[0]}
+    means = {name: combined(ones) for name, ones in members.items()}
+    start = max(start_of_equilibrium(run, args.skip) for run in runs)
     paths = histogram(runs, args.skip)
-    rows = table(runs, args.skip, paths[0] if paths else None)
+    rows = table(runs, means, start, paths[0] if paths else None)
+    notes = [note for name, ones in members.items() for note in doubts(name, ones)]
     title = "Pressure, rates and free paths of hard disks"
-    report(args, runs, title, draw(runs, paths, args.skip), rows)
+    report(args, runs, title, draw(runs, means, start, paths), rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 
 Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
 equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start
-u is v itself.  Runs of the same N are combined.  Equilibrium takes the frames after --skip
-collisions per disk that are at least --apart collisions per disk from each other, of --frames.
+u is v itself.  Runs of the same N are combined.  Equilibrium is found, or begins after --skip; it
+takes the frames of --frames that are at least --apart collisions per disk from each other.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
 disks that share a fixed energy, which matters if they are few.  A disk forgets its speed within 5
 collisions: frames that are closer count for the tests as one frame every 5 collisions per disk.
@@ -145,7 +145,7 @@ def histograms(groups: list, samples: list[np.ndarray]) -> dict[str, np.ndarray]
 
 
 def main() -> None:
-    args = command_line(__doc__, "speeds.png", frames=None, skip=15.0, apart=5.0).parse_args()
+    args = command_line(__doc__, "speeds.png", frames=None, skip=None, apart=5.0).parse_args()
     runs = read_all(args.runs)
     groups = grouped(runs, lambda run: run.count)
     samples, independent = [], []

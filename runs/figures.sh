@@ -95,6 +95,7 @@ HTML
   section correlations 'Bulk: memory, diffusion, order' state
   section rates 'Bulk: pressure in time, free paths' state
   section haff 'Bulk: cooling by the law of Haff' state
+  section coverage 'Bulk: how often an error bar holds the truth' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"
 printf 'figures = %s/index.html\n' "$figures"

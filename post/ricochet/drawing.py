@@ -3,7 +3,9 @@
 `plt.style.use(drawing.STYLE)` gives a notebook the style of the scripts.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -136,6 +138,14 @@ def species_legend(figure: plt.Figure, run: Run) -> None:
     ]
     if len(run.names) > 1:
         figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
+
+
+def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
+    """Below the figure, what speaks against its numbers; at most three notes in full."""
+    more = [f"and {len(notes) - 3} more warnings, as printed"] if len(notes) > 3 else []
+    lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
+    text = "\n".join([line for part in lines for line in part] + more)
+    figure.supxlabel(text, fontsize=9, color="firebrick")
 
 
 def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:

@@ -16,10 +16,10 @@ from typing import NoReturn
 import matplotlib
 import numpy as np
 
-from .drawing import LABELS, STYLE, plt, save
+from .drawing import LABELS, STYLE, plt, save, warn
 from .files import did_you_mean, destination
 from .reader import Run, RunError, read_run
-from .statistics import Estimate
+from .statistics import Estimate, SeriesMean
 from .thermodynamics import equilibrium_frames
 
 matplotlib.use("Agg")
@@ -80,7 +80,7 @@ def positive(text: str) -> int:
 OPTIONS = {
     "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "at most this many of the frames, evenly spread"),
-    "skip": (float, "X", "leave out the first X collisions per disk"),
+    "skip": (float, "X", "leave out the first X collisions per disk [until nothing drifts]"),
     "apart": (float, "X", "take frames at least X collisions per disk apart"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
     "colour": (
@@ -216,18 +216,40 @@ def report(
     figure: plt.Figure | None,
     *tables: Table,
     data: Table | None = None,
+    notes: Sequence[str] = (),
 ) -> None:
-    """Print the tables, save the figure, write `data` (else the first table) to --csv."""
-    print("\n\n".join(text_of(table) for table in tables if table))
+    """Print the tables, save the figure, write `data` (else the first table) to --csv.
+
+    `notes` say what speaks against the numbers: on stderr, and on the figure.
+    """
+    print("\n\n".join(text_of(table) for table in tables if table), flush=True)
+    for note in [*notes, *without_error(tables)]:
+        print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
+        if notes:
+            warn(figure, notes)
         save(figure, args.output, runs, title)
     if args.csv:
         write_csv(args.csv, tables[0] if data is None else data)
 
 
-def measured(name: str, estimate: Estimate) -> dict[str, float]:
-    """Two cells of a row: a mean and its standard error."""
+def measured(name: str, estimate: Estimate | SeriesMean | None) -> dict[str, float | None]:
+    """Two cells of a row: a mean and its error; None where there is nothing to measure."""
+    if estimate is None:
+        return {name: None, f"{name}_error": None}
     return {name: float(estimate.mean), f"{name}_error": float(estimate.error)}
+
+
+def without_error(tables: Sequence[Table]) -> list[str]:
+    """Why some errors are not numbers, in at most one sentence."""
+    names = [
+        name.removesuffix("_error")
+        for table in tables
+        for name, values in columns(table).items()
+        if name.endswith("error") and any(isinstance(v, float) and np.isnan(v) for v in values)
+    ]
+    reason = "takes several runs, or more samples in equilibrium"
+    return [f"no error of {', '.join(names)}: it {reason}"] if names else []
 
 
 def columns(table: Table) -> dict[str, Iterable]:
@@ -250,7 +272,7 @@ def text_of(table: Table) -> str:
     """A table for people: aligned, six digits."""
     table = columns(table)
     rows = [
-        [f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
+        ["-" if v is None else f"{v:.6g}" if isinstance(v, float) else str(v) for v in row]
         for row in zip(*table.values(), strict=True)
     ]
     widths = [max(map(len, column)) for column in zip(table, *rows, strict=True)]

@@ -1,6 +1,10 @@
-"""Means with errors, fits, and tests of a sample against a law."""
+"""Means with errors, fits, and tests of a sample against a law.
 
-from collections.abc import Callable
+Two kinds of error: `estimate` is for independent members, such as runs that differ by their seed;
+`series_mean` is for one series in time, whose samples remember each other.
+"""
+
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -72,17 +76,132 @@ def estimate(values: np.ndarray, axis: int = 0) -> Estimate:
     return Estimate(mean, values.std(axis=axis, ddof=1) / np.sqrt(values.shape[axis]))
 
 
-def combined(estimates: list[Estimate]) -> Estimate:
-    """The mean of independent estimates, with the error that follows from theirs."""
-    means = np.array([e.mean for e in estimates])
-    errors = np.array([e.error for e in estimates])
-    return Estimate(means.mean(axis=0), np.sqrt(np.sum(errors**2, axis=0)) / len(means))
+# --- series in time ---
+
+FINE, COARSE = 64, 16  # cells of a series: in their means fast noise fades, and slow modes show
+FEWEST = 8  # samples from which an error can be had
+ONE_SIGMA = float(scipy.stats.norm.cdf(1))
 
 
-def ratio(amount: np.ndarray, per: np.ndarray, factor: float = 1.0) -> Estimate:
-    """Sum of the blocks (B,) over sum, with the error from their scatter."""
-    total = np.sum(amount) / np.sum(per)
-    return Estimate(factor * total, abs(factor) * estimate(amount / per).error)
+class SeriesMean(NamedTuple):
+    """The mean of a correlated series, and what is needed to trust it."""
+
+    mean: float
+    error: float  # half the 68 % interval; NaN with fewer than `FEWEST` samples
+    samples: float  # independent samples that the series is worth
+    drift: float  # second half less first half, over the error of that difference
+
+    def scaled(self, factor: float, offset: float = 0.0) -> "SeriesMean":
+        """The same for offset + factor x."""
+        return self._replace(mean=offset + factor * self.mean, error=abs(factor) * self.error)
+
+
+def cells(series: np.ndarray, count: int) -> np.ndarray:
+    """Means over `count` equal parts of a series (T,); samples too many for that lead and go."""
+    width = max(1, len(series) // count)
+    return series[len(series) % width :].reshape(-1, width).mean(axis=1)
+
+
+def memory(series: np.ndarray) -> float:
+    """1 + 2 tau, tau the integrated autocorrelation time in samples: as many count as one.
+
+    The window of the sum and the correction for the unknown mean are those of U. Wolff, Comput.
+    Phys. Commun. 156, 143 (2004), with S = 1.5.  Sums that end at the first negative term, as
+    libraries have them, give too small errors for series as short as these.
+    """
+    count, rest = len(series), series - np.mean(series)
+    if np.ptp(series) <= 1e-12 * np.max(np.abs(series), initial=0):
+        return 1.0
+    found = 1.0
+    for lag in range(1, count // 2):
+        found += 2 * np.mean(rest[lag:] * rest[:-lag]) / np.mean(rest**2)
+        tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
+        if np.exp(-lag / tau) < tau / np.sqrt(lag * count):
+            break
+    return max(1.0, found) * (1 + (2 * lag + 1) / count)
+
+
+def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
+    """Sum of a series (T,) in equilibrium over the sum of another, such as counts over times.
+
+    The error is that of the mean of amount - ratio * per, from the autocorrelation of its cells,
+    with Student's t for few samples.
+    """
+    amount, per = np.broadcast_arrays(np.asarray(amount, dtype=float), per)
+    if len(amount) == 0:
+        return SeriesMean(np.nan, np.nan, 0.0, 0.0)
+    mean = float(np.sum(amount) / np.sum(per))
+    if len(amount) < FEWEST:
+        return SeriesMean(mean, np.nan, float(len(amount)), 0.0)
+    rest = (amount - mean * per) / np.mean(per)
+    coarse = cells(rest, COARSE)
+    free = len(coarse) / memory(coarse)
+    error = float(np.std(coarse, ddof=1) / np.sqrt(free))
+    if not error > 0:
+        return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
+    early, late = (half.mean() for half in np.array_split(rest, 2))
+    samples = min(float(len(rest)), float(np.var(rest)) / error**2)
+    interval = error * float(scipy.stats.t.ppf(ONE_SIGMA, max(1.0, free - 1)))
+    return SeriesMean(mean, interval, samples, float(late - early) / (2 * error))
+
+
+def equilibration(series: np.ndarray) -> int:
+    """Where a series (T,) may be taken as stationary: twice the point that White's rule finds.
+
+    The rule (MSER; K. P. White, Simulation 69, 323 (1997)) drops what makes the standard error of
+    the rest smallest; at that point what is left of the start is as large as the noise.
+    """
+    values = cells(series, FINE)
+    count = len(values)
+    scatter = [np.var(values[k:]) / (count - k) for k in range(count // 4 + 1)]
+    return 2 * int(np.argmin(scatter)) * max(1, len(series) // FINE)
+
+
+def combined(means: Sequence[SeriesMean]) -> SeriesMean:
+    """The mean over independent runs; their scatter counts where their errors do not explain it.
+
+    Samples add up, but where the scatter counts a run is one sample; drifts that agree grow.
+    """
+    runs = len(means)
+    mean, error, samples, drift = np.array(means).T
+    size, own = samples.sum(), np.sqrt(np.sum(error**2)) / runs
+    if scatter_p(means) < UNLIKELY:
+        size, own = runs, scipy.stats.sem(mean) * scipy.stats.t.ppf(ONE_SIGMA, runs - 1)
+    return SeriesMean(mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs)))
+
+
+UNLIKELY = 0.005  # probability below which chance is no explanation
+FEW = 10  # independent samples
+
+
+def scatter_p(means: Sequence[SeriesMean]) -> float:
+    """Probability that runs scatter more than this, if their errors are right."""
+    mean, error, *_ = np.array(means).T
+    if len(means) < 2 or not np.all(error > 0):
+        return 1.0
+    return float(scipy.stats.chi2.sf(np.sum(((mean - mean.mean()) / error) ** 2), len(mean) - 1))
+
+
+def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
+    """Why the mean over these runs should not be trusted, in sentences; none if it may be."""
+    found, whole = [], combined(means)
+    if np.isnan(whole.error):
+        return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
+    if scatter_p(means) < UNLIKELY:
+        spread, said = np.std([m.mean for m in means], ddof=1), np.mean([m.error for m in means])
+        found.append(
+            f"{name}: runs scatter by {spread:.2g} where each says ± {said:.2g}; the error is from "
+            "the scatter"
+        )
+    elif whole.samples < FEW:
+        found.append(f"{name}: worth only {whole.samples:.1f} independent samples; run longer")
+    if 2 * scipy.stats.norm.sf(abs(whole.drift)) < UNLIKELY:
+        more = "above" if whole.drift > 0 else "below"
+        found.append(
+            f"{name}: still drifts, the second half is {abs(whole.drift):.1f} errors {more} the "
+            "first; run longer, or --skip more"
+        )
+    return found
 
 
 def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,8 +1,8 @@
-"""Pressure, collision rates and temperature of a run, with errors from blocks of its time.
+"""Pressure, collision rates and temperature of a run in equilibrium, with errors.
 
 Three independent ways to the pressure: the virial of the pair collisions, the collision rate (equal
 disks), the force on the sides.  Z = P / (n kT); elastic runs.  `skip` is what is left out at the
-start, in collisions per disk.
+start, in collisions per disk; None finds it.
 """
 
 from typing import NamedTuple
@@ -11,53 +11,72 @@ import numpy as np
 
 from . import hard_disks
 from .reader import Run, RunError
-from .statistics import Estimate, ratio
+from .statistics import FEWEST, SeriesMean, equilibration, series_mean
 
-SKIP = 20.0  # collisions per disk
-BLOCKS = 20
-
-
-class Blocks(NamedTuple):
-    """What happened in each of `BLOCKS` equal parts of the run."""
-
-    time: np.ndarray  # (B,)
-    collisions: np.ndarray  # (B,) of pairs
-    virial: np.ndarray  # (B,)
-    hits: np.ndarray  # (B,) of all sides
-    impulse: np.ndarray  # (B, 4) by side
+SPEEDS_FORGET = 15.0  # collisions per disk after which any distribution of speeds is Maxwell's
 
 
-def settled(tau: np.ndarray, skip: float) -> int:
-    """Index of the first sample after `skip`; 0 if the run, `tau` (T,), is not twice as long."""
-    return int(np.searchsorted(tau, skip)) if tau[-1] > 2 * skip else 0
+class Steps(NamedTuple):
+    """What happened between one sample of the observables and the next, in equilibrium."""
+
+    time: np.ndarray  # (T,) how long it was
+    collisions: np.ndarray  # (T,) of pairs
+    virial: np.ndarray  # (T,)
+    hits: np.ndarray  # (T,) of all sides
+    impulse: np.ndarray  # (T, 4) by side
+
+
+def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
+    """The time after `skip` collisions per disk, or else that from which nothing drifts.
+
+    Looked at are the collision rate and the kinetic energy of each species.  Speeds get
+    `SPEEDS_FORGET`, as those series say nothing of their distribution.  A run too short for all
+    that counts from its middle.
+    """
+    time, tau = run.collisions_per_disk
+    if skip is not None:
+        if tau[-1] < skip:
+            ends = f"ends after {tau[-1]:.4g} collisions per disk"
+            raise RunError(f"{run.path}: {ends}, before --skip {skip:g}")
+        return float(time[np.searchsorted(tau, skip)])
+    if len(time) < 2 * FEWEST or not tau[-1] > 0:
+        return float(time[-1] / 2)
+    apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
+    series = [np.diff(tau) / apart]
+    if len(run.names) > 1:
+        series += [run.observable(f"{name}/kinetic_energy").value[1:] for name in run.names]
+    first = max(equilibration(values) for values in series)
+    return float(max(time[first], np.interp(min(SPEEDS_FORGET, tau[-1] / 2), tau, time)))
 
 
 def equilibrium_frames(
-    run: Run, skip: float, apart: float = 0.0, frames: list[int] | None = None
+    run: Run, skip: float | None, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Of the frames [all] those after `skip` collisions per disk, each `apart` from the last."""
+    """Of the frames [all] those in equilibrium, each `apart` collisions per disk from the last."""
     chosen, last = [], -np.inf
-    tau = run.collisions_per_disk_at(run.time)
+    tau, start = run.collisions_per_disk_at(run.time), start_of_equilibrium(run, skip)
     for frame in range(run.frames) if frames is None else sorted(frames):
-        if tau[frame] >= skip and tau[frame] >= last + apart * (1 - 1e-9):
+        if run.time[frame] >= start and tau[frame] >= last + apart * (1 - 1e-9):
             chosen.append(frame)
             last = tau[frame]
     return chosen
 
 
-def blocks(run: Run, skip: float = SKIP) -> Blocks:
-    """The run cut at samples of the observables."""
-    time, tau = run.collisions_per_disk
-    first = settled(tau, skip)
-    cuts = np.linspace(first, len(time) - 1, BLOCKS + 1).astype(int)
-    if len(time) - first <= BLOCKS or tau[-1] == 0:
-        raise RunError(f"{run.path}: too few observables for blocks, set observables_every_...")
+def steps(run: Run, skip: float | None = None) -> Steps:
+    """Differences of the observables that only grow, from the start of equilibrium on."""
+    time = run.collisions_per_disk.time
+    first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
+    if len(time) - first <= FEWEST:
+        raise RunError(
+            f"{run.path}: has {len(time) - first} samples of the observables in equilibrium, too "
+            "few for an error; set output.observables_every_time, or run longer"
+        )
     sums = (
-        run.observable(name).value[cuts]
+        run.observable(name).value[first:]
         for name in ("collisions", "virial", "wall_collisions", "wall_impulse")
     )
     collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
-    return Blocks(np.diff(time[cuts]), collisions, virial, hits.sum(axis=1), impulse)
+    return Steps(np.diff(time[first:]), collisions, virial, hits.sum(axis=1), impulse)
 
 
 def free_disks(run: Run) -> int:
@@ -81,31 +100,29 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
     return int(np.argmin(masses)), int(np.argmax(masses))
 
 
-def collision_rate(run: Run, skip: float = SKIP) -> Estimate:
+def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """Pair collisions per disk and time."""
-    b = blocks(run, skip)
-    return ratio(b.collisions, b.time, 2 / run.count)
+    s = steps(run, skip)
+    return series_mean(s.collisions, s.time).scaled(2 / run.count)
 
 
-def z_virial(run: Run, skip: float = SKIP) -> Estimate:
+def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the virial of the pairs."""
-    b = blocks(run, skip)
-    z = ratio(b.virial, b.time, 1 / (2 * run.count * temperature(run)))
-    return Estimate(1 + z.mean, z.error)
+    s = steps(run, skip)
+    return series_mean(s.virial, s.time).scaled(1 / (2 * run.count * temperature(run)), 1.0)
 
 
-def z_rate(run: Run, skip: float = SKIP) -> Estimate:
+def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the collision rate; equal masses."""
     free = free_disks(run)
     diameter, mass = 2 * run.radius[0], run.mass[0]
     unit = hard_disks.collision_rate(2.0, diameter, free, temperature(run), mass)
-    rate = collision_rate(run, skip)
-    return Estimate(1 + rate.mean / unit, rate.error / unit)
+    return collision_rate(run, skip).scaled(1 / unit, 1.0)
 
 
-def z_wall(run: Run, skip: float = SKIP) -> Estimate:
+def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the force on the sides, over the area open to the centres of equal disks."""
-    b = blocks(run, skip)
+    s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
-    work = b.impulse[:, :2].mean(axis=1) * a[0] + b.impulse[:, 2:].mean(axis=1) * a[1]
-    return ratio(work, b.time, 1 / (2 * run.count * temperature(run)))
+    work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
+    return series_mean(work, s.time).scaled(1 / (2 * run.count * temperature(run)))

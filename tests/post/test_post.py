@@ -111,7 +111,7 @@ def test_power_law_is_found_with_its_error(rng):
 # --- gas and mixture ---
 
 
-def gas(path, rng, count=200, frames=41, **more):
+def gas(path, rng, count=200, frames=41, mass=1.0, **more):
     """Equal speeds at first, then Maxwell with the energy kept; half a collision per frame."""
     angle = rng.uniform(0, 2 * np.pi, (1, count))
     v = np.concatenate(
@@ -122,15 +122,20 @@ def gas(path, rng, count=200, frames=41, **more):
     )
     v *= np.sqrt(count / np.sum(v**2, axis=(1, 2)))[:, None, None]
     x = rng.uniform(0.05, 0.95, (frames, count, 2))
-    tau = np.arange(frames)
-    return write_run(path, x, v, observables={"collisions": tau * count // 2}, **more)
+    energy = 0.5 * np.broadcast_to(mass, count) * np.sum(v**2, axis=2)
+    observables = {"collisions": np.arange(frames) * count // 2} | {
+        f"{name}/kinetic_energy": energy[:, more.get("species", np.ones(count)) == k + 1].mean(1)
+        for k, name in enumerate(more.get("names", ()))
+    }
+    return write_run(path, x, v, mass=mass, observables=observables, **more)
 
 
 def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
     run = read_run(gas(tmp_path / "gas.h5", rng))
     assert thermodynamics.equilibrium_frames(run, skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
     assert thermodynamics.equilibrium_frames(run, skip=39, apart=0) == [39, 40]
-    assert thermodynamics.equilibrium_frames(run, skip=50, apart=5) == []
+    with pytest.raises(RunError, match="ends after 40 collisions per disk, before --skip 50"):
+        thermodynamics.equilibrium_frames(run, skip=50, apart=5)
 
 
 def test_reduced_speeds_do_not_know_units(tmp_path, rng):
@@ -498,13 +503,14 @@ def test_runs_with_equal_seeds_are_compared(tmp_path, rng):
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):
             missed.compare(runs, 2.0)
-    with pytest.raises(RunError, match="ends before"):
+    with pytest.raises(RunError, match="before --skip 20"):
         missed.compare(steps + events, 20.0)
 
 
-def test_equilibrium_values_are_means_over_the_second_half(tmp_path, rng):
+def test_equilibrium_values_are_means_after_skip(tmp_path, rng):
     runs = [read_run(falling(tmp_path / f"{k}.h5", rng, temperature=k, seed=k)) for k in (1, 3)]
-    (result,) = equipartition.table([(0.5, runs)], [equipartition.approach(runs, 10, 0.1)])
+    approach = equipartition.approach(runs, 10, 0.1)
+    (result,) = equipartition.table([(0.5, runs)], [approach], skip=100)  # 0.5 a frame
     assert result["runs"] == 2 and result["energy"] == pytest.approx(80 / 60)
     for name, column in (("A", "K_light"), ("B", "K_heavy")):
         one, other = (run.observable(f"{name}/kinetic_energy").value[200:].mean() for run in runs)
@@ -754,6 +760,14 @@ def test_script_draws_and_tabulates(tmp_path, rng, script, capsys):
     assert len(rows) > 1 and len({len(row) for row in rows}) == 1
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) > 1 and len(printed[0]) == len(printed[1]) > 10, "a table"
+
+
+def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
+    draw("cooling", cooled(tmp_path / "one.h5", 0.9, 0.3).path, "-o", tmp_path / "a.png")
+    printed, said = capsys.readouterr()
+    assert "nan" in printed and "no error of energy_left, temperature_ratio: it takes sev" in said
+    draw("equipartition", falling(tmp_path / "f.h5", rng), "--within", 0, "-o", tmp_path / "b.png")
+    assert "v0 = 0.5: the energies never agree within 0 %" in capsys.readouterr().err
 
 
 def test_vector_figures_are_written_too(tmp_path, rng):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import correlations
 import equation_of_state
@@ -71,16 +72,16 @@ def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():
 # --- pressure ---
 
 
-def steady(path, periodic, **parameters):
-    """100 disks with kT = 2; all sums grow linearly in time."""
+def steady(path, periodic, speed=1.0, **parameters):
+    """100 disks with kT = 2 speed^2; all sums grow linearly in time."""
     time = np.arange(201.0)
-    v = np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
+    v = speed * np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
     x = np.full_like(v, 0.5)
     observables = {
         "collisions": (500 * time).astype(int),
-        "virial": 300 * time,
+        "virial": 300 * speed**2 * time,
         "wall_collisions": np.outer(time, (3, 3, 4, 4)).astype(int),
-        "wall_impulse": np.outer(time, (400.0, 400.0, 500.0, 500.0)),
+        "wall_impulse": speed**2 * np.outer(time, (400.0, 400.0, 500.0, 500.0)),
     }
     return written(
         path,
@@ -108,14 +109,63 @@ def test_three_pressures_of_a_steady_run(tmp_path):
     bulk = steady(tmp_path / "bulk.h5", PERIODIC)
     assert thermodynamics.temperature(bulk) == pytest.approx(200 / 99)
     assert thermodynamics.z_virial(bulk).mean == pytest.approx(1 + 300 / (2 * 100 * 200 / 99))
-    assert np.isnan(equation_of_state.pressures(bulk)[2].mean)
+    assert set(equation_of_state.pressures(bulk)) == {"virial", "rate"}
 
 
-def test_errors_come_from_the_scatter_of_blocks(rng):
-    amount = rng.poisson(1000, 2000).astype(float)
-    found = statistics.ratio(amount, np.full(2000, 2.0))
+def test_pressures_in_time_are_those_at_the_mean_temperature(tmp_path):
+    runs = [steady(tmp_path / f"{k}.h5", (False, False), speed=k) for k in (1, 2)]  # kT = 2, 8
+    found = rates.pressures_in_time(runs, np.linspace(0, 200, 5))
+    np.testing.assert_allclose(found["virial"], (2 * 100 + 300 / 2) * 5 / 2)
+    np.testing.assert_allclose(found["sides"], 450 * 5 / 2)
+
+
+def remembering(rng, length: int, memory: float) -> np.ndarray:
+    """A series (T,) of mean 0 and variance 1 whose correlation falls by 1/e in `memory` samples."""
+    keep = np.exp(-1 / memory)
+    return lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.normal(size=length + 2000))[2000:]
+
+
+def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(rng):
+    amount = rng.poisson(1000, 20000).astype(float)
+    found = statistics.series_mean(amount, np.full(20000, 2.0))
     assert found.mean == pytest.approx(500, rel=0.01)
-    assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(2000), rel=0.1)
+    assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(20000), rel=0.4)
+
+
+@pytest.mark.parametrize("memory", [0.5, 5, 20])
+def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memory):
+    means = [
+        statistics.series_mean(remembering(rng, 2000, memory) + 3 * rng.normal(size=2000))
+        for _ in range(400)
+    ]
+    hit = np.mean([abs(one.mean) < one.error for one in means])
+    assert 0.60 <= hit <= 0.76
+    exact = np.sqrt((1 / np.tanh(0.5 / memory) + 9) / 2000)
+    assert np.mean([one.error for one in means]) == pytest.approx(1.1 * exact, rel=0.12)
+
+
+def test_equilibrium_begins_where_a_drift_has_died_out(rng):
+    decay = 20 * np.exp(-np.arange(4000) / 200)
+    starts = [statistics.equilibration(remembering(rng, 4000, 3) + decay) for _ in range(40)]
+    assert np.quantile(starts, 0.1) > 3 * 200 and np.quantile(starts, 0.9) < 2000
+    calm = [statistics.equilibration(remembering(rng, 4000, 3)) for _ in range(40)]
+    assert np.median(calm) < 400
+
+
+def test_what_speaks_against_an_error_is_said(rng):
+    calm = [statistics.series_mean(rng.normal(size=640)) for _ in range(10)]
+    assert statistics.doubts("Z", calm) == []
+    slope = np.linspace(0, 0.5, 640)  # hardly seen in one run, but they all agree
+    drifting = [statistics.series_mean(rng.normal(size=640) + slope) for _ in range(10)]
+    assert "Z: still drifts" in statistics.doubts("Z", drifting)[0]
+    apart = [one._replace(mean=one.mean + k) for k, one in enumerate(calm)]
+    assert "runs scatter by 3" in statistics.doubts("Z", apart)[0]
+    assert statistics.combined(apart).error == pytest.approx(1, rel=0.1)
+    assert statistics.combined(apart).samples == 10, "a run is a sample"
+    short = statistics.series_mean(rng.normal(size=5))
+    assert "no error" in statistics.doubts("Z", [short])[0]
+    slow = statistics.series_mean(remembering(rng, 640, 100))
+    assert "independent samples; run longer" in " ".join(statistics.doubts("Z", [slow]))
 
 
 def test_inelastic_runs_have_no_equation_of_state(tmp_path):
@@ -138,7 +188,7 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
     )  # fmt: skip
     zero = np.zeros(len(hits), int)
     run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
-    path, weight = rates.free_paths(run)
+    path, weight = rates.free_paths(run, skip=0)
     assert set(np.round(path, 9)) == {0.5, 2.0}
     assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
 
@@ -160,7 +210,8 @@ def test_velocities_that_turn_are_remembered_as_a_cosine(tmp_path):
     run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=observables)
     at = correlations.lags(100)
     assert at[0] == 1 and at[-1] == 50 and np.all(np.diff(at) > 0)
-    np.testing.assert_allclose(correlations.velocity_memory(run, at), np.cos(0.1 * at), atol=1e-12)
+    memory = correlations.velocity_memory(run, at, skip=0)
+    np.testing.assert_allclose(memory, np.cos(0.1 * at), atol=1e-12)
 
 
 def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
@@ -179,7 +230,7 @@ def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
         observables=observables,
     )
     at = np.array([1, 5, 20])
-    np.testing.assert_allclose(correlations.displacement(run, at), (0.1 * at) ** 2)
+    np.testing.assert_allclose(correlations.displacement(run, at, skip=0), (0.1 * at) ** 2)
 
 
 @pytest.mark.parametrize("periodic", [PERIODIC, (False, False), (True, False)])

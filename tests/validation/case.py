@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ricochet.statistics import Estimate
+from ricochet.statistics import Estimate, SeriesMean
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Case:
     id: str
     what: str
     members: tuple[Member, ...]
-    measure: Callable[..., ArrayLike | Estimate]  # of the runs of the members
+    measure: Callable[..., ArrayLike | Estimate | SeriesMean]  # of the runs of the members
     reference: ArrayLike
     tolerance: Tolerance
     source: str
@@ -84,7 +84,9 @@ def judge(case: Case, runs: list) -> Verdict:
         result = case.measure(*runs)
     except Exception as problem:
         return failed(case, f"{type(problem).__name__}: {problem}")
-    mean, error = result if isinstance(result, Estimate) else (result, 0.0)
+    mean, error = (
+        (result.mean, result.error) if isinstance(result, Estimate | SeriesMean) else (result, 0.0)
+    )
     measured = np.atleast_1d(np.asarray(mean, dtype=float))
     reference = np.atleast_1d(np.asarray(case.reference, dtype=float))
     if measured.shape != reference.shape and reference.size != 1:

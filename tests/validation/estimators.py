@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ricochet import Run
-from ricochet.statistics import Estimate, estimate, ratio
-from ricochet.thermodynamics import blocks
+from ricochet.statistics import Estimate, SeriesMean, estimate, series_mean
+from ricochet.thermodynamics import steps
 
 
 def over_runs(measure, runs: tuple[Run, ...]) -> Estimate:
@@ -22,9 +22,9 @@ def middle(measure, runs: tuple[Run, ...]) -> np.ndarray:
     return np.median([measure(run) for run in runs], axis=0)
 
 
-def several(estimates: list[Estimate]) -> Estimate:
-    """Several estimates as one with vectors."""
-    return Estimate(*(np.array(part, dtype=float) for part in zip(*estimates, strict=True)))
+def several(means: list[SeriesMean]) -> Estimate:
+    """Several means as one with vectors."""
+    return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
 
 
 def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
@@ -32,16 +32,16 @@ def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
     return np.interp(tau, run.collisions_per_disk.value, run.observable(name).value)
 
 
-def hit_rate(run: Run) -> Estimate:
+def hit_rate(run: Run) -> SeriesMean:
     """Hits of all sides per time."""
-    b = blocks(run)
-    return ratio(b.hits, b.time)
+    s = steps(run)
+    return series_mean(s.hits, s.time)
 
 
-def force(run: Run) -> Estimate:
+def force(run: Run) -> SeriesMean:
     """Mean force on one side."""
-    b = blocks(run)
-    return ratio(b.impulse.mean(axis=1), b.time)
+    s = steps(run)
+    return series_mean(s.impulse.mean(axis=1), s.time)
 
 
 def closest_gap(run: Run) -> float:

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# How often an error bar holds the truth: 200 short runs of a gas, a liquid, and near freezing.
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
+
+while read -r packing placement; do
+  runs/ensemble.sh input/bulk.nml -d "$data/eta_$packing" --seeds 1-200 \
+    --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" "$@"
+done <<'TABLE'
+0.3 random
+0.6 dense
+0.68 dense
+TABLE
+"$python" post/coverage.py "$data"/eta_*/*.h5 -o "$figures/coverage.png" \
+  --csv "$figures/coverage.csv"
