@@ -16,13 +16,15 @@ from ricochet.drawing import (
     chosen_colour,
     disk_collection,
     draw_box,
+    move_disks,
     plt,
     species_colours,
     species_legend,
     values_of,
+    warn,
 )
 from ricochet.files import destination
-from ricochet.script import command_line, film_frames, launch, positive, text_of
+from ricochet.script import command_line, film_frames, launch, positive, report
 
 import numpy as np
 from matplotlib import animation
@@ -56,22 +58,26 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
     width = height / aspect + (1.2 if colour != "species" else 0.2)
     figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
     draw_box(axes, run)
+
+    def colours_of(frame: int) -> dict:
+        if colour == "species":
+            return {"facecolors": species_colours(run)}
+        return {"array": values_of(run, frame, colour)}
+
+    disks = disk_collection(axes, run, run.position[0], **colours_of(0))
     if colour == "species":
-        disks = disk_collection(axes, run, run.position[0], facecolors=species_colours(run))
         species_legend(figure, run)
     else:
-        limits = colour_limits(run, frames, colour)
-        disks = disk_collection(axes, run, run.position[0], array=np.zeros(run.count), clim=limits)
+        disks.set_clim(*colour_limits(run, frames, colour))
         figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
     title = axes.set_title(" ")
+    warn(figure, [run.shortcoming] if run.shortcoming else [])
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
     writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(fps=fps)
     with writer.saving(figure, str(destination(path)), dpi=100):
         for frame in tqdm(frames, unit="frame", desc=path.name, disable=None):
-            disks.set_offsets(run.position[frame])
-            if colour != "species":
-                disks.set_array(values_of(run, frame, colour))
+            move_disks(disks, run, run.position[frame], **colours_of(frame))
             title.set_text(f"{caption([run])},  t = {run.time[frame]:.4g}")
             writer.grab_frame()
     plt.close(figure)
@@ -87,7 +93,7 @@ def main() -> None:
     path = film_path(args.output, run)
     frames = film_frames(run, args)
     animate(run, frames, chosen_colour(run, args.colour), path, args.fps)
-    print(text_of([{"film": path, "frames": len(frames), "of": run.frames}]))
+    report(args, [run], "Film", None, [{"film": path, "frames": len(frames), "of": run.frames}])
 
 
 if __name__ == "__main__":

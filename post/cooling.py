@@ -1,10 +1,10 @@
-"""Mean kinetic energy of a mixture in time, elastic and inelastic.
+"""Mean kinetic energy in time, elastic and inelastic, of each species of a mixture.
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
 Runs are combined by restitution xi; lines are means over the runs, bands are standard errors.  K is
 per disk and in units of its start value over all disks.  The lowest row shows the temperature ratio
-of the heaviest to the lightest species, 1 in equilibrium.
+of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class Cooling(NamedTuple):
 
     by_time: tuple[np.ndarray, Estimate]
     by_collisions: tuple[np.ndarray, Estimate]
-    ratio: Estimate  # (P,) heaviest to lightest, at the collisions
+    ratio: Estimate | None  # (P,) heaviest to lightest, at the collisions
 
 
 def energies(run: Run) -> np.ndarray:
@@ -42,38 +42,45 @@ def cooling(runs: list[Run], points: int = 201) -> Cooling:
     tau = np.linspace(0, min(c[-1] for _, c, _ in tracks), points)
     by_time = np.array([[np.interp(time, t, k) for k in ks] for t, _, ks in tracks])
     by_tau = np.array([[np.interp(tau, c, k) for k in ks] for _, c, ks in tracks])
-    light, heavy = lightest_and_heaviest(runs[0])
-    ratio = by_tau[:, 1 + heavy] / by_tau[:, 1 + light]
-    return Cooling((time, estimate(by_time)), (tau, estimate(by_tau)), estimate(ratio))
+    ratio = None
+    if np.ptp(runs[0].mass) > 0:
+        light, heavy = lightest_and_heaviest(runs[0])
+        ratio = estimate(by_tau[:, 1 + heavy] / by_tau[:, 1 + light])
+    return Cooling((time, estimate(by_time)), (tau, estimate(by_tau)), ratio)
 
 
-def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.Figure:
-    """Columns: restitution.  Rows: against time, against collisions; below the ratio."""
-    figure = plt.figure(figsize=(10, 9))
-    grid = figure.add_gridspec(3, len(groups))
-    labels = ("all", *groups[0][1][0].names)
-    colours = ("black", *COLOURS)
-    floor = min(r.by_time[1].mean.min() for r in results)
-    for column, ((xi, _), result) in enumerate(zip(groups, results, strict=True)):
-        for row, (x, y) in enumerate((result.by_time, result.by_collisions)):
-            axes = figure.add_subplot(grid[row, column])
-            for label, mean, error, colour in zip(labels, y.mean, y.error, colours, strict=False):
-                band(axes, x, mean, error, color=colour, label=label)
-            axes.set(yscale="log", ylim=(0.8 * floor, 2), xlim=(0, x[-1]))
-            axes.set_xlabel("collisions per disk" if row else "time (reduced units)")
-            if column == 0:
-                axes.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
-            if row == 0:
-                axes.set_title(f"ξ = {xi:g}")
-            if row == column == 0:
-                axes.legend()
-    axes = figure.add_subplot(grid[2, :])
+def draw_ratio(axes: plt.Axes, groups: list, results: list[Cooling]) -> None:
+    """The temperature ratio against collisions, beside the dilute limit."""
     for (xi, _), result, colour in zip(groups, results, COLOURS[2:], strict=False):
-        band(axes, result.by_collisions[0], *result.ratio, color=colour, label=f"ξ = {xi:g}")
+        if result.ratio is not None:
+            band(axes, result.by_collisions[0], *result.ratio, color=colour, label=f"ξ = {xi:g}")
     dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", xlim=(0, None), ylabel="temperature ratio heavy / light")
     axes.legend(ncols=2)
+
+
+def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.Figure:
+    """Columns: restitution.  Rows: against time, against collisions; below the ratio."""
+    rows = 2 + any(result.ratio is not None for result in results)
+    figure = plt.figure(figsize=(10, 3 * rows))
+    grid = figure.add_gridspec(rows, len(groups))
+    upper = grid[:2, :].subgridspec(2, len(groups))
+    panels = upper.subplots(sharex="row", sharey=True, squeeze=False)
+    colours, floor = ("black", *COLOURS), min(r.by_time[1].mean.min() for r in results)
+    for column, (xi, runs), result in zip(panels.T, groups, results, strict=True):
+        labels = ("all", *runs[0].names)
+        for axes, (x, y) in zip(column, (result.by_time, result.by_collisions), strict=True):
+            for label, mean, error, colour in zip(labels, y.mean, y.error, colours, strict=False):
+                band(axes, x, mean, error, color=colour, label=label)
+            axes.set(yscale="log", xlim=(0, None), ylim=(0.8 * floor, 2))
+        column[0].set(title=f"ξ = {xi:g}", xlabel="time (reduced units)")
+        column[1].set(xlabel="collisions per disk")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
+    panels[0, 0].legend()
+    if rows == 3:
+        draw_ratio(figure.add_subplot(grid[2, :]), groups, results)
     runs = [run for _, members in groups for run in members]
     figure.suptitle(
         f"{caption(runs)}, wall rule: {runs[0].parameter('contact', 'wall_rule', '')}", fontsize=10
@@ -87,7 +94,7 @@ def table(groups: list, results: list[Cooling]) -> list[dict]:
     for (xi, runs), found in zip(groups, results, strict=True):
         energy = found.by_time[1]
         left = measured("energy_left", Estimate(energy.mean[0, -1], energy.error[0, -1]))
-        ratio = Estimate(found.ratio.mean[-1], found.ratio.error[-1])
+        ratio = found.ratio and Estimate(found.ratio.mean[-1], found.ratio.error[-1])
         row = {"restitution": xi, "runs": len(runs)}
         rows.append(row | left | measured("temperature_ratio", ratio))
     return rows
@@ -102,7 +109,8 @@ def curves(groups: list, results: list[Cooling]) -> dict[str, np.ndarray]:
         columns[f"collisions_per_disk_xi{xi:g}"] = tau
         for name, mean, error in zip(names, *energy, strict=True):
             columns[f"K_{name}_xi{xi:g}"], columns[f"K_{name}_error_xi{xi:g}"] = mean, error
-        columns[f"ratio_xi{xi:g}"], columns[f"ratio_error_xi{xi:g}"] = result.ratio
+        if result.ratio:
+            columns[f"ratio_xi{xi:g}"], columns[f"ratio_error_xi{xi:g}"] = result.ratio
     return columns
 
 

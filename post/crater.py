@@ -6,12 +6,23 @@
 The projectile is the species of that name, or else the only disk that moves at the start; the
 others are the bed.  Sizes: `hit`, bed disks that collided with anything; `displaced`, bed disks
 now further than one radius from their first position; `width` and `depth`, the extent of the first
-positions of the displaced ones, from the rim of the bed downwards.
+positions of the displaced ones, from the rim of the bed downwards.  A crater is marked if the box
+takes part (wall hits are more than 1 % of the number of disks), or if the run ended with more
+energy left than `stop.energy_fraction`.
 """
 
 from ricochet import Run
-from ricochet.crater import Crater, bed, crater, displaced, packing_field, projectile
-from ricochet.drawing import COLOURS, WALL, caption, disk_collection, draw_box, plt
+from ricochet.crater import (
+    Crater,
+    bed,
+    box_takes_part,
+    crater,
+    displaced,
+    ended_by_time,
+    packing_field,
+    projectile,
+)
+from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, read_all, report
 
 import numpy as np
@@ -75,8 +86,8 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 def draw(run: Run, size: Crater) -> plt.Figure:
     """Before, after, collisions per disk, energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
-    moved = run.displacement(-1) / np.median(run.radius)
-    limits = (0, max(1.0, float(np.quantile(moved[displaced(run)], 0.9)) if size.displaced else 1))
+    moved, radius = run.displacement(-1), float(np.median(run.radius))
+    limits = (0, float(np.quantile(moved[displaced(run)], 0.9)) if size.displaced else radius)
     draw_state(before, run, 0, moved, limits)
     draw_hull(before, run)
     draw_state(after, run, -1, moved, limits)
@@ -90,7 +101,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
         aspect=40,
         extend="max",
         pad=0.02,
-        label="displacement at the end (radii)",
+        label=f"{LABELS['displacement']} at the end",
     )
     count = np.log10(1.0 + run.collisions[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
@@ -115,15 +126,30 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     return figure
 
 
+def marks(run: Run, size: Crater) -> dict[str, int]:
+    """What cut the crater short, as in `crater_scan.py`."""
+    return {
+        "ended_by_time": int(ended_by_time(run, size)),
+        "box_takes_part": int(box_takes_part(run, size.wall_collisions)),
+    }
+
+
+def notes(run: Run, size: Crater) -> list[str]:
+    """The same in words."""
+    found, name = marks(run, size), run.path.name
+    left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, the crater still grows"
+    box = f"{name}: the crater reaches the floor or the sides, {size.wall_collisions} wall hits"
+    return [left] * found["ended_by_time"] + [box] * found["box_takes_part"]
+
+
 def main() -> None:
     args = command_line(__doc__, "crater.png").parse_args()
     runs = read_all(args.runs)
     sizes = [crater(run) for run in runs]
     figure = draw(runs[0], sizes[0]) if len(runs) == 1 else None
-    table = [
-        {"run": run.path.name, **size._asdict()} for run, size in zip(runs, sizes, strict=True)
-    ]
-    report(args, runs, "Crater", figure, table)
+    members = list(zip(runs, sizes, strict=True))
+    table = [{"run": run.path.name, **size._asdict(), **marks(run, size)} for run, size in members]
+    report(args, runs, "Crater", figure, table, notes=[n for one in members for n in notes(*one)])
 
 
 if __name__ == "__main__":

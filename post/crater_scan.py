@@ -5,16 +5,24 @@
 The four parameters are read from each run.  The most frequent value of each is the base; a run
 belongs to the scan of a parameter if the other three are at the base.  Points: means over the
 runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
-restitution, the fraction of normal energy lost in a collision).  Open symbols are left out of
-the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
-runs ended by time, with more energy left than `stop.energy_fraction`.
+restitution, the fraction of normal energy lost in a collision).  Only what varies is drawn.  Open
+symbols are left out of the fit: the box takes part (wall hits are more than 1 % of the number of
+disks), or some of the runs ended by time, with more energy left than `stop.energy_fraction`.
 """
 
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.crater import Crater, bed, crater, projectile
-from ricochet.drawing import COLOURS, plt
+from ricochet.crater import (
+    Crater,
+    bed,
+    box_takes_part,
+    crater,
+    ended_by_time,
+    energy_fraction,
+    projectile,
+)
+from ricochet.drawing import COLOURS, caption, panel_grid, plt
 from ricochet.script import command_line, launch, measured, read_all, report
 from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law
 
@@ -65,9 +73,7 @@ def base_of(keys: list[tuple[float, ...]]) -> tuple[float, ...]:
     return tuple(max(sorted(set(column)), key=column.count) for column in zip(*keys, strict=True))
 
 
-def scan_points(
-    keys: list, craters: list[Crater], axis: int, fraction: float, few_hits: float
-) -> list[Point]:
+def scan_points(keys: list, runs: list[Run], craters: list[Crater], axis: int) -> list[Point]:
     """The scan along one parameter, all others at the base, in ascending order."""
     base = base_of(keys)
     along = [
@@ -77,14 +83,15 @@ def scan_points(
     ]
     points = []
     for x in sorted({keys[k][axis] for k in along}):
-        here = [craters[k] for k in along if keys[k][axis] == x]
+        members = [k for k in along if keys[k][axis] == x]
+        here = [craters[k] for k in members]
         sizes = {name: estimate([getattr(c, name) for c in here]) for name in SIZES | EXTENTS}
         left, hits = (
             np.array([getattr(c, name) for c in here])
             for name in ("energy_left", "wall_collisions")
         )
-        by_time = bool(left.max() > fraction * (1 + 1e-9))
-        free = bool(not by_time and hits.mean() <= few_hits)
+        by_time = any(ended_by_time(runs[k], craters[k]) for k in members)
+        free = not by_time and not box_takes_part(runs[members[0]], hits.mean())
         points.append(Point(x, len(here), sizes, left.mean(), hits.mean(), by_time, free))
     return points
 
@@ -128,12 +135,14 @@ def draw_sizes(
         axes.errorbar(x[~free], y[~free], error[~free], mfc="white", **style)
 
 
-def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list[Run]):
-    """A panel per parameter: numbers of disks above, width and depth below."""
-    figure = plt.figure(figsize=(11, 11))
-    grid = figure.add_gridspec(4, 2, height_ratios=(1.3, 1, 1.3, 1))
-    for fixed, (axis, points) in enumerate(scans.items()):
-        fits, row, column = fits_of(axis, points), 2 * (fixed // 2), fixed % 2
+def draw(scans: dict[str, list[Point]], base: tuple, runs: list[Run]) -> plt.Figure:
+    """Panels for each parameter: numbers of disks above, width and depth below."""
+    rows, columns = panel_grid(len(scans), 1)
+    figure = plt.figure(figsize=(5.5 * max(columns, 1.3), 5.5 * rows))
+    grid = figure.add_gridspec(2 * rows, columns, height_ratios=(1.3, 1) * rows)
+    fraction = energy_fraction(runs[0])
+    for panel, (axis, points) in enumerate(scans.items()):
+        fits, row, column = fits_of(axis, points), 2 * (panel // columns), panel % columns
         numbers = figure.add_subplot(grid[row, column])
         lengths = figure.add_subplot(grid[row + 1, column], sharex=numbers)
         draw_sizes(numbers, axis, points, fits, SIZES, COLOURS[:2])
@@ -150,8 +159,8 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
             )
         others = [
             f"{name} {value:g}"
-            for k, (name, value) in enumerate(zip(AXES, base, strict=True))
-            if k != fixed
+            for name, value in zip(AXES, base, strict=True)
+            if name != axis
         ]
         numbers.set(ylabel="number of disks", title=",  ".join(others))
         numbers.tick_params(labelbottom=False)
@@ -163,9 +172,7 @@ def draw(scans: dict[str, list[Point]], base: tuple, fraction: float, runs: list
     number = "-".join(map(str, sorted({min(per_point), max(per_point)})))
     ended = any(not p.free for points in scans.values() for p in points)
     figure.suptitle(
-        f"Crater size,  N = {', '.join(str(n) for n in sorted({r.count for r in runs}))},  "
-        f"{number} runs per point,  ended at "
-        f"{100 * fraction:g} % of the energy"
+        f"{caption(runs)}\n{number} runs per point,  ended at {100 * fraction:g} % of the energy"
         + (" (open: the box takes part, or ended by time)" if ended else ""),
         fontsize=10,
     )
@@ -204,10 +211,10 @@ def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
     runs = distinct(read_all(args.runs))
     keys, craters = [key_of(run) for run in runs], [crater(run) for run in runs]
-    fraction = float(runs[0].parameter("stop", "energy_fraction", 0.1))
-    few_hits = 0.01 * runs[0].count
-    scans = {axis: scan_points(keys, craters, k, fraction, few_hits) for k, axis in enumerate(AXES)}
-    figure = draw(scans, base_of(keys), fraction, runs)
+    scans = {axis: scan_points(keys, runs, craters, k) for k, axis in enumerate(AXES)}
+    scanned = {axis: points for axis, points in scans.items() if len(points) > 1}
+    scans = scanned or {"mass": scans["mass"]}
+    figure = draw(scans, base_of(keys), runs)
     report(args, runs, "Crater size", figure, table(scans), exponents(scans))
 
 

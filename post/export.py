@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ricochet import Run, RunError, read_run
 from ricochet.files import destination
-from ricochet.script import chosen_frames, command_line, launch, text_of
+from ricochet.script import chosen_frames, command_line, launch, report
 
 from tqdm import tqdm
 
@@ -73,7 +73,7 @@ def main() -> None:
     frames = chosen_frames(run, args.frames, args.count)
     with destination(path).open("w") as file:
         file.writelines(exported(run, path.suffix, frames))
-    print(text_of([{"export": path, "frames": len(frames), "of": run.frames}]))
+    report(args, [run], "Export", None, [{"export": path, "frames": len(frames), "of": run.frames}])
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ run: from the autocorrelation over its frames).
 Theory: each species has <K> = kT = E / N and <v> = sqrt(pi kT / 2 m).
 """
 
-from ricochet import Run
+from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, hold_against, series_mean
@@ -129,6 +129,9 @@ def moments(row: dict, when: str) -> str:
 def main() -> None:
     args = command_line(__doc__, "mixture.png", frames=None, skip=None, apart=5.0).parse_args()
     runs = read_all(args.runs)
+    for run in runs:
+        if run.names != runs[0].names or len(run.names) < 2:
+            raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames)
     report(args, runs, "Speeds of a mixture", draw(runs, frames, result), result)

@@ -20,7 +20,7 @@ from pathlib import Path
 from ricochet import Run, RunError, read_run
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
 from ricochet.files import destination
-from ricochet.script import chosen_disks, command_line, film_frames, launch, text_of
+from ricochet.script import chosen_disks, command_line, film_frames, launch, report
 
 import numpy as np
 from matplotlib.colors import to_hex
@@ -183,6 +183,7 @@ def page(run: Run, facts: dict, blocks: dict) -> str:
         "policy": policy(template),
         "title": html.escape(title),
         "caption": html.escape(caption([run])),
+        "warning": html.escape(run.shortcoming),
         "source": html.escape(f"{run.path.name} (ricochet {commit})"),
         "data": "\n".join(data),
     }
@@ -214,7 +215,8 @@ def main() -> None:
     text = page(run, *film(run, frames, chosen_colour(run, args.colour), traced))
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
-    print(text_of([{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]))
+    rows = [{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]
+    report(args, [run], "Player", None, rows)
 
 
 if __name__ == "__main__":

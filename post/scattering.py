@@ -2,9 +2,9 @@
 
     python post/scattering.py runs/scattering/*.h5 -o scattering.png --csv scattering.csv
 
-Each run holds two disks, one at rest; b is the distance of the rest disk's centre from the
-line of flight, R12 = r1 + r2.  The angle is that between the moving disk's first and last
-velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, kappa =
+Each run holds two disks, one at rest; b is the distance of the line of flight from the rest disk's
+centre, positive on its left, R12 = r1 + r2.  The angle is that between the moving disk's first and
+last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, kappa =
 (1 + xi) / 2 * M / (1 + M), s = b / R12, c^2 = 1 - s^2:
     tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
 """
@@ -22,7 +22,7 @@ import numpy as np
 class Scattering(NamedTuple):
     """What one run says."""
 
-    impact: float  # b / R12
+    impact: float  # b / R12, with its sign
     angle: float  # [rad]
     speed_change: float  # speed' / speed - 1
     mass_ratio: float  # at rest over moving
@@ -37,7 +37,7 @@ def scattering(run: Run) -> Scattering:
     i, k = moving[0], 1 - moving[0]
     v, w = before[i], after[i]
     gap = run.position[0][k] - run.position[0][i]
-    impact = abs(v[0] * gap[1] - v[1] * gap[0]) / np.hypot(*v) / run.radius.sum()
+    impact = (v[1] * gap[0] - v[0] * gap[1]) / np.hypot(*v) / run.radius.sum()
     angle = np.arctan2(abs(v[0] * w[1] - v[1] * w[0]), v @ w)
     change = np.hypot(*w) / np.hypot(*v) - 1
     return Scattering(impact, angle, change, run.mass[k] / run.mass[i])
@@ -50,7 +50,8 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
     figure, (top, bottom) = plt.subplots(
         2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1), constrained_layout=True
     )
-    fine = np.linspace(0, max(1.2, s.max()), 1201)
+    end = max(1.2, np.abs(s).max())
+    fine = np.linspace(-end if s.min() < 0 else 0, end, 2401)
     exact = f"exact, $m_1/m_2$ = {ratio:,.7g}, ξ = {restitution:g}"
     top.plot(
         fine,
@@ -66,7 +67,7 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
             color=COLOURS[4],
             lw=1.2,
             ls="--",
-            label="$m_1/m_2 = \\infty$: $2\\arccos(b/R_{12})$",
+            label="$m_1/m_2 = \\infty$: $2\\arccos(|b|/R_{12})$",
         )
     top.plot(
         s,
@@ -79,12 +80,12 @@ def draw(points: list[Scattering], restitution: float) -> plt.Figure:
     )
     top.set(ylabel="scattering angle θ (degrees)", ylim=(-5, 185), yticks=range(0, 181, 30))
     top.legend()
-    error = np.degrees(angle - scattering_angle(s, ratio, restitution))
-    bottom.semilogy(s, np.maximum(np.abs(error), 1e-16), ls="", marker=".", color=COLOURS[0])
+    error = np.abs(np.degrees(angle - scattering_angle(s, ratio, restitution)))
+    bottom.semilogy(s, np.maximum(error, 1e-16), ls="", marker=".", color=COLOURS[0])
     bottom.set(
         xlabel="impact parameter $b/R_{12}$",
         ylabel="|error| (degrees)\n(0 drawn at $10^{-16}$)",
-        ylim=(1e-17, 1e-8),
+        ylim=(1e-17, 30 * max(error.max(), 1e-16)),
     )
     return figure
 

@@ -4,8 +4,12 @@
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
-Colour: species, speed, displacement from the first frame, or collisions so far.
+Colour: species, speed, displacement from the first frame, or collisions so far.  One scale holds
+for all frames, from 0, unless --per-frame; with --log it is logarithmic.  A disk that reaches
+across a periodic side is drawn on both.
 """
+
+import argparse
 
 from ricochet import Run, read_run
 from ricochet.drawing import (
@@ -23,7 +27,7 @@ from ricochet.drawing import (
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
 
 import numpy as np
-from matplotlib.colors import to_rgba_array
+from matplotlib.colors import LogNorm, Normalize, to_rgba_array
 
 
 def darker(colours: list[str]) -> np.ndarray:
@@ -40,8 +44,17 @@ def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -
     )
 
 
-def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
-    """One panel per frame, one colour scale for all."""
+def scale(values: np.ndarray, log: bool) -> Normalize:
+    """A colour scale without the few largest values; a logarithmic one without the smallest too."""
+    moved = values[values > 0]
+    if not len(moved):
+        return Normalize(0, 1)
+    low, top = np.quantile(moved, (0.005, 0.995))
+    return LogNorm(min(low, top / 1.01), top) if log else Normalize(0, top)
+
+
+def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
+    """One panel per frame."""
     aspect = run.edges[1] / run.edges[0]
     rows, columns = panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
@@ -49,8 +62,9 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
         rows, columns, squeeze=False, figsize=(width * columns + 0.9, width * aspect * rows + 0.7)
     )
     if colour != "species":
-        values = [values_of(run, frame, colour) for frame in frames]
-        limits = (0.0, float(np.quantile(values, 0.995)) or 1.0)
+        values = np.array([values_of(run, frame, colour) for frame in frames])
+        whole = scale(values, args.log)
+        bar = {"label": LABELS[colour], "extend": "both" if args.log else "max"}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
     for k, axes in enumerate(panels.flat):
         if k >= len(frames):
@@ -60,16 +74,19 @@ def draw(run: Run, frames: list[int], colour: str, quiver: bool) -> plt.Figure:
         if colour == "species":
             style = {"facecolors": species_colours(run)}
         else:
-            style = {"array": values[k], "clim": limits}
+            norm = scale(values[k], args.log) if args.per_frame else whole
+            style = {"array": values[k], "norm": norm}
         disks = disk_collection(axes, run, run.position[frames[k]], **style)
-        if quiver:
+        if colour != "species" and args.per_frame:
+            figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
+        if args.quiver:
             arrows = darker(species_colours(run)) if colour == "species" else "0.2"
             draw_arrows(axes, run, frames[k], longest, arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
         species_legend(figure, run)
-    else:
-        figure.colorbar(disks, ax=panels, label=LABELS[colour], shrink=0.8, aspect=30, extend="max")
+    elif not args.per_frame:
+        figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
     figure.suptitle(caption([run]), fontsize=10)
     return figure
 
@@ -90,11 +107,13 @@ def table(run: Run, frames: list[int]) -> list[dict]:
 def main() -> None:
     parser = command_line(__doc__, "snapshot.png", one=True, frames=None, count=None, colour=None)
     parser.add_argument("--quiver", action="store_true", help="velocities as arrows")
+    parser.add_argument("--log", action="store_true", help="logarithmic colour scale")
+    parser.add_argument("--per-frame", action="store_true", help="a colour scale for each frame")
     args = parser.parse_args()
     run = read_run(args.run)
     which = args.frames or (None if args.count else frame_list("-1"))
     frames = chosen_frames(run, which, args.count)
-    figure = draw(run, frames, chosen_colour(run, args.colour), args.quiver)
+    figure = draw(run, frames, chosen_colour(run, args.colour), args)
     report(args, [run], f"Frames of {run.path.name}", figure, table(run, frames))
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# S1: scattering angle of a light disk off a heavy one, for 41 impact parameters b/R12 in 0..1.2.
+# S1: scattering angle of a light disk off a heavy one, for 81 impact parameters b/R12 in -1.2..1.2.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 # Height of the light disk: 0.5 + b, R12 = 0.1 + 0.001.
-for k in {0..40}; do
+for k in {-40..40}; do
   awk -v k="$k" 'BEGIN {
     s = 1.2 * k / 40
     printf "b_%.2f\t--set species.light.position=0.2,%.17g\n", s, 0.5 + 0.101 * s }'

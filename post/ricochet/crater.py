@@ -25,6 +25,24 @@ class Crater(NamedTuple):
     wall_collisions: int
 
 
+FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
+
+
+def energy_fraction(run: Run) -> float:
+    """The share of the energy at which the run was to end."""
+    return float(run.parameter("stop", "energy_fraction", 0.1))
+
+
+def ended_by_time(run: Run, size: Crater) -> bool:
+    """More energy is left than `stop.energy_fraction`."""
+    return size.energy_left > energy_fraction(run) * (1 + 1e-9)
+
+
+def box_takes_part(run: Run, wall_collisions: float) -> bool:
+    """The crater reaches the floor or the sides; `wall_collisions` may be a mean over runs."""
+    return wall_collisions > FEW_HITS * run.count
+
+
 def projectile(run: Run) -> int:
     """Index of the projectile."""
     if run.count < 2:

@@ -29,15 +29,51 @@ LABELS = {
 
 
 def caption(runs: list[Run]) -> str:
-    """What a reader must know: number of disks, restitution, seeds."""
-    counts = sorted({run.count for run in runs})
-    parts = [f"N = {', '.join(map(str, counts))}"]
-    restitutions = sorted({run.restitution for run in runs})
-    if all(np.isfinite(restitutions)):
-        parts.append(f"ξ = {', '.join(f'{x:g}' for x in restitutions)}")
-    seeds = sorted({run.seed for run in runs})
-    parts.append(f"seed {seeds[0]}" if len(seeds) == 1 else f"{len(seeds)} seeds")
-    return ",  ".join(parts)
+    """What a reader must know: number of disks, restitution, what else varies, seeds."""
+    parts = [f"N = {listed({run.count for run in runs})}"]
+    restitutions = {run.restitution for run in runs}
+    if all(map(np.isfinite, restitutions)):
+        parts.append(f"ξ = {listed(restitutions)}")
+    parts += [f"{name} = {listed(values)}" for name, values in varying(runs).items()]
+    seeds = {run.seed for run in runs}
+    parts.append(f"seed {min(seeds)}" if len(seeds) == 1 else f"{len(seeds)} seeds")
+    return "\n".join(wrap(",  ".join(parts), 110))
+
+
+def listed(values: set[float]) -> str:
+    """A few numbers, or from where to where they go."""
+    words = [f"{value:g}" for value in sorted(values)]
+    return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
+
+
+def varying(runs: list[Run]) -> dict[str, set[float]]:
+    """The numbers of the input that differ between the runs, by name, with what they are.
+
+    Not those that a caption names anyhow, nor how long the runs are and what they write.
+    """
+    values: dict[str, set[float]] = {}
+    for run in runs:
+        for name, value in numbers_of(run).items():
+            values.setdefault(name, set()).add(value)
+    return {name: own for name, own in values.items() if len(own) > 1}
+
+
+def numbers_of(run: Run) -> dict[str, float]:
+    """The numbers of the input that say what system it is, by name."""
+    found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
+    if found.get("wall_restitution") == run.restitution:
+        del found["wall_restitution"]
+    for kind in run.names:
+        own, prefix = run.parameters.get("species", {}).get(kind, {}), f"{kind} "
+        if "packing_fraction" in own:
+            own = {name: value for name, value in own.items() if name != "radius"}
+        found |= {prefix * (len(run.names) > 1) + name: value for name, value in own.items()}
+    found["dt"] = run.time_step
+    return {
+        name: float(value)
+        for name, value in found.items()
+        if isinstance(value, int | float) and name.split()[-1] not in ("count", "restitution")
+    }
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:
@@ -96,21 +132,45 @@ def periods(run: Run) -> np.ndarray:
     return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
+def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices and places of the disks, and of their periodic images that reach into the box."""
+    which, places = [np.arange(run.count)], [position]
+    for shift in periods(run):
+        if shift.any():
+            place = position + shift
+            inside = (place > run.lower - run.radius[:, None]) & (
+                place < run.upper + run.radius[:, None]
+            )
+            which.append(np.flatnonzero(inside.all(axis=1)))
+            places.append(place[which[-1]])
+    return np.concatenate(which), np.concatenate(places)
+
+
 def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
-    """Disks of true size at `position` (N, 2); `array=` colours them by value."""
-    diameter = 2 * run.radius
-    style = {"linewidths": 0, **style}
-    collection = EllipseCollection(
-        diameter,
-        diameter,
-        np.zeros(run.count),
-        units="xy",
-        offsets=position,
-        offset_transform=axes.transData,
-        **style,
-    )
+    """Disks of true size at `position` (N, 2) and their periodic images, see `move_disks`."""
+    colours = {name: style.pop(name) for name in ("array", "facecolors") if name in style}
+    style = {"linewidths": 0, "units": "xy", "offset_transform": axes.transData, **style}
+    collection = EllipseCollection([], [], [], offsets=np.empty((0, 2)), **style)
+    move_disks(collection, run, position, **colours)
     axes.add_collection(collection)
     return collection
+
+
+def move_disks(
+    collection: EllipseCollection,
+    run: Run,
+    position: np.ndarray,
+    array: np.ndarray | None = None,
+    facecolors: Sequence | None = None,
+) -> None:
+    """To `position` (N, 2); `array` (N,) colours them by value, or else `facecolors`."""
+    which, places = with_images(run, position)
+    collection.set(offsets=places, angles=np.zeros(len(which)))
+    collection.set(widths=2 * run.radius[which], heights=2 * run.radius[which])
+    if array is not None:
+        collection.set_array(np.asarray(array)[which])
+    if facecolors is not None:
+        collection.set_facecolors(np.asarray(facecolors)[which])
 
 
 def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
@@ -142,6 +202,8 @@ def species_legend(figure: plt.Figure, run: Run) -> None:
 
 def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
     """Below the figure, what speaks against its numbers; at most three notes in full."""
+    if not notes:
+        return
     more = [f"and {len(notes) - 3} more warnings, as printed"] if len(notes) > 3 else []
     lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
     text = "\n".join([line for part in lines for line in part] + more)

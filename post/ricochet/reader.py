@@ -227,6 +227,15 @@ class Run:
         return float(self.parameter("run", "dt")) if steps else 0.0
 
     @property
+    def shortcoming(self) -> str:
+        """Why this is not a run that went on until a stop rule was met; empty if it is."""
+        note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
+        if self.path.suffix != ".part":
+            return f"{self.path.name} ended early: {note}" if note else ""
+        state = f"broke off: {note}" if note else "is unfinished: going on, stopped, or broken off"
+        return f"{self.path.name} {state}; last frame at t = {self.time[-1]:.6g}"
+
+    @property
     def seed(self) -> int:
         """Seed of the random number generator."""
         return int(self.parameter("run", "seed", self.parameters.get("seed", 0)))

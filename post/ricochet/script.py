@@ -220,16 +220,17 @@ def report(
 ) -> None:
     """Print the tables, save the figure, write `data` (else the first table) to --csv.
 
-    `notes` say what speaks against the numbers: on stderr, and on the figure.
+    `notes` say what speaks against the numbers, and so does a run that did not end as it should: on
+    stderr, and on the figure.
     """
     print("\n\n".join(text_of(table) for table in tables if table), flush=True)
+    notes = [*(run.shortcoming for run in runs if run.shortcoming), *notes]
     for note in [*notes, *without_error(tables)]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
-        if notes:
-            warn(figure, notes)
+        warn(figure, notes)
         save(figure, args.output, runs, title)
-    if args.csv:
+    if "csv" in args and args.csv:
         write_csv(args.csv, tables[0] if data is None else data)
 
 

@@ -95,8 +95,10 @@ def packing(run: Run) -> float:
 
 
 def lightest_and_heaviest(run: Run) -> tuple[int, int]:
-    """Indices of the species with the smallest and the largest mass."""
+    """Indices of the species with the smallest and the largest mass, which must differ."""
     masses = [kind.mass for kind in run.by_species]
+    if min(masses) == max(masses):
+        raise RunError(f"{run.path}: needs two species of different mass")
     return int(np.argmin(masses)), int(np.argmax(masses))
 
 

@@ -20,6 +20,7 @@ import scattering
 import speeds
 import trajectory
 from ricochet import RunError, crater, read_run, statistics, theory, thermodynamics
+from ricochet.drawing import caption, plt, with_images
 from ricochet.script import chosen_frames, frame_list
 from synthetic_run import maxwell_velocities, run_script, text, write_run
 
@@ -225,6 +226,28 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
     np.testing.assert_allclose(curves.mean[:, 0], [1, 2 / 3, 4 / 3])
 
 
+def test_panels_of_cooling_share_a_time_axis(tmp_path):
+    groups = [(xi, [cooled(tmp_path / f"{xi}.h5", xi, 3 * (1 - xi))]) for xi in (0.8, 0.9)]
+    results = [cooling.cooling(members) for _, members in groups]
+    figure = cooling.draw(groups, results)
+    first, second = figure.axes[:2]
+    assert first.get_shared_x_axes().joined(first, second) and len(figure.axes) == 5
+
+
+def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng, names=("all",))  # all/kinetic_energy, disks of that name
+    draw("cooling", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    assert "ratio" not in (tmp_path / "a.csv").read_text()
+
+
+@pytest.mark.parametrize("script", ["equipartition", "mixture"])
+def test_what_compares_species_wants_several(tmp_path, rng, capsys, script):
+    path = gas(tmp_path / "gas.h5", rng, names=("one",))
+    assert run_script(script, path, "-o", tmp_path / "a.png") == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"{script}.py: {path}: needs ") and said.count("\n") == 1
+
+
 def test_energies_are_in_units_of_the_first_mean(tmp_path):
     kinetic = cooling.energies(cooled(tmp_path / "run.h5", 0.9, decay=5.0, points=3))
     np.testing.assert_allclose(kinetic[0], np.exp([0, -1.25, -5]))
@@ -236,7 +259,7 @@ def test_energies_are_in_units_of_the_first_mean(tmp_path):
 def collision(path, b, ratio=1e6):
     """Two frames of a light disk scattered by a heavy one at rest, by the collision rule."""
     r, v = np.array([0.1, 0.001]), np.array([1.0, 0.0])
-    normal = np.array([-np.sqrt(1 - b**2), b]) if b < 1 else np.zeros(2)
+    normal = np.array([-np.sqrt(1 - b**2), b]) if abs(b) < 1 else np.zeros(2)
     after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
     x = [[[0.5, 0.5], [0.1, 0.5 + b * r.sum()]]] * 2
     return read_run(
@@ -251,11 +274,24 @@ def collision(path, b, ratio=1e6):
     )
 
 
-@pytest.mark.parametrize("b", [0.0, 0.3, 0.7, 0.99, 1.1])
+@pytest.mark.parametrize("b", [0.0, 0.3, -0.7, 0.99, -1.1])
 def test_scattering_of_a_run(tmp_path, b):
     result = scattering.scattering(collision(tmp_path / "run.h5", b))
     assert result.impact == pytest.approx(b, abs=1e-14) and result.mass_ratio == 1e6
     assert result.angle == pytest.approx(theory.scattering_angle(b, 1e6), abs=1e-13)
+
+
+def test_the_error_panel_of_scattering_holds_every_point():
+    angle = np.pi / 2 + np.array([0, 1e-9, 1e-3])
+    points = [
+        scattering.Scattering(b, a, 0, np.inf)
+        for b, a in zip((-(0.5**0.5), 0.5**0.5, 0.5**0.5), angle, strict=True)
+    ]
+    top, bottom = scattering.draw(points, 1.0).axes
+    low, high = bottom.get_ylim()
+    drawn = bottom.lines[0].get_ydata()
+    assert np.all((low < drawn) & (drawn < high)) and drawn.max() > 0.05
+    assert top.get_xlim()[0] <= -1.2 and top.get_xlim()[1] >= 1.2
 
 
 def test_scattering_needs_one_moving_disk(tmp_path):
@@ -314,6 +350,47 @@ def test_no_crater_has_size_zero(tmp_path):
     assert (size.displaced, size.width, size.depth) == (0, 0, 0)
 
 
+def test_a_crater_that_was_cut_short_is_marked(tmp_path, capsys):
+    """By the rule of the scan, in print and on the figure."""
+    for name, words, more in (
+        ("whole", "", {}),
+        ("box", "reaches the floor or the sides, 3 wall hits", {"walls": 3}),
+        ("time", "30 % of the energy is left", {"left": 0.3}),
+    ):
+        path = impact(tmp_path / f"{name}.h5", **more)
+        draw("crater", path, "-o", tmp_path / f"{name}.png", "--csv", tmp_path / "a.csv")
+        (row,) = csv.DictReader((tmp_path / "a.csv").open())
+        assert int(row["box_takes_part"]) == ("walls" in more)
+        assert int(row["ended_by_time"]) == ("left" in more)
+        said = capsys.readouterr().err
+        assert words in said and bool(said) == bool(more)
+
+
+def test_a_scan_of_one_parameter_is_one_column_that_says_what_varies(tmp_path):
+    paths = [impact(tmp_path / f"{m}.h5", mass=m, moved=m) for m in (5, 10, 15)]
+    runs = [read_run(path) for path in paths]
+    keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
+    points = crater_scan.scan_points(keys, runs, sizes, 0)
+    figure = crater_scan.draw({"mass": points}, crater_scan.base_of(keys), runs)
+    assert len(figure.axes) == 2 and figure.axes[1].get_xlabel() == crater_scan.AXES["mass"]
+
+
+def test_captions_name_what_varies(tmp_path):
+    x = np.zeros((1, 2, 2))
+
+    def run(k, **species):
+        groups = {"run": {"seed": k}, "contact": {"restitution": 1.0}, "species/disk": species}
+        groups["stop"] = {"time": 1.0 + k}
+        return read_run(write_run(tmp_path / f"{k}.h5", x, x, parameters=groups))
+
+    same = [run(k, mass=2.0) for k in (1, 2)]
+    assert caption(same) == "N = 2,  ξ = 1,  2 seeds"
+    two = [*same, run(3, mass=4.0)]
+    assert caption(two) == "N = 2,  ξ = 1,  mass = 2, 4,  3 seeds"
+    many = [run(k, packing_fraction=k / 10, radius=k / 100) for k in range(1, 7)]
+    assert caption(many) == "N = 2,  ξ = 1,  packing_fraction = 0.1 to 0.6,  6 seeds"
+
+
 def test_packing_field_holds_the_area_of_the_bed(tmp_path):
     run = read_run(impact(tmp_path / "run.h5"))
     x, y, field = crater.packing_field(run, 0)
@@ -337,7 +414,7 @@ def test_scan_finds_its_base_and_its_points(tmp_path):
     assert len(runs) == len(paths) - 2, "mass 25 and xi 0.5 is the base, once per seed"
     keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
     assert crater_scan.base_of(keys) == (25, 5, 5, 0.5)
-    mass, speed, _, xi = (crater_scan.scan_points(keys, sizes, k, 0.1, 1) for k in range(4))
+    mass, speed, _, xi = (crater_scan.scan_points(keys, runs, sizes, k) for k in range(4))
     assert [p.x for p in mass] == [5, 10, 15, 20, 25] and [p.x for p in speed] == [5]
     assert mass[1].sizes["displaced"] == (3.5, 0.5) and mass[1].runs == 2
     assert [p.by_time for p in xi] == [False, False, True] == [not p.free for p in xi]
@@ -539,6 +616,39 @@ def test_frames_are_chosen_by_number_range_and_count(tmp_path, rng):
             chosen_frames(run, frame_list(which), None)
 
 
+def test_disks_that_reach_across_a_periodic_side_are_drawn_on_both(tmp_path):
+    x = np.array([[[0.5, 0.5], [0.005, 0.5], [0.5, 0.995], [0.995, 0.995]]])
+    sides = {"radius": 0.01, "image": np.zeros((1, 4, 2), int)}
+    along_x = [(1, 1.005, 0.5), (3, -0.005, 0.995)]
+    along_y = [(2, 0.5, -0.005), (3, 0.995, -0.005)]
+    for periodic, expected in (
+        ((False, False), []),
+        ((True, False), along_x),
+        ((True, True), [*along_x, *along_y, (3, -0.005, -0.005)]),
+    ):
+        run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=periodic, **sides))
+        which, places = with_images(run, x[0])
+        np.testing.assert_array_equal(which[:4], range(4))
+        found = [(k, *place) for k, place in zip(which[4:], places[4:].round(9), strict=True)]
+        assert sorted(found) == sorted(expected)
+
+
+def test_a_snapshot_has_one_scale_or_one_for_each_frame(tmp_path, rng, monkeypatch):
+    v = maxwell_velocities(rng, 3, 50) * np.array([1, 10, 100])[:, None, None]
+    path = write_run(tmp_path / "run.h5", rng.uniform(size=v.shape), v)
+    figures, limits = [], {}
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    for name, options in {"one": (), "each": ("--per-frame",), "log": ("--log",)}.items():
+        draw("snapshot", path, "--frames", ":", "--colour", "speed", *options)
+        disks = (axes.collections[-1] for axes in figures[-1].axes if axes.get_title("left"))
+        limits[name] = [collection.get_clim() for collection in disks]
+    assert len(set(limits["one"])) == 1 == len(set(limits["log"])) and len(set(limits["each"])) == 3
+    assert limits["one"][0][0] == 0 and limits["each"][0][1] < 0.03 * limits["one"][0][1]
+    low, high = limits["log"][0]
+    assert 0 < low < 1 and high == limits["one"][0][1]
+    plt.close("all")
+
+
 def test_paths_break_where_a_period_is_crossed(tmp_path):
     x = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]])
     run = read_run(
@@ -695,7 +805,7 @@ def runs_for(script, folder, rng):
             for s in (1, 2)
         ]
     if script == "scattering":
-        return [collision(folder / f"{b}.h5", b).path for b in (0, 0.5, 1.1)]
+        return [collision(folder / f"{b}.h5", b).path for b in (-0.5, 0, 0.5, 1.1)]
     if script == "crater":
         return [impact(folder / "run.h5", moved=9)]
     if script == "crater_scan":

@@ -206,10 +206,34 @@ def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
     for script, options in scripts.items():
         figure = tmp_path / f"{script}.{ENDINGS.get(script, 'png')}"
         few = ("--count", "3") if script == "animate" else ()
-        assert run_script(script, *parts, "-o", figure, *options, *few) == 0, (
-            capsys.readouterr().err
-        )
+        code = run_script(script, *parts, "-o", figure, *options, *few)
+        said = capsys.readouterr().err
+        assert code == 0, said
+        for part in parts:
+            assert f"warning: {part.name} is unfinished" in said
         assert figure.stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "note", "said"),
+    [
+        ("a.h5", "", ""),
+        ("a.h5", "cooled to nothing", "a.h5 ended early: cooled to nothing"),
+        ("a.h5.part", "", "a.h5.part is unfinished: going on, stopped, or broken off"),
+        ("a.h5.part", "an inelastic\x1b[2J\ncollapse", "broke off: an inelastic[2Jcollapse; last"),
+    ],
+)
+def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name, note, said):
+    """In print, and in red on the figure."""
+    x, known = np.zeros((4, 3, 2)), {"git_commit": "abc", "note": note}
+    run, texts = write_run(tmp_path / name, x, x + 1, provenance=known), []
+    monkeypatch.setattr(
+        "ricochet.script.save",
+        lambda figure, *_: texts.append(figure.get_supxlabel().replace("\n", " ")),
+    )
+    assert run_script("snapshot", run) == 0
+    warned = capsys.readouterr().err
+    assert said in warned and said in texts[0] and bool(said) == bool(warned) == bool(texts[0])
 
 
 def test_every_script_draws_a_running_simulation():
