@@ -11,11 +11,12 @@ module time_stepped
   use errors, only: error_t, exit_broken, fail
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
-  use near_pairs, only: find_all_contacts, near_pairs_t, pair_list_t
+  use near_pairs, only: near_pairs_t
+  use pair_lists, only: list_pairs, pair_list_t, places_t
   use partners, only: axis_of, n_sides, nothing, sense_of
-  use shapes, only: magnitude, nearest_image
-  use simulation_state, only: simulation_t
+  use shapes, only: nearest_image
   use signals, only: stop_requested
+  use simulation_state, only: simulation_t
   use texts, only: written
   implicit none
   private
@@ -31,7 +32,7 @@ module time_stepped
     logical :: every_pair = .false.                 !! test all pairs at every step, not only near ones
     type(near_pairs_t), private :: near
     ! Of the current step
-    real(real64), allocatable, private :: x(:, :)   !! (2,disks) where they are [length]
+    type(places_t), private :: at                   !! where they are
     integer(int32), allocatable, private :: outside(:)  !! (disks) those beyond a side come first
     type(pair_list_t), private :: contacts
   contains
@@ -47,8 +48,10 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    if (allocated(self%x)) deallocate (self%x, self%outside)
-    allocate (self%x(2, sim%n_disks()), self%outside(sim%n_disks()))
+    if (allocated(self%outside)) deallocate (self%at%x, self%outside)
+    allocate (self%at%x(sim%n_disks(), 2), self%outside(sim%n_disks()))
+    self%at%radius = sim%disk%radius
+    self%at%period = sim%box%periods()
     call self%near%start()
     self%idle = .false.
   end subroutine start
@@ -128,56 +131,88 @@ contains
     integer(int32) :: n_outside, i
     integer :: k
 
-    call fly(sim%disk, sim%box, sim%now, self%x, self%outside, n_outside)
+    call fly(sim%disk, sim%box, sim%now, self%at, self%outside, n_outside)
     do k = 1, n_outside
       i = self%outside(k)
-      if (any(self%x(:, i) /= self%x(:, i))) then
+      if (any(self%at%centre(i) /= self%at%centre(i))) then
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
       call meet_sides(self, sim, i)
     end do
     if (self%every_pair) then
-      call find_all_contacts(sim, self%x, slow(self, sim), self%contacts)
+      call list_pairs(self%contacts, sim%box, self%at, 0.0_real64, interruptible=slow(self, sim))
     else
-      call self%near%find_contacts(sim, self%x, self%dt, self%contacts)
+      call self%near%find_contacts(sim, self%at, self%dt, self%contacts)
     end if
     do k = 1, self%contacts%n
-      associate (p => self%contacts%pair(k))
-        if (p%partner > 0) then
-          call meet_disk(self, sim, p%i, p%partner)
+      associate (i => self%contacts%i(k), partner => self%contacts%partner(k))
+        if (partner > 0) then
+          call meet_disk(self, sim, i, partner)
         else
-          call meet_wall(self, sim, p%i, p%partner)
+          call meet_wall(self, sim, i, partner)
         end if
       end associate
     end do
   end subroutine take_step
 
-  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN).
-  pure subroutine fly(disk, box, t, x, outside, n)
+  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN). That is seldom, and tested in
+  !> vector registers.
+  pure subroutine fly(disk, box, t, at, outside, n)
     type(disk_t), intent(in) :: disk(:)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: t                   !! since the epoch [time]
-    real(real64), intent(out) :: x(:, :)            !! (2,disks) [length]
-    integer(int32), intent(out) :: outside(:)       !! (disks) the first n count, ascending
+    type(places_t), intent(inout) :: at
+    integer(int32), intent(out) :: outside(*)       !! (disks) the first n count, ascending
     integer(int32), intent(out) :: n
-    real(real64) :: g(2), inset(2), s
-    integer(int32) :: i
+    real(real64) :: g(2), s
+    integer(int32) :: i, k, hit
 
     g = box%gravity
-    inset = merge(0.0_real64, 1.0_real64, box%periodic)
-    n = 0
     do i = 1, size(disk, kind=int32)
       s = t - disk(i)%clock
-      x(1, i) = flight(disk(i)%x(1), disk(i)%v(1), g(1), s)
-      x(2, i) = flight(disk(i)%x(2), disk(i)%v(2), g(2), s)
-      if (x(1, i) >= box%lower(1) + inset(1)*disk(i)%radius .and. x(1, i) <= box%upper(1) - inset(1)*disk(i)%radius &
-        .and. x(2, i) >= box%lower(2) + inset(2)*disk(i)%radius &
-        .and. x(2, i) <= box%upper(2) - inset(2)*disk(i)%radius) cycle
-      n = n + 1
-      outside(n) = i
+      at%x(i, 1) = flight(disk(i)%x(1), disk(i)%v(1), g(1), s)
+      at%x(i, 2) = flight(disk(i)%x(2), disk(i)%v(2), g(2), s)
+    end do
+    call mark_outside(size(disk), at%x(:, 1), at%x(:, 2), at%radius, box, outside, n)
+    if (n == 0) return
+    n = 0
+    do k = 1, size(disk, kind=int32)
+      hit = outside(k)
+      outside(n + 1) = k
+      n = n + hit
     end do
   end subroutine fly
+
+  !> Marks with 1 the disks that are not between the sides.
+  pure subroutine mark_outside(n, x, y, radius, box, hit, n_hits)
+    integer, intent(in) :: n
+    real(real64), intent(in) :: x(n), y(n), radius(n)     !! [length]
+    type(box_t), intent(in) :: box
+    integer(int32), intent(out) :: hit(n)
+    integer(int32), intent(out) :: n_hits           !! how many
+    real(real64) :: low(2), high(2), inset(2)
+    integer :: i
+
+    low = box%lower
+    high = box%upper
+    inset = merge(0.0_real64, 1.0_real64, box%periodic)
+    n_hits = 0
+    !GCC$ VECTOR
+    do i = 1, n
+      hit(i) = 1 - iand(between(x(i), low(1) + inset(1)*radius(i), high(1) - inset(1)*radius(i)), &
+        between(y(i), low(2) + inset(2)*radius(i), high(2) - inset(2)*radius(i)))
+      n_hits = n_hits + hit(i)
+    end do
+  end subroutine mark_outside
+
+  !> 1 if x is between two limits, else (or if it is NaN) 0.
+  elemental function between(x, low, high) result(inside)
+    real(real64), intent(in) :: x, low, high
+    integer(int32) :: inside
+
+    inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
+  end function between
 
   !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
   subroutine meet_sides(self, sim, i)
@@ -192,16 +227,16 @@ contains
       axis = axis_of(side)
       inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
       if (sense_of(side) < 0) then
-        beyond = (sim%box%lower(axis) + inset) - self%x(axis, i)
+        beyond = (sim%box%lower(axis) + inset) - self%at%x(i, axis)
       else
-        beyond = self%x(axis, i) - (sim%box%upper(axis) - inset)
+        beyond = self%at%x(i, axis) - (sim%box%upper(axis) - inset)
       end if
       if (.not. beyond > 0) cycle
       if (passes(sim, side)) then
-        before = self%x(:, i)
+        before = self%at%centre(i)
         call pass_side(sim, i, side)
-        self%x(:, i) = sim%position(i)
-        call self%near%shift(i, self%x(:, i) - before)
+        self%at%x(i, :) = sim%position(i)
+        call self%near%shift(i, self%at%centre(i) - before)
       else
         call meet_wall(self, sim, i, side)
       end if
@@ -215,7 +250,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
 
-    if (dot_product(sim%velocity(i), wall_normal(sim%box, code, self%x(:, i))) < 0) &
+    if (dot_product(sim%velocity(i), wall_normal(sim%box, code, self%at%centre(i))) < 0) &
       call collide(sim, i, code, sim%now, self%log)
   end subroutine meet_wall
 
@@ -226,8 +261,8 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64) :: dx(2)
 
-    dx = self%x(:, j) - self%x(:, i)
-    dx = dx - nearest_image(dx, sim%box%periods())
+    dx = self%at%centre(j) - self%at%centre(i)
+    dx = dx - nearest_image(dx, self%at%period)
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, self%log)
   end subroutine meet_disk
 
@@ -244,7 +279,7 @@ contains
     text = ""
     speed = 0
     do i = 1, sim%n_disks()
-      speed = max(speed, magnitude(sim%velocity(i)))
+      speed = max(speed, norm2(sim%velocity(i)))
     end do
     speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges()))
     radius = minval(sim%disk%radius)
