@@ -4,7 +4,8 @@
 
 Runs are combined by restitution xi; lines are means over the runs, bands are standard errors.  K is
 per disk and in units of its start value over all disks.  The lowest row shows the temperature ratio
-of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.
+of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.  The table has all
+curves, against collisions per disk in the same units, against time in those of the input.
 """
 
 from typing import NamedTuple
@@ -25,6 +26,7 @@ class Cooling(NamedTuple):
     by_time: tuple[np.ndarray, Estimate]
     by_collisions: tuple[np.ndarray, Estimate]
     ratio: Estimate | None  # (P,) heaviest to lightest, at the collisions
+    first: float  # energy per disk at the start
 
 
 def energies(run: Run) -> np.ndarray:
@@ -46,7 +48,8 @@ def cooling(runs: list[Run], points: int = 201) -> Cooling:
     if np.ptp(runs[0].mass) > 0:
         light, heavy = lightest_and_heaviest(runs[0])
         ratio = estimate(by_tau[:, 1 + heavy] / by_tau[:, 1 + light])
-    return Cooling((time, estimate(by_time)), (tau, estimate(by_tau)), ratio)
+    first = np.mean([run.observable("all/kinetic_energy").value[0] for run in runs])
+    return Cooling((time, estimate(by_time)), (tau, estimate(by_tau)), ratio, float(first))
 
 
 def draw_ratio(axes: plt.Axes, groups: list, results: list[Cooling]) -> None:
@@ -54,7 +57,9 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Cooling]) -> None:
     for (xi, _), result, colour in zip(groups, results, COLOURS[2:], strict=False):
         if result.ratio is not None:
             band(axes, result.by_collisions[0], *result.ratio, color=colour, label=f"ξ = {xi:g}")
-    dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
+    kinds = sorted((kind.mass, kind.disks.sum()) for kind in groups[0][1][0].by_species)
+    if len(kinds) == 2 and kinds[1] == (4 * kinds[0][0], kinds[0][1]):
+        dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", xlim=(0, None), ylabel="temperature ratio heavy / light")
     axes.legend(ncols=2)
@@ -101,7 +106,7 @@ def table(groups: list, results: list[Cooling]) -> list[dict]:
 
 
 def curves(groups: list, results: list[Cooling]) -> dict[str, np.ndarray]:
-    """All curves against collisions per disk."""
+    """All curves: relative ones against collisions per disk, energies against time."""
     names = ("all", *groups[0][1][0].names)
     columns = {}
     for (xi, _), result in zip(groups, results, strict=True):
@@ -111,6 +116,11 @@ def curves(groups: list, results: list[Cooling]) -> dict[str, np.ndarray]:
             columns[f"K_{name}_xi{xi:g}"], columns[f"K_{name}_error_xi{xi:g}"] = mean, error
         if result.ratio:
             columns[f"ratio_xi{xi:g}"], columns[f"ratio_error_xi{xi:g}"] = result.ratio
+        time, energy = result.by_time
+        columns[f"time_xi{xi:g}"] = time
+        for name, *both in zip(names, *energy, strict=True):
+            column = f"energy_{name}_xi{xi:g}", f"energy_{name}_error_xi{xi:g}"
+            columns |= zip(column, np.array(both) * result.first, strict=True)
     return columns
 
 

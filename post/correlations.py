@@ -1,29 +1,57 @@
-"""How a gas forgets, spreads and orders: VACF, mean square displacement, a2, g(r), psi6.
+"""How a gas forgets, spreads and orders: VACF, diffusion, a2; g(r), S(k), psi6 and g6(r).
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-Runs are combined by packing fraction; lines are means over the runs.  Frames must be equally far
-apart in time; lags are logarithmic, every frame is an origin.  Frames before equilibrium, which is
-found or begins after --skip, count for a2 alone.  Times are in units of the
-mean free time 1/w, lengths of the mean diameter.  At first the VACF falls as exp(-w t); the
-displacement is compared with Enskog's D; a2 = <v^4> / (2 <v^2>^2) - 1 is 0 in equilibrium and -1/2
-for equal speeds; psi6 = mean of exp(6 i theta) over the Delaunay neighbours, its modulus for single
-disks and for all: 1 in a perfect triangular crystal.
+Elastic disks without gravity.  Runs are combined by packing fraction; lines are means over the
+runs.  Frames must be equally far apart in time; lags are logarithmic, every frame is an origin.
+Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Times are in
+units of the mean free time 1/w, lengths of the mean diameter.
+
+VACF: at first it falls as exp(-w t), late, in theory, as 1/t (mode coupling).  Diffusion: D(t) is
+a quarter of the slope of the mean square displacement, and half the integral of <v(0) v(t)>; for
+equal disks beside D_E of Enskog.  In two dimensions the tail makes D(t) grow without end, as the
+logarithm of t: a D belongs to a time, and to a box, whose images are felt when sound has crossed
+it.  The table has both D, which must agree, between half of `D_time` and `D_time`; that is the time
+of crossing if an eighth of the run is longer.  Periodic boxes only.  a2 = <v^4> / (2 <v^2>^2) - 1
+is 0 in equilibrium and -1/2 for equal speeds.
+
+S(k) = <|sum of exp(i k x)|^2> / N.  psi6 of a disk: mean of exp(6 i theta) over its Delaunay
+neighbours; local is its modulus, global the modulus of the mean over all disks: 1 in a perfect
+triangular crystal.  g6(r) = <psi6*(0) psi6(r)>: it falls exponentially in a fluid, slowly as a
+power of r in a hexatic phase, and not at all in a crystal.
 """
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 from ricochet import Run, RunError, hard_disks
+from ricochet.diffusion import crossing_time, diffusion, displacement, velocity_memory
 from ricochet.drawing import COLOURS, caption, dilute_limit, plt
-from ricochet.script import command_line, grouped, launch, read_all, report
-from ricochet.statistics import estimate, excess_kurtosis
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import SeriesMean, combined, doubts, estimate, excess_kurtosis, series_mean
+from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
 from ricochet.theory import RELAXATION
-from ricochet.thermodynamics import packing, start_of_equilibrium, temperature
+from ricochet.thermodynamics import (
+    equal_disks,
+    free_disks,
+    packing,
+    start_of_equilibrium,
+    temperature,
+)
 
 import numpy as np
 import scipy
 
-MOST_FRAMES = 50  # for g(r) and psi6
+MOST_FRAMES = 50  # for the structure
+SCARCE = 0.5  # mean free times between frames beyond which they cannot be integrated
+
+
+class Found(NamedTuple):
+    """Of the runs at one packing fraction: what has an error; curves as name -> (x, y)."""
+
+    members: dict[str, list[SeriesMean]]
+    curves: dict[str, tuple[np.ndarray, np.ndarray]]
+    lag: float  # of the diffusion coefficients, in mean free times
+    step: float  # between frames, in mean free times
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
@@ -41,10 +69,14 @@ def mean_free_time(run: Run) -> float:
     return run.time[-1] / collisions
 
 
-def check_frames(run: Run) -> None:
-    """Equal intervals of time, or the lags mean nothing; the last frame may be out of step."""
+def check(run: Run, first: Run) -> None:
+    """Refuse what is no equilibrium; the lags mean nothing without equal intervals of time."""
+    if run.restitution != 1 or run.gravity.any():
+        raise RunError(f"{run.path}: needs an elastic gas without gravity")
+    if equal_disks(run) != equal_disks(first):
+        raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
     steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)
-    if run.frames < 10 or np.ptp(steps) > 1e-6 * steps[0]:
+    if run.frames < 10 or np.ptp(steps) > 1e-6 * steps[0]:  # the last may be out of step
         raise RunError(f"{run.path}: needs 10 frames and more, written by frames_every_time")
 
 
@@ -56,187 +88,227 @@ def later(run: Run, skip: float | None) -> slice:
     return slice(first, run.frames - 1)
 
 
-def velocity_memory(run: Run, at: np.ndarray, skip: float | None = None) -> np.ndarray:
-    """Normalised velocity autocorrelation at lags in frames."""
-    v = run.velocity[later(run, skip)]
-    return np.array([np.mean(v[k:] * v[: len(v) - k]) for k in at]) / np.mean(v**2)
+def some(frames: slice) -> list[int]:
+    """At most `MOST_FRAMES` of them."""
+    return np.unique(np.linspace(frames.start, frames.stop - 1, MOST_FRAMES).astype(int)).tolist()
 
 
-def displacement(run: Run, at: np.ndarray, skip: float | None = None) -> np.ndarray:
-    """Mean square displacement at lags in frames, relative to the centre of mass."""
-    x = run.unwrapped(later(run, skip))
-    x = x - np.average(x, axis=1, weights=run.mass, keepdims=True)
-    return np.array([2 * np.mean((x[k:] - x[: len(x) - k]) ** 2) for k in at])
+def kurtosis(run: Run, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Collisions per disk and a2 of the first frames."""
+    a2 = np.array([excess_kurtosis(run.speed(k)) for k in range(frames)])
+    return run.collisions_per_disk_at(run.time[:frames]), a2
 
 
-def frames_of(run: Run) -> np.ndarray:
-    """At most `MOST_FRAMES`, from the later half."""
-    return np.unique(np.linspace(run.frames // 2, run.frames - 1, MOST_FRAMES).astype(int))
+def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
+    """In frames: until sound has crossed the box, or an eighth of the shortest run."""
+    step = runs[0].time[1] - runs[0].time[0]
+    shortest = min(f.stop - f.start for f in frames)
+    return int(np.clip(crossing_time(runs[0]) / step, 2, max(2, shortest // 8)))
 
 
-def pair_correlation(run: Run, edges: np.ndarray) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them."""
-    r = edges * 2 * run.radius.mean()
-    size = np.where(run.periodic, run.edges, 0.0)
-    sums = np.zeros(len(edges) - 1)
-    centres = 0
-    for k in frames_of(run):
-        x = run.position[k] - run.lower
-        margin = np.where(run.periodic, -np.inf, r[-1])
-        inner = np.all((x > margin) & (x < run.edges - margin), axis=1)
-        tree, part = (scipy.spatial.cKDTree(p, boxsize=size) for p in (x, x[inner]))
-        sums += np.diff(part.count_neighbors(tree, r))
-        centres += inner.sum()
-    density = (run.count - 1) / np.prod(run.edges)
-    return sums / np.maximum(centres, 1) / (density * np.pi * np.diff(r**2))
+def enskog(run: Run) -> tuple[float, float]:
+    """Diffusion coefficient and kinematic viscosity of equal disks, with the Z of their rate."""
+    diameter, kt, mass = 2 * run.radius[0], temperature(run), run.mass[0]
+    unit = hard_disks.collision_rate(2.0, diameter, free_disks(run), kt, mass)
+    state = (1 + 1 / (mean_free_time(run) * unit), packing(run), diameter, kt, mass)
+    return hard_disks.enskog_diffusion(*state), hard_disks.enskog_viscosity(*state)
 
 
-def bond_order(run: Run, frame: int) -> np.ndarray:
-    """(N,) complex psi6 of each disk, over its Delaunay neighbours."""
-    x = run.position[frame]
-    near = 4 * np.sqrt(np.prod(run.edges) / run.count)
-    points = padded(x, run, near)
-    start, neighbours = scipy.spatial.Delaunay(points).vertex_neighbor_vertices
-    centre = np.repeat(np.arange(len(points)), np.diff(start))
-    inside = centre < run.count
-    bonds = points[neighbours[inside]] - points[centre[inside]]
-    turns = np.exp(6j * np.arctan2(bonds[:, 1], bonds[:, 0]))
-    sums = np.bincount(centre[inside], turns.real, run.count) + 1j * np.bincount(
-        centre[inside], turns.imag, run.count
-    )
-    return sums / np.bincount(centre[inside], minlength=run.count)
+def numbers(run: Run, frames: slice, psi: list[np.ndarray], lag: int) -> dict[str, SeriesMean]:
+    """What one run says with an error."""
+    found = {}
+    if run.periodic.all():
+        found["D_displacement"], found["D_velocities"] = diffusion(run, frames, lag)
+    found["psi6_local"] = series_mean([np.abs(one).mean() for one in psi])
+    found["psi6_global"] = series_mean([abs(one.mean()) for one in psi])
+    return found
 
 
-def padded(x: np.ndarray, run: Run, width: float) -> np.ndarray:
-    """The points, then their periodic copies within `width` of the box."""
-    points = x
-    for axis in np.flatnonzero(run.periodic):
-        shift = np.where(np.arange(2) == axis, run.edges, 0.0)
-        low = points[:, axis] < run.lower[axis] + width
-        high = points[:, axis] > run.upper[axis] - width
-        points = np.concatenate([points, points[low] + shift, points[high] - shift])
-    return points
-
-
-def order(run: Run) -> tuple[float, float]:
-    """Mean |psi6| of single disks, and |mean psi6| of all; over frames."""
-    values = [bond_order(run, k) for k in frames_of(run)]
-    return float(np.mean(np.abs(values))), float(np.mean([abs(v.mean()) for v in values]))
-
-
-def kurtosis(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of the frames."""
-    a2 = np.array([excess_kurtosis(run.speed(k)) for k in range(run.frames)])
-    return run.collisions_per_disk_at(run.time), a2
-
-
-def diffusion_law(run: Run, time: np.ndarray) -> np.ndarray:
-    """4 D_E t by Enskog; NaN where the equation of state of the fluid ends."""
-    eta = packing(run)
-    z = float(hard_disks.simulated(eta))
-    diameter = 2 * run.radius.mean()
-    return (
-        4 * time * hard_disks.enskog_diffusion(z, eta, diameter, temperature(run), run.mass.mean())
-    )
-
-
-def mean_over(runs: list[Run], measure: Callable[[Run], np.ndarray]) -> np.ndarray:
-    return estimate([measure(run) for run in runs]).mean
-
-
-def analysed(runs: list[Run], skip: float | None) -> dict[str, np.ndarray]:
-    """All curves of runs at one packing fraction."""
-    for run in runs:
-        check_frames(run)
-    first = runs[0]
-    at = lags(min(len(range(run.frames)[later(run, skip)]) for run in runs))
-    reach = min(4.0, 0.45 * first.edges.min() / (2 * first.radius.mean()))
-    edges = np.linspace(1, reach, 121)
-    time = at * (first.time[1] - first.time[0])
-    free = float(np.mean([mean_free_time(run) for run in runs]))
-    diameter = 2 * first.radius.mean()
-    tau, _ = kurtosis(first)
-    tau = tau[: max(1, *(later(run, skip).start + 1 for run in runs))]
-    return {
-        "wt": time / free,
-        "vacf": mean_over(runs, lambda run: velocity_memory(run, at, skip)),
-        "msd": mean_over(runs, lambda run: displacement(run, at, skip)) / diameter**2,
-        "enskog": diffusion_law(first, time) / diameter**2,
-        "tau": tau,
-        "a2": mean_over(runs, lambda run: kurtosis(run)[1][: len(tau)]),
-        "r": (edges[1:] + edges[:-1]) / 2,
-        "g": mean_over(runs, lambda run: pair_correlation(run, edges)),
-        "psi6": mean_over(runs, lambda run: np.array(order(run))),
+def bins(run: Run) -> dict[str, np.ndarray]:
+    """Of distances and wave numbers, in mean diameters."""
+    half = 0.5 * run.edges.min() / (2 * run.radius.mean())
+    found = {
+        "g": np.linspace(1, max(1.1, min(6.0, 0.9 * half)), 151),
+        "g6": np.geomspace(1, max(1.1, half), 41),
     }
+    return found | ({"S": np.linspace(0, 20, 101)} if run.periodic.all() else {})
 
 
-def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figure:
-    """Four panels: VACF, displacement, a2, g(r)."""
-    figure, panels = plt.subplots(2, 2, figsize=(11, 8.5))
-    (vacf, msd), (a2, pairs) = panels
-    for (eta, _), found, colour in zip(groups, results, COLOURS, strict=False):
-        label = f"η = {eta:.3g}"
-        vacf.plot(found["wt"], found["vacf"], color=colour, marker=".", lw=1, label=label)
-        msd.plot(found["wt"], found["msd"], color=colour, marker=".", lw=1)
-        msd.plot(found["wt"], found["enskog"], color=colour, ls="--", lw=1)
-        a2.plot(found["tau"], found["a2"], color=colour, lw=1)
-        local, of_all = found["psi6"]
-        pairs.plot(
-            found["r"], found["g"], color=colour, lw=1,
-            label=f"{label},  ψ₆ {local:.2f} of a disk, {of_all:.2f} of all",
-        )  # fmt: skip
-    wt = np.geomspace(min(f["wt"][0] for f in results), 5, 200)
-    vacf.plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
-    msd.plot([], [], color="black", ls="--", lw=1, label="$4 D_E t$, Enskog")
-    vacf.axhline(0, color="0.6", lw=0.8, zorder=0)
-    vacf.set(xscale="log", xlabel="$w\\,t$", ylabel="velocity autocorrelation")
-    msd.set(
-        xscale="log",
-        yscale="log",
-        xlabel="$w\\,t$",
-        ylabel="mean square displacement / $\\sigma^2$",
-    )
-    if min(found["a2"][0] for found in results) < -0.4:
-        dilute_limit(a2, RELAXATION)
-        a2.legend(loc="lower right")
-    a2.axhline(0, color="0.6", lw=0.8, zorder=0)
-    a2.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)", xlim=(0, None))
-    pairs.axhline(1, color="0.6", lw=0.8, zorder=0)
-    pairs.set(xlabel="$r\\,/\\,\\sigma$", ylabel="pair correlation $g(r)$", ylim=(0, None))
-    for axes, place in ((vacf, "upper right"), (msd, "lower right"), (pairs, "upper right")):
-        axes.legend(loc=place)
+def shapes(run: Run, frames: list[int], psi: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Curves of the structure of one run, in `bins`."""
+    edges = bins(run)
+    found = {"g": pair_correlation(run, frames, edges["g"])}
+    found["g6"] = bond_correlation(run, frames, psi, edges["g6"])
+    if "S" in edges:
+        found["S"] = structure_factor(run, frames, edges["S"])
+    return found
+
+
+def motion(runs: list[Run], frames: list[slice]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Curves against w t of memory and diffusion, and of a2 against collisions per disk."""
+    first, pairs = runs[0], list(zip(runs, frames, strict=True))
+    at = lags(min(f.stop - f.start for f in frames))
+    time, diameter = at * (first.time[1] - first.time[0]), 2 * first.radius.mean()
+    wt = time / np.mean([mean_free_time(run) for run in runs])
+    vacf = estimate([velocity_memory(*one, at) for one in pairs]).mean
+    msd = estimate([displacement(*one, at) for one in pairs]).mean
+    until = max(own.start for own in frames) + 1
+    a2 = estimate([kurtosis(run, until) for run in runs]).mean
+    curves = {"vacf": (wt, vacf), "msd": (wt, msd / diameter**2), "a2": tuple(a2)}
+    if equal_disks(first):
+        density = first.count / np.prod(first.edges)
+        curves["vacf_tail"] = wt, hard_disks.long_time_tail(time, density, *enskog(first))
+    if first.periodic.all():
+        squares = np.mean(first.speed(frames[0].start) ** 2)
+        integral = scipy.integrate.cumulative_trapezoid(np.append(1, vacf), np.append(0, time))
+        curves["D_velocities(t)"] = wt, squares / 2 * integral
+        curves["D_displacement(t)"] = wt, np.gradient(np.append(0, msd), np.append(0, time))[1:] / 4
+    return curves
+
+
+def analysed(runs: list[Run], skip: float | None) -> Found:
+    """All that runs at one packing fraction say."""
+    frames = [later(run, skip) for run in runs]
+    lag, members, forms = diffusion_lag(runs, frames), [], []
+    for run, own in zip(runs, frames, strict=True):
+        psi = [bond_order(run, k) for k in some(own)]
+        members.append(numbers(run, own, psi, lag))
+        forms.append(shapes(run, some(own), psi))
+    curves = motion(runs, frames)
+    for name, edges in bins(runs[0]).items():
+        y = estimate([form[name] for form in forms]).mean
+        known = np.isfinite(y)
+        curves[name] = ((edges[1:] + edges[:-1]) / 2)[known], y[known]
+    named = {name: [one[name] for one in members] for name in members[0]}
+    step = (runs[0].time[1] - runs[0].time[0]) / np.mean([mean_free_time(run) for run in runs])
+    return Found(named, curves, float(lag * step), float(step))
+
+
+def table(groups: list, results: list[Found]) -> list[dict]:
+    """A row per packing fraction."""
+    rows = []
+    for (eta, runs), found in zip(groups, results, strict=True):
+        row = {"packing": eta, "runs": len(runs), "D_time": found.lag}
+        for name in ("D_displacement", "D_velocities", "psi6_local", "psi6_global"):
+            members = found.members.get(name)
+            row |= measured(name, combined(members) if members else None)
+        row["D_enskog"] = enskog(runs[0])[0] if equal_disks(runs[0]) else None
+        rows.append(row | {"g_first_bin": float(found.curves["g"][1][0])})
+    return rows
+
+
+def notes(groups: list, results: list[Found]) -> list[str]:
+    """What speaks against the numbers."""
+    said = []
+    for (eta, _), found in zip(groups, results, strict=True):
+        for name, members in found.members.items():
+            said += doubts(f"η = {eta:g}, {name}", members)
+        if found.step > SCARCE and "D_velocities" in found.members:
+            said.append(
+                f"η = {eta:g}: frames are {found.step:.2g} mean free times apart, too far for D "
+                f"from the velocities; take at most {SCARCE:g}"
+            )
+    return said
+
+
+def curves(groups: list, results: list[Found]) -> list[dict]:
+    """What has an error, then all curves, one below the other."""
+    rows = []
+    for (eta, _), found in zip(groups, results, strict=True):
+        for what, members in found.members.items():
+            mean, error, *_ = combined(members)
+            x = found.lag if what.startswith("D_") else None
+            rows.append({"what": what, "packing": eta, "x": x, "y": mean, "error": error})
+        rows += [
+            {"what": what, "packing": eta, "x": float(x), "y": float(y), "error": None}
+            for what, curve in found.curves.items()
+            for x, y in zip(*curve, strict=True)
+        ]
+    return rows
+
+
+# --- figure ---
+
+AXES = {
+    "vacf": {"ylabel": "velocity autocorrelation", "xscale": "log"},
+    "tail": {"ylabel": "velocity autocorrelation", "xscale": "log", "yscale": "log"},
+    "msd": {"ylabel": "square displacement / $\\sigma^2$", "xscale": "log", "yscale": "log"},
+    "D": {"ylabel": "$D(t)\\,/\\,D_E$", "xscale": "log"},
+    "a2": {"xlabel": "collisions per disk", "ylabel": "$a_2$ (0: Maxwell)"},
+    "g": {"xlabel": "$r\\,/\\,\\sigma$", "ylabel": "pair correlation $g(r)$"},
+    "S": {"xlabel": "$k\\,\\sigma$", "ylabel": "structure factor $S(k)$"},
+    "g6": {"xlabel": "$r\\,/\\,\\sigma$", "ylabel": "$g_6(r)$", "xscale": "log", "yscale": "log"},
+}
+
+
+def draw_group(panels: dict[str, plt.Axes], found: Found, row: dict, colour: str) -> None:
+    """One packing fraction in all panels."""
+    line = {"color": colour, "lw": 1}
+    label, (wt, vacf) = f"η = {row['packing']:.3g}", found.curves["vacf"]
+    panels["vacf"].plot(wt, vacf, marker=".", label=label, **line)
+    panels["tail"].plot(wt[vacf > 0], vacf[vacf > 0], marker=".", **line)
+    if "vacf_tail" in found.curves:
+        late = wt > 3
+        panels["tail"].plot(wt[late], found.curves["vacf_tail"][1][late], ls="--", **line)
+    spread = ""
+    if row["D_displacement"]:
+        spread = f"{label},  D = {row['D_displacement']:.4g} ± {row['D_displacement_error']:.2g}"
+    panels["msd"].plot(*found.curves["msd"], marker=".", label=spread, **line)
+    for name, marker in (("D_displacement(t)", "."), ("D_velocities(t)", "x")):
+        if name in found.curves:
+            x, y = found.curves[name]
+            panels["D"].plot(x, y / (row["D_enskog"] or y.max()), marker=marker, ms=4, **line)
+    for name in ("a2", "S", "g"):
+        if name in found.curves:
+            panels[name].plot(*found.curves[name], **line)
+    r, g6 = found.curves["g6"]
+    order = f"{label},  ψ₆ {row['psi6_local']:.2f} of a disk, {row['psi6_global']:.2f} of all"
+    panels["g6"].plot(r[g6 > 0], g6[g6 > 0], marker=".", label=order, **line)
+
+
+def draw(groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict]):
+    """Eight panels: motion above, structure below."""
+    figure, axes = plt.subplots(2, 4, figsize=(18, 8.5))
+    panels = dict(zip(AXES, axes.flat, strict=True))
+    for found, row, colour in zip(results, rows, COLOURS, strict=False):
+        draw_group(panels, found, row, colour)
+    for name, style in AXES.items():
+        panels[name].set(**{"xlabel": "$w\\,t$", **style})
+    wt = np.geomspace(min(f.curves["vacf"][0][0] for f in results), 5, 200)
+    if equal_disks(groups[0][1][0]):
+        panels["vacf"].plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
+        panels["tail"].plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")
+    else:
+        panels["D"].set_ylabel("$D(t)$ / its largest value")
+    panels["D"].plot([], [], color="black", marker=".", label="from displacements")
+    panels["D"].plot([], [], color="black", marker="x", label="from velocities")
+    start = min(found.curves["a2"][1][0] for found in results)
+    if start < -0.4 and equal_disks(groups[0][1][0]):
+        dilute_limit(panels["a2"], RELAXATION)
+    for name, level in (("vacf", 0), ("D", 1), ("a2", 0), ("g", 1), ("S", 1)):
+        panels[name].axhline(level, color="0.6", lw=0.8, zorder=0)
+    panels["tail"].set_ylim(1e-4, 1.2)
+    panels["g6"].set_ylim(1e-5, 30)
+    for name in ("g", "S", "D"):
+        panels[name].set_ylim(0, None)
+    for name in ("vacf", "tail", "msd", "D", "a2", "g6"):
+        if panels[name].get_legend_handles_labels()[0]:
+            panels[name].legend()
     figure.suptitle(caption([run for _, runs in groups for run in runs]), fontsize=10)
     return figure
-
-
-def curves(groups: list, results: list[dict]) -> list[dict]:
-    """All curves, one below the other."""
-    return [
-        {"what": what, "packing": eta, "x": float(x), "y": float(y)}
-        for (eta, _), found in zip(groups, results, strict=True)
-        for what, abscissa in (("vacf", "wt"), ("msd", "wt"), ("a2", "tau"), ("g", "r"))
-        for x, y in zip(found[abscissa], found[what], strict=False)
-    ]
-
-
-def table(groups: list, results: list[dict]) -> list[dict]:
-    """A row per packing fraction: order at contact and of the bonds."""
-    rows = []
-    for (eta, members), found in zip(groups, results, strict=True):
-        local, of_all = map(float, found["psi6"])
-        row = {"packing": eta, "runs": len(members), "g_first_bin": float(found["g"][0])}
-        rows.append(row | {"psi6_local": local, "psi6_global": of_all})
-    return rows
 
 
 def main() -> None:
     args = command_line(__doc__, "correlations.png", skip=None).parse_args()
     runs = read_all(args.runs)
+    for run in runs:
+        check(run, runs[0])
     groups = grouped(runs, lambda run: round(packing(run), 6))
     results = [analysed(members, args.skip) for _, members in groups]
-    figure, rows = draw(groups, results), table(groups, results)
+    rows = table(groups, results)
     title = "Correlations in a gas of hard disks"
-    report(args, runs, title, figure, rows, data=curves(groups, results))
+    data, said = curves(groups, results), notes(groups, results)
+    report(args, runs, title, draw(groups, results, rows), rows, data=data, notes=said)
 
 
 if __name__ == "__main__":

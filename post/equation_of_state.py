@@ -5,9 +5,10 @@
 By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
 (walls).  Means are taken in equilibrium: from where nothing drifts any more, or after --skip.
 Errors take the memory of the pressure into account; `samples` is how many independent ones the
-virial is worth.  Runs at equal packing fraction are combined.  Elastic runs only.  Disks between
-walls are denser away from them: the wall pressure belongs to the area open to the centres, and
-differs from the bulk by about 1/sqrt(N).
+virial is worth.  Runs at equal packing fraction are combined.  Elastic runs without gravity.  Disks
+between walls are denser away from them: the wall pressure belongs to the area open to the centres,
+and differs from the bulk by about 1/sqrt(N).  The curves are those of disks of one radius, and are
+left out for others.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -23,8 +24,8 @@ WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the wal
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """Z by virial, rate, walls, where they apply."""
-    if run.restitution != 1:
-        raise RunError(f"{run.path}: is not elastic, it has no equation of state")
+    if run.restitution != 1 or run.gravity.any():
+        raise RunError(f"{run.path}: is not elastic or falls, it has no equation of state")
     equal = np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0
     empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
     walled = empty and np.ptp(run.radius) == 0
@@ -41,6 +42,15 @@ def reference(eta: float, count: int, periodic: bool) -> float:
     return float(hard_disks.crystal(eta, count) if eta >= 0.72 else hard_disks.simulated(eta))
 
 
+def one_radius(runs: list[Run]) -> bool:
+    """Whether the curves apply: to all runs, or to none."""
+    equal = [bool(np.ptp(run.radius) == 0) for run in runs]
+    for run, own in zip(runs, equal, strict=True):
+        if own != equal[0]:
+            raise RunError(f"{run.path}: not of one radius, or of several, as {runs[0].path} is")
+    return equal[0]
+
+
 def table(
     groups: list[tuple[float, list[Run]]], skip: float | None
 ) -> tuple[list[dict], list[str]]:
@@ -55,25 +65,36 @@ def table(
             notes += doubts(f"η = {eta:g}, {WAYS[name]}", members) if members else []
         row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
         periodic = bool(runs[0].periodic.all())
-        expected = reference(eta, runs[0].count, periodic)
+        expected = reference(eta, runs[0].count, periodic) if one_radius(runs) else np.nan
         rows.append(row | {"Z_reference": expected if np.isfinite(expected) else None})
     return rows, notes
 
 
-def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
-    """Z above, its deviation from the reference below."""
-    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
-    fluid = np.linspace(0, 0.72, 200)
+def draw_curves(above: plt.Axes, below: plt.Axes) -> None:
+    """Published equations of state, and the deviation of one of them from the reference."""
+    fluid, solid = np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
     above.plot(fluid, hard_disks.henderson(fluid), color="0.6", label="Henderson 1975")
     above.plot(
         fluid, hard_disks.simulated(fluid), color="black", lw=1,
         label="Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985",
     )  # fmt: skip
-    solid = np.linspace(0.715, 0.86, 100)
     above.plot(
         solid, hard_disks.crystal(solid), color="black", lw=1, ls="--",
         label="crystal, Alder, Hoover and Young 1968",
     )  # fmt: skip
+    henderson = 100 * (hard_disks.henderson(fluid) / hard_disks.simulated(fluid) - 1)
+    below.plot(fluid, henderson, color="0.6")
+
+
+def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
+    """Z above, its deviation from the reference below."""
+    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
+    if one_radius(runs):
+        draw_curves(above, below)
+    else:
+        below.set_visible(False)
+        above.set_xlabel("packing fraction $\\eta$")
+        above.tick_params(labelbottom=True)
     found = {name: np.array(values, dtype=float) for name, values in columns(rows).items()}
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
@@ -83,8 +104,6 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
         style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6}
         above.errorbar(eta, z, error, label=f"by {way}", **style)
         below.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
-    henderson = 100 * (hard_disks.henderson(fluid) / hard_disks.simulated(fluid) - 1)
-    below.plot(fluid, henderson, color="0.6")
     below.axhline(0, color="black", lw=1, zorder=0)
     largest = np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(

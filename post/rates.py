@@ -10,7 +10,7 @@ of the pair collisions, and by the impulses on each side (a little larger: centr
 away from sides).  With an event log also w_ij, the collisions of a disk of species i with disks of
 species j per time, and the free paths: in a frame each disk is on one, as long as its speed times
 the time between its collisions before and after.  Frames meet long paths more often; therefore each
-counts 1 over its time.  The line is for disks that meet without memory (Boltzmann, Enskog).
+counts 1 over its time.  The line is for equal disks that meet without memory (Boltzmann, Enskog).
 """
 
 from ricochet import Run, RunError
@@ -19,6 +19,7 @@ from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import FINE, SeriesMean, combined, doubts, estimate, series_mean
 from ricochet.thermodynamics import (
     collision_rate,
+    equal_disks,
     packing,
     start_of_equilibrium,
     steps,
@@ -186,7 +187,8 @@ def draw(
         axes = panels[1]
         axes.stairs(density, BINS, color=COLOURS[0], label=f"measured, $\\ell$ = {mean:.4g}")
         fine = np.linspace(0, BINS[-1], 200)
-        axes.plot(fine, path_density(fine), color="black", lw=1.2, label="without memory")
+        if equal_disks(runs[0]):
+            axes.plot(fine, path_density(fine), color="black", lw=1.2, label="without memory")
         axes.set(
             yscale="log", xlabel="free path $/\\,\\ell$", ylabel="probability density", xlim=(0, 6)
         )

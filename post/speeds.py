@@ -17,6 +17,7 @@ from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
+from ricochet.thermodynamics import equal_disks
 
 import numpy as np
 
@@ -102,7 +103,9 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
-    dilute_limit(axes, RELAXATION)
+    everyone = [run for _, runs in groups for run in runs]
+    if all(equal_disks(run) and relaxation(run, 0)[1][0] < -0.4 for run in everyone):
+        dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
     axes.legend()

@@ -104,6 +104,25 @@ def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
 
 
+def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
+    """Of the fluid, adiabatic: c^2 = (d(eta Z)/d eta + Z^2) kT / m, Z by Henderson."""
+    step = 1e-6
+    slope = ((eta + step) * henderson(eta + step) - (eta - step) * henderson(eta - step)) / step / 2
+    return math.sqrt((slope + henderson(eta) ** 2) * kt / mass)
+
+
+def enskog_viscosity(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
+    """Shear viscosity over mass density; Gass, J. Chem. Phys. 54, 1898 (1971)."""
+    density = 4 * eta / (math.pi * diameter**2)
+    dilute = 1.022 / (2 * diameter) * math.sqrt(mass * kt / math.pi)
+    return dilute * 2 * eta * (1 / (z - 1) + 1 + 0.8729 * (z - 1)) / (mass * density)
+
+
+def long_time_tail(time: np.ndarray, density: float, diffusion: float, viscosity: float):
+    """<v(0) v(t)> / <v^2> at late times by mode coupling; Dorfman and Cohen, PRL 25, 1257."""
+    return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))
+
+
 def enskog_diffusion(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
     """D_E, first Sonine approximation."""
     density = 4 * eta / (math.pi * diameter**2)

@@ -186,6 +186,21 @@ class Run:
             return Series(rows(group, "time", count), rows(group, "value", count, None))
 
     @cached_property
+    def observables(self) -> tuple[str, ...]:
+        """The names that `observable` knows."""
+        with open_file(self.path) as file:
+            group = find(file, "observables")
+            if not isinstance(group, h5py.Group):
+                raise Unsound("has no observables")
+            return tuple(series_in(group))
+
+    def to_dataframe(self):
+        """The observables as a pandas DataFrame, a row per sample, the time as index."""
+        from .bridges import observables_frame
+
+        return observables_frame(self)
+
+    @cached_property
     def events(self) -> Events:
         """All collisions; needs `output.event_log = .true.` in the input file."""
         with open_file(self.path) as file:
@@ -306,6 +321,17 @@ def run_of(path: Path, file: h5py.File) -> Run:
         parameters=parameters,
         provenance=provenance,
     )
+
+
+def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
+    """The names of the series in a group, and in the groups of the species in it."""
+    for name in group:
+        item = find(group, name)
+        if isinstance(item, h5py.Group):
+            if find(item, "value") is not None:
+                yield path + name
+            elif not path:
+                yield from series_in(item, f"{name}/")
 
 
 def committed(file: h5py.File, group: str, extent: int) -> int:

@@ -94,6 +94,11 @@ def packing(run: Run) -> float:
     return float(np.pi * np.sum(run.radius**2) / np.prod(run.edges))
 
 
+def equal_disks(run: Run) -> bool:
+    """Whether the run is of one component, as most laws are."""
+    return bool(np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0)
+
+
 def lightest_and_heaviest(run: Run) -> tuple[int, int]:
     """Indices of the species with the smallest and the largest mass, which must differ."""
     masses = [kind.mass for kind in run.by_species]

@@ -99,6 +99,18 @@ def test_analyses_of_mdanalysis_work_on_a_run(run):
     np.testing.assert_allclose(RMSF(atoms).run().results.rmsf, spread, rtol=1e-4)
 
 
+def test_pandas_gets_all_observables(run):
+    reader("pandas")
+    table = run.to_dataframe()
+    np.testing.assert_array_equal(table.index, run.observable("momentum").time)
+    np.testing.assert_array_equal(table["total_energy"], run.observable("total_energy").value)
+    np.testing.assert_array_equal(table["momentum_y"], run.observable("momentum").value[:, 1])
+    hits = table[[f"wall_collisions_{side}" for side in ("left", "right", "bottom", "top")]]
+    np.testing.assert_array_equal(hits, run.observable("wall_collisions").value)
+    names = {f"{kind}/{what}" for kind in ("all", *run.names) for what in ("mean_speed",)}
+    assert names < set(table) and len(table.columns) == len(run.observables) + 1 + 3 + 3
+
+
 def test_csv_is_read_by_numpy(run):
     table = np.genfromtxt(
         exported(run, "run.csv", "--frames", "::2"), delimiter=",", names=True, dtype=None

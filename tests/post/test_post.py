@@ -240,6 +240,16 @@ def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
     assert "ratio" not in (tmp_path / "a.csv").read_text()
 
 
+def test_the_table_of_cooling_has_energies_against_time(tmp_path):
+    runs = [cooled(tmp_path / f"{k}.h5", 0.9, 1.0, seed=k, points=401) for k in (1, 2)]
+    columns = cooling.curves([(0.9, runs)], [cooling.cooling(runs)])
+    time = columns["time_xi0.9"]
+    expected = 3 * np.exp(-time)  # 3 at the start, and t is already a square
+    np.testing.assert_allclose(columns["energy_all_xi0.9"], expected, rtol=1e-3)
+    np.testing.assert_allclose(columns["energy_heavy_xi0.9"], expected * 4 / 3, rtol=1e-3)
+    np.testing.assert_allclose(columns["energy_all_error_xi0.9"], 0, atol=1e-12)
+
+
 @pytest.mark.parametrize("script", ["equipartition", "mixture"])
 def test_what_compares_species_wants_several(tmp_path, rng, capsys, script):
     path = gas(tmp_path / "gas.h5", rng, names=("one",))

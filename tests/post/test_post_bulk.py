@@ -1,5 +1,6 @@
 """Pressure, correlations and cooling in post/: closed formulas, and each figure drawn once."""
 
+import csv
 import warnings
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import correlations
 import equation_of_state
 import haff
 import rates
-from ricochet import Events, RunError, read_run, statistics, thermodynamics
+from ricochet import Events, RunError, diffusion, read_run, statistics, structure, thermodynamics
 from ricochet import hard_disks as hd
 from synthetic_run import run_script, write_run
 from validation.estimators import force, hit_rate
@@ -72,7 +73,7 @@ def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():
 # --- pressure ---
 
 
-def steady(path, periodic, speed=1.0, **parameters):
+def steady(path, periodic, speed=1.0, radius=0.01, **parameters):
     """100 disks with kT = 2 speed^2; all sums grow linearly in time."""
     time = np.arange(201.0)
     v = speed * np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
@@ -88,6 +89,7 @@ def steady(path, periodic, speed=1.0, **parameters):
         x,
         v,
         time=[0, 200],
+        radius=radius,
         periodic=periodic,
         observables=observables,
         observable_time=time,
@@ -206,11 +208,10 @@ def test_free_paths_without_memory_have_the_mean_one():
 def test_velocities_that_turn_are_remembered_as_a_cosine(tmp_path):
     time = np.arange(101) * 0.1
     v = np.stack([np.cos(time), np.sin(time)], axis=1)[:, None].repeat(3, axis=1)
-    observables = {"collisions": np.zeros(101, int)}
-    run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=observables)
+    run = written(tmp_path / "run.h5", 0 * v, v, time=time)
     at = correlations.lags(100)
     assert at[0] == 1 and at[-1] == 50 and np.all(np.diff(at) > 0)
-    memory = correlations.velocity_memory(run, at, skip=0)
+    memory = diffusion.velocity_memory(run, slice(101), at)
     np.testing.assert_allclose(memory, np.cos(0.1 * at), atol=1e-12)
 
 
@@ -219,26 +220,64 @@ def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
     v = np.array([[1.0, 0.0], [-1.0, 0.0]])[None].repeat(51, axis=0)
     flight = 0.5 + v * time[:, None, None]
     image = np.floor(flight).astype(int)
-    observables = {"collisions": np.zeros(51, int)}
     run = written(
-        tmp_path / "run.h5",
-        flight - image,
-        v,
-        image=image,
-        time=time,
-        periodic=PERIODIC,
-        observables=observables,
+        tmp_path / "run.h5", flight - image, v, image=image, time=time, periodic=PERIODIC
     )
     at = np.array([1, 5, 20])
-    np.testing.assert_allclose(correlations.displacement(run, at, skip=0), (0.1 * at) ** 2)
+    np.testing.assert_allclose(diffusion.displacement(run, slice(51), at), (0.1 * at) ** 2)
+
+
+def test_the_diffusion_coefficient_is_that_of_a_langevin_walk(tmp_path, rng):
+    """Velocities that forget in the time 1: between t/2 and t the mean of D(t) = 1 - exp(-t)."""
+    step, size, frames = 0.1, 100, 4000
+    v = np.array([remembering(rng, frames, 1 / step) for _ in range(2 * size)])
+    v = (v - v.reshape(size, 2, -1).mean(axis=0).repeat(size, 0).reshape(v.shape)).T
+    v = v.reshape(frames, size, 2)
+    x = step * (np.cumsum(v, axis=0) - v / 2)
+    image = np.floor(x).astype(int)
+    sides = {"image": image, "time": step * np.arange(frames), "periodic": PERIODIC}
+    run = written(tmp_path / "run.h5", x - image, v, **sides)
+    spread, memory = diffusion.diffusion(run, slice(frames), 60)
+    expected = 1 - (np.exp(-3) - np.exp(-6)) / 3
+    for found in (spread, memory):
+        assert found.mean == pytest.approx(expected, abs=4 * found.error)
+        assert 0.003 < found.error < 0.05
+    assert spread.mean == pytest.approx(memory.mean, abs=2 * spread.error)
+
+
+def test_enskog_is_boltzmann_in_a_dilute_gas():
+    assert hd.speed_of_sound(1e-6) == pytest.approx(np.sqrt(2), rel=1e-4)
+    eta = 1e-4
+    viscosity = hd.enskog_viscosity(1 + 2 * eta, eta, 0.01, kt=2.0, mass=3.0)
+    density = 3.0 * 4 * eta / (np.pi * 1e-4)
+    assert viscosity * density == pytest.approx(1.022 / 0.02 * np.sqrt(6 / np.pi), rel=1e-3)
+    assert hd.long_time_tail(2.0, 5.0, 0.7, 0.3) == pytest.approx(1 / (80 * np.pi))
 
 
 @pytest.mark.parametrize("periodic", [PERIODIC, (False, False), (True, False)])
 def test_points_at_random_are_not_correlated(tmp_path, rng, periodic):
     x = rng.uniform(size=(60, 1000, 2))
     run = written(tmp_path / "run.h5", x, x, periodic=periodic)
-    g = correlations.pair_correlation(run, np.linspace(1, 6, 6))
+    g = structure.pair_correlation(run, list(range(60)), np.linspace(1, 6, 6))
     np.testing.assert_allclose(g, 1, atol=0.05)
+
+
+def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, rng, monkeypatch):
+    x = rng.uniform(size=(60, 500, 2))
+    gas = written(tmp_path / "gas.h5", x, x, periodic=PERIODIC)
+    edges = np.array([0, 0.12, 0.3, 0.6, 1.0])  # 2 pi / L = 0.126 in diameters
+    for terms in (structure.MOST_TERMS, 1e4):
+        monkeypatch.setattr(structure, "MOST_TERMS", terms)
+        found = structure.structure_factor(gas, list(range(60)), edges)
+        assert np.isnan(found[0]), "no wave is longer than the box"
+        np.testing.assert_allclose(found[2:], 1, atol=0.15)
+    x, sides = triangular(12, 14)
+    lattice = written(tmp_path / "c.h5", [x], [x], edges=sides, periodic=PERIODIC, radius=0.5)
+    monkeypatch.undo()
+    first = 4 * np.pi / np.sqrt(3)  # Bragg's peak, six wave vectors
+    edges = first + np.array([-0.3, -0.01, 0.01])
+    between, peak = structure.structure_factor(lattice, [0], edges)
+    assert between == pytest.approx(0, abs=1e-9) and peak == pytest.approx(len(x))
 
 
 def triangular(columns, rows):
@@ -254,15 +293,20 @@ def test_a_crystal_is_in_order_and_points_at_random_are_not(tmp_path, rng):
     x = x + rng.normal(0, 1e-6, x.shape)
     frames = np.stack([x, x])
     crystal = written(tmp_path / "c.h5", frames, frames, edges=edges, periodic=PERIODIC)
-    np.testing.assert_allclose(correlations.bond_order(crystal, 0), 1, atol=1e-4)
+    np.testing.assert_allclose(structure.bond_order(crystal, 0), 1, atol=1e-4)
+    psi = [structure.bond_order(crystal, k) for k in (0, 1)]
+    g6 = structure.bond_correlation(crystal, [0, 1], psi, np.array([40, 80, 120, 300]))
+    np.testing.assert_allclose(g6, 1, atol=1e-4)
     turned = written(
         tmp_path / "t.h5", frames[..., ::-1], frames, edges=edges[::-1], periodic=PERIODIC
     )
-    np.testing.assert_allclose(correlations.bond_order(turned, 0), -1, atol=1e-4)
+    np.testing.assert_allclose(structure.bond_order(turned, 0), -1, atol=1e-4)
     x = rng.uniform(size=(2, 2000, 2))
     gas = written(tmp_path / "g.h5", x, x, periodic=PERIODIC)
-    local, of_all = correlations.order(gas)
-    assert 0.3 < local < 0.45 and of_all < 0.1
+    psi = structure.bond_order(gas, 0)
+    assert 0.3 < np.mean(np.abs(psi)) < 0.45 and abs(psi.mean()) < 0.1
+    (far,) = structure.bond_correlation(gas, [0], [psi], np.array([5, 25]))
+    assert abs(far) < 0.01
 
 
 # --- the scripts, on runs of the program ---
@@ -288,16 +332,55 @@ def bulk(ricochet, tmp_path):
     return paths
 
 
+def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_path):
+    table = tmp_path / "a.csv"
+    assert run_script("correlations", bulk[0], "-o", tmp_path / "a.png", "--csv", table) == 0
+    rows = {row["what"]: row for row in csv.DictReader(table.open())}
+    both = [rows[f"D_{way}"] for way in ("displacement", "velocities")]
+    one, other = (float(row["y"]) for row in both)
+    error = float(both[0]["error"])
+    run = read_run(bulk[0])
+    assert 0 < error < 0.3 * one and one == pytest.approx(other, abs=error)
+    assert one == pytest.approx(correlations.enskog(run)[0], abs=4 * error + 0.1 * one)
+    assert {"vacf", "msd", "g", "S", "g6", "psi6_local", "psi6_global"} <= set(rows)
+
+
+def test_what_is_no_gas_in_equilibrium_has_no_correlations(bulk, tmp_path, capsys):
+    falling = {"box": {"gravity": [0.0, -1.0]}}
+    x = np.full((20, 4, 2), 0.5)
+    fall = write_run(tmp_path / "fall.h5", x, x, parameters=falling)
+    radius = {"radius": [0.01, 0.01, 0.02, 0.02], "species": [1, 1, 2, 2], "names": ("a", "b")}
+    mixed = write_run(tmp_path / "mixed.h5", x, x, **radius)
+    for script in ("correlations", "equation_of_state"):
+        for runs in ([bulk[2]], [fall], [bulk[0], mixed]):
+            assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+            said = capsys.readouterr().err
+            assert said.startswith(f"{script}.py: {runs[-1]}: ") and said.count("\n") == 1
+
+
+def test_mixtures_are_not_drawn_on_the_curves_of_equal_disks(tmp_path):
+    radius = np.repeat([0.01, 0.02], 50)
+    mixed = steady(tmp_path / "mixed.h5", PERIODIC, radius=radius)
+    rows, _ = equation_of_state.table([(0.5, [mixed])], None)
+    assert rows[0]["Z_reference"] is None
+    figure = equation_of_state.draw(rows, [mixed])
+    assert [line.get_label() for line in figure.axes[0].lines if "19" in line.get_label()] == []
+    equal = steady(tmp_path / "equal.h5", PERIODIC)
+    rows, _ = equation_of_state.table([(0.5, [equal])], None)
+    assert rows[0]["Z_reference"] > 1
+    assert len(equation_of_state.draw(rows, [equal]).axes[0].lines) > 3
+
+
 def test_scripts_draw(bulk, tmp_path):
     scripts = {"equation_of_state": bulk[:2], "correlations": bulk[:2], "haff": bulk[2:]}
     scripts["rates"] = bulk[:1]
     for script, runs in scripts.items():
-        figure, csv = tmp_path / f"{script}.png", tmp_path / f"{script}.csv"
+        figure, table = tmp_path / f"{script}.png", tmp_path / f"{script}.csv"
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            assert run_script(script, *runs, "-o", figure, "--csv", csv) == 0
+            assert run_script(script, *runs, "-o", figure, "--csv", table) == 0
         assert figure.stat().st_size > 10000
-        assert len(csv.read_text().splitlines()) > 2
+        assert len(table.read_text().splitlines()) > 2
     for script, runs in (("equation_of_state", bulk[2:]), ("rates", bulk[2:])):
         assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
 

@@ -5,9 +5,10 @@ Frames in single precision: seven digits of a velocity are more than enough here
 
 import numpy as np
 
-from correlations import velocity_memory
+from correlations import later
 from ricochet import Run
 from ricochet import hard_disks as hd
+from ricochet.diffusion import velocity_memory
 from ricochet.statistics import estimate
 
 from .case import Case, Member, within
@@ -49,7 +50,8 @@ def half_and_one(run: Run) -> list[float]:
     """The psi at w t = 1/2 and 1, interpolated between frames."""
     lags = np.arange(1, 6)
     t = lags * (run.time[1] - run.time[0]) / mean_free_time(run)
-    return list(np.exp(np.interp((0.5, 1.0), t, np.log(velocity_memory(run, lags)))))
+    psi = velocity_memory(run, later(run, None), lags)
+    return list(np.exp(np.interp((0.5, 1.0), t, np.log(psi))))
 
 
 def slope(run: Run) -> float:

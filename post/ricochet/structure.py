@@ -1,0 +1,101 @@
+"""How disks are arranged: pair correlation, structure factor, order of the bonds.
+
+A handful of lines of scipy each, and no library: those know periodic boxes, but not walls.
+"""
+
+import numpy as np
+import scipy
+
+from .reader import Run
+
+MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
+MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
+
+
+def pair_correlation(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:
+    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them."""
+    r = edges * 2 * run.radius.mean()
+    size = np.where(run.periodic, run.edges, 0.0)
+    sums = np.zeros(len(edges) - 1)
+    centres = 0
+    for k in frames:
+        x = run.position[k] - run.lower
+        margin = np.where(run.periodic, -np.inf, r[-1])
+        inner = np.all((x > margin) & (x < run.edges - margin), axis=1)
+        tree, part = (scipy.spatial.cKDTree(p, boxsize=size) for p in (x, x[inner]))
+        sums += np.diff(part.count_neighbors(tree, r))
+        centres += inner.sum()
+    density = (run.count - 1) / np.prod(run.edges)
+    return sums / np.maximum(centres, 1) / (density * np.pi * np.diff(r**2))
+
+
+def structure_factor(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:
+    """S(k) = <|sum of exp(ikx)|^2> / N in bins, `edges` of k in 1 / mean diameters; NaN without k.
+
+    Periodic boxes.  Of many disks only every so many wave vector along x and y is taken.
+    """
+    unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
+    most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
+    step = int(np.ceil(np.sqrt(2 * run.count * np.prod(most + 1) / MOST_TERMS)))
+    along_x = step * np.arange(most[0] // step + 1)
+    along_y = step * np.arange(-(most[1] // step), most[1] // step + 1)
+    k = np.hypot(*np.meshgrid(along_x * unit[0], along_y * unit[1], indexing="ij"))
+    k *= 2 * run.radius.mean()
+    sums = np.zeros(k.shape)
+    for frame in frames:
+        x, y = (run.position[frame] * unit).T
+        sums += np.abs(np.exp(1j * np.outer(along_x, x)) @ np.exp(1j * np.outer(y, along_y))) ** 2
+    sums[k == 0] = np.nan
+    known = np.isfinite(sums)
+    total, _ = np.histogram(k[known], edges, weights=sums[known] / (run.count * len(frames)))
+    number, _ = np.histogram(k[known], edges)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def bond_order(run: Run, frame: int) -> np.ndarray:
+    """(N,) complex psi6 of each disk, over its Delaunay neighbours."""
+    x = run.position[frame]
+    near = 4 * np.sqrt(np.prod(run.edges) / run.count)
+    points = padded(x, run, near)
+    start, neighbours = scipy.spatial.Delaunay(points).vertex_neighbor_vertices
+    centre = np.repeat(np.arange(len(points)), np.diff(start))
+    inside = centre < run.count
+    bonds = points[neighbours[inside]] - points[centre[inside]]
+    turns = np.exp(6j * np.arctan2(bonds[:, 1], bonds[:, 0]))
+    sums = np.bincount(centre[inside], turns.real, run.count) + 1j * np.bincount(
+        centre[inside], turns.imag, run.count
+    )
+    return sums / np.bincount(centre[inside], minlength=run.count)
+
+
+def padded(x: np.ndarray, run: Run, width: float) -> np.ndarray:
+    """The points, then their periodic copies within `width` of the box."""
+    points = x
+    for axis in np.flatnonzero(run.periodic):
+        shift = np.where(np.arange(2) == axis, run.edges, 0.0)
+        low = points[:, axis] < run.lower[axis] + width
+        high = points[:, axis] > run.upper[axis] - width
+        points = np.concatenate([points, points[low] + shift, points[high] - shift])
+    return points
+
+
+def bond_correlation(
+    run: Run, frames: list[int], psi: list[np.ndarray], edges: np.ndarray
+) -> np.ndarray:
+    """g6(r) = Re <psi6*(0) psi6(r)> in bins, `edges` in mean diameters; NaN without pairs.
+
+    `psi` is the bond order of each of the frames.  Of many disks only some are centres.
+    """
+    few = np.linspace(0, run.count - 1, min(run.count, max(16, MOST_PAIRS // run.count)))
+    centres = few.astype(int)
+    sums, pairs = np.zeros((2, len(edges) + 1))
+    for frame, own in zip(frames, psi, strict=True):
+        x = run.position[frame]
+        gap = x[centres, None] - x
+        gap -= np.where(run.periodic, run.edges * np.round(gap / run.edges), 0.0)
+        r = np.hypot(gap[..., 0], gap[..., 1]) / (2 * run.radius.mean())
+        where = np.searchsorted(edges, r.ravel(), side="right")
+        product = (own[centres, None].conj() * own).real.ravel()
+        sums += np.bincount(where, product, len(sums))
+        pairs += np.bincount(where, minlength=len(sums))
+    return np.where(pairs > 0, sums / np.maximum(pairs, 1), np.nan)[1:-1]
