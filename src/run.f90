@@ -3,13 +3,14 @@ module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use checkpoint, only: read_checkpoint, write_checkpoint
   use command_line, only: command_t
-  use errors, only: error_t, exit_files, exit_stopped, fail
+  use errors, only: error_t, exit_broken, exit_files, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
+  use progress, only: progress_t
   use progress_line, only: progress_line_t
   use run_files, only: current_checkpoint, is_file, run_file
   use run_input, only: run_input_t
@@ -26,6 +27,7 @@ module run
   real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
   integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
   character(len=1), parameter :: eol = new_line("a")
+  character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
 
   type :: run_t
     type(command_t) :: command
@@ -57,16 +59,16 @@ contains
     if (allocated(error)) return
     call choose_evolution(run%input%settings, run%evolution)
     if (command%resume) then
-      call describe_system(run%input%settings, run%sim)
-      call read_checkpoint(command%output, run%input, run%sim, run%output, error)
+      call go_on(run, error)
     else
       call begin(run, error)
     end if
     if (allocated(error) .or. command%check) return
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
-    if (.not. allocated(error)) call run%output%finish(run%sim, seconds() - run%started, run%rate, error)
+    if (.not. allocated(error)) call run%output%finish(run%sim, cost(run), note(run), error)
     if (allocated(error)) then
+      if (error%code == exit_broken) call run%output%break_off(run%sim, cost(run), error%message)
       call rescue(run, error)
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing")
@@ -100,6 +102,33 @@ contains
         "note: folder "//folder_of(command%output)//" has been created for the output"
     end associate
   end subroutine begin
+
+  !> Restores the state of a run and opens its output; with --check says only that it can go on.
+  subroutine go_on(run, error)
+    type(run_t), intent(inout) :: run
+    type(error_t), allocatable, intent(out) :: error
+    type(progress_t) :: progress
+    type(stop_rule_t) :: rule
+    logical :: finished
+
+    associate (command => run%command, sim => run%sim)
+      call describe_system(run%input%settings, sim)
+      call read_checkpoint(command%output, run%input, sim, progress, finished, error)
+      if (allocated(error)) return
+      rule = stop_rule_t(run%input%settings%stop, sim)
+      if (finished .and. rule%met(sim)) then
+        call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
+          //written(sim%collisions)//" collisions; to continue it, repeat the command with --resume and a stop rule that " &
+          //"is not met yet, such as --set stop.time="//written(2*sim%time()))
+      else if (finished .and. rule%too_cold(sim)) then
+        call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
+      else if (command%check) then
+        call print_text(command%input//": valid; the run goes on from time "//written(sim%time()), error)
+      else
+        call run%output%resume(command%output, run%input, sim, progress, finished, error)
+      end if
+    end associate
+  end subroutine go_on
 
   !> Warns of what is legal but rarely meant.
   subroutine warn(run)
@@ -150,8 +179,8 @@ contains
       limits%turns = turns
       call run%output%tighten(limits)
       call run%evolution%advance(run%sim, limits, error)
-      if (allocated(error)) exit
       call run%output%write_events(run%sim, run%evolution%log)
+      if (allocated(error)) exit
       call run%output%write_what_is_due(run%sim, error)
       if (allocated(error)) exit
       now = seconds()
@@ -233,14 +262,27 @@ contains
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
     end associate
-    if (run%stop_rule%met(run%sim)) return
-    text = text//eol//"note = "
-    if (run%stop_rule%too_cold(run%sim)) then
-      text = text//"cooled to 1e-25 of the first temperature, below which rounding errors dominate"
-    else
-      text = text//"no further events are possible"
-    end if
-    text = text//": the run ended before its stop rule was met"
+    if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
+
+  !> Why the run ended if no stop rule was met; else empty.
+  function note(run) result(text)
+    type(run_t), intent(in) :: run
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (run%stop_rule%met(run%sim)) return
+    text = "no further events are possible"
+    if (run%stop_rule%too_cold(run%sim)) text = coldness//", below which rounding errors dominate"
+    text = text//": the run ended before its stop rule was met"
+  end function note
+
+  !> Wall time since the start or the last resume [s], and collisions per processor time [1/s].
+  function cost(run)
+    type(run_t), intent(in) :: run
+    real(real64) :: cost(2)
+
+    cost = [seconds() - run%started, run%rate]
+  end function cost
 
 end module run

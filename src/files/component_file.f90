@@ -1,9 +1,11 @@
 !> Files whose components are either written or read, each in one line for both. A component that is read must lie in
 !> the range that the line gives; the first that does not is remembered.
 module component_file
+  use, intrinsic :: iso_fortran_env, only: int8
   use bounds, only: first_outside
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
+  use sealed_file, only: crc_of
   use texts, only: written
   implicit none
   private
@@ -12,13 +14,26 @@ module component_file
   type :: component_file_t
     type(hdf5_file_t) :: hdf5
     logical :: writing = .false.
+    character(len=:), allocatable :: group        !! before all names
+    integer(int64) :: crc = 0                     !! of all values so far
     character(len=:), allocatable :: flaw         !! the first value that cannot be right
   contains
     generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers
+    procedure :: name_of
     procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, exchange_integers, object
   end type component_file_t
 
 contains
+
+  !> The path of a component in the file.
+  pure function name_of(self, name) result(path)
+    class(component_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: path
+
+    path = name
+    if (allocated(self%group)) path = self%group//name
+  end function name_of
 
   !> Writes or reads a real.
   subroutine exchange_real(self, name, value, range)
@@ -43,11 +58,10 @@ contains
     integer :: k
 
     allocate (buffer, source=values)
-    if (self%writing) then
-      call self%hdf5%put(name, shape(buffer), buffer)
-      return
-    end if
-    call self%hdf5%fetch(name, size(buffer), buffer)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
+    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) return
     values = buffer
     k = first_outside(buffer, range)
     if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))
@@ -76,11 +90,10 @@ contains
     integer :: k
 
     allocate (buffer, source=values)
-    if (self%writing) then
-      call self%hdf5%put(name, shape(buffer), buffer)
-      return
-    end if
-    call self%hdf5%fetch(name, size(buffer), buffer)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
+    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) return
     values = buffer
     k = first_outside(buffer, range)
     if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))
@@ -96,11 +109,10 @@ contains
     integer :: k
 
     allocate (buffer, source=values)
-    if (self%writing) then
-      call self%hdf5%put(name, shape(buffer), buffer)
-      return
-    end if
-    call self%hdf5%fetch(name, size(buffer), buffer)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
+    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) return
     values = buffer
     k = first_outside(int(buffer, int64), range)
     if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))

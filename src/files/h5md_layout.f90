@@ -10,6 +10,7 @@ module h5md_layout
     events_group = "events/", &
     parameters_group = "parameters/", &
     provenance = "provenance", &
+    checkpoint_group = "checkpoint/", &           !! the state of a finished run, to go on from
     box_group = disks_group//"box", &
     all_disks = "all"                             !! the group of means over all disks in `observables_group`
 

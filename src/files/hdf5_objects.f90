@@ -4,8 +4,8 @@
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, &
-    h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aexists_f, h5aopen_f, h5awrite_f, &
-    h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
+    h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
+    h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
     h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_virtual_f, &
     h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tget_class_f, h5tis_variable_str_f, h5tclose_f, &
@@ -28,11 +28,11 @@ module hdf5_objects
     procedure :: make_dataset
     procedure :: open_dataset
     procedure :: link
-    procedure :: replace
     procedure :: extents
     procedure :: length
     generic :: put => put_reals, put_integers, put_longs, put_text, put_texts
     generic :: fetch => fetch_reals, fetch_integers, fetch_longs
+    procedure :: fetch_attribute
     procedure :: fetch_text
     procedure :: fetch_texts
     procedure, private :: put_reals, put_integers, put_longs, put_text, put_texts, put_values, put_attribute
@@ -143,17 +143,11 @@ contains
     character(len=*), intent(in) :: name
     integer(int64) :: n
 
-    n = values_in(self%extents(name))
-  end function length
-
-  !> Number of values of a shape; -1 if it is too large to be counted.
-  pure function values_in(extents) result(n)
-    integer(hsize_t), intent(in) :: extents(:)
-    integer(int64) :: n
-
     n = -1
-    if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
-  end function values_in
+    associate (extents => self%extents(name))
+      if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
+    end associate
+  end function length
 
   !> Writes reals as doubles.
   subroutine put_reals(self, name, extents, values)
@@ -224,7 +218,7 @@ contains
     call h5tset_size_f(string, int(length, size_t), status)
   end function string_of
 
-  !> Writes a new dataset, or an attribute, new or not.
+  !> Writes a dataset or an attribute, new or not; one that is there must have as many values.
   subroutine put_values(self, name, extents, stored_as, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -242,8 +236,13 @@ contains
       call self%put_attribute(name, int(extents, hsize_t), stored_as, in_memory, address)
       return
     end if
-    call self%make_dataset(name, stored_as, int(extents, hsize_t), dataset)
-    call h5dwrite_f(dataset, in_memory, address, status)
+    call self%open_dataset(name, dataset, status, like=stored_as)
+    if (status < 0) then
+      call self%make_dataset(name, stored_as, int(extents, hsize_t), dataset)
+    else if (self%length(name) /= product(int(extents, int64))) then
+      call self%check(-1, "write "//name)
+    end if
+    if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
     call h5dclose_f(dataset, status)              ! writes what has been buffered
     call self%check(status, "write "//name)
@@ -258,17 +257,12 @@ contains
     type(c_ptr), intent(in) :: address
     integer(hid_t) :: object, space, attribute
     integer :: status, closed, at
-    logical :: exists
 
     at = index(name, "@")
     call h5screate_simple_f(size(extents), extents, space, status)
     if (status >= 0) call h5oopen_f(self%id, name(:at - 1), object, status)
-    if (status >= 0) call h5aexists_f(object, name(at + 1:), exists, status)
-    if (status >= 0 .and. exists) then
-      call h5aopen_f(object, name(at + 1:), attribute, status)
-    else if (status >= 0) then
-      call h5acreate_f(object, name(at + 1:), stored_as, space, attribute, status)
-    end if
+    if (status >= 0) call h5aopen_f(object, name(at + 1:), attribute, status)
+    if (status < 0) call h5acreate_f(object, name(at + 1:), stored_as, space, attribute, status)
     if (status >= 0) call h5awrite_f(attribute, in_memory, address, status)
     if (status >= 0) call h5aclose_f(attribute, status)
     call self%check(status, "write "//name)
@@ -276,21 +270,30 @@ contains
     call h5sclose_f(space, closed)
   end subroutine put_attribute
 
-  !> Overwrites a dataset of one integer.
-  subroutine replace(self, name, value)
+  !> Reads an attribute that is a real.
+  subroutine fetch_attribute(self, name, value)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(int64), intent(in), target :: value
-    integer(hid_t) :: dataset
-    integer :: status
+    real(real64), intent(inout), target :: value
+    type(c_ptr) :: place
+    integer(hid_t) :: object, space, attribute
+    integer(hsize_t) :: n
+    integer :: status, closed, at
 
     if (allocated(self%failure)) return
-    call self%open_dataset(name, dataset, status)
-    if (status >= 0) call h5dwrite_f(dataset, h5kind_to_type(int64, h5_integer_kind), c_loc(value), status)
-    call self%check(status, "write "//name)
-    call h5dclose_f(dataset, status)              ! writes what has been buffered
-    call self%check(status, "write "//name)
-  end subroutine replace
+    at = index(name, "@")
+    place = c_loc(value)
+    call h5oopen_f(self%id, name(:at - 1), object, status)
+    if (status >= 0) call h5aopen_f(object, name(at + 1:), attribute, status)
+    if (status >= 0) call h5aget_space_f(attribute, space, status)
+    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
+    if (status >= 0 .and. n /= 1) status = -1
+    if (status >= 0) call h5aread_f(attribute, h5t_native_double, place, status)
+    call self%check(status, "be read: "//name)
+    call h5sclose_f(space, closed)
+    call h5aclose_f(attribute, closed)
+    call h5oclose_f(object, closed)
+  end subroutine fetch_attribute
 
   !> Reads a dataset of n reals.
   subroutine fetch_reals(self, name, n, values)

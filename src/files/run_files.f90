@@ -97,8 +97,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     if (is_file(output)) then
-      call fail(error, exit_files, output//": exists already; --force replaces it when the run has finished, " &
-        //"-o writes elsewhere")
+      call fail(error, exit_files, output//": exists already; --resume with a longer stop rule continues it, " &
+        //"--force replaces it when the run has finished, -o writes elsewhere")
     else if (is_file(run_file(output, current_checkpoint))) then
       call fail(error, exit_files, run_file(output, current_checkpoint)//": exists already, from a run that was " &
         //"stopped; --resume goes on, --force starts over")

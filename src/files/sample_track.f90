@@ -37,6 +37,7 @@ module sample_track
   contains
     procedure :: make
     procedure :: resume
+    procedure :: commit
     procedure :: copy
     procedure :: close => close_track
     procedure :: first_capacity
@@ -161,7 +162,8 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Opens the track of a file and goes back to those of its first `taken` samples that are in the file.
+  !> Opens the track of a file and goes back to those of its first `taken` samples that are in the file, which stays as
+  !> it is.
   subroutine resume(self, file, taken, unwritten)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -189,8 +191,15 @@ contains
     self%capacity = minval(self%series%capacity)
     self%appended = count
     self%committed = count
-    if (committed(1) /= count) call file%replace(self%counter, count)
   end subroutine resume
+
+  !> Tells readers which samples are complete: after `resume`, no more than those it went back to.
+  subroutine commit(self, file)
+    class(track_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
+
+    if (allocated(self%series)) call file%put(self%counter, scalar, [self%committed])
+  end subroutine commit
 
   !> Makes the same track in a new file with another capacity, with all samples that are written.
   subroutine copy(self, file, source, source_file, capacity)
@@ -209,7 +218,7 @@ contains
     do k = 1, size(self%series)
       call self%series(k)%copy(file, source%series(k), source_file, source%committed)
     end do
-    call file%replace(self%counter, self%committed)
+    call self%commit(file)
   end subroutine copy
 
   !> Notes a failure of the file if it lacks samples.
@@ -305,7 +314,7 @@ contains
     end do
     committed = self%committed + size(samples, 2)
     call file%flush()
-    call file%replace(self%counter, committed)
+    call file%put(self%counter, scalar, [committed])
     call file%flush()
     if (.not. allocated(file%failure)) self%committed = committed
   end subroutine write_samples

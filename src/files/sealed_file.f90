@@ -7,7 +7,7 @@ module sealed_file
   use system, only: what_is, write_start
   implicit none
   private
-  public :: seal, flaw_of, checksum
+  public :: seal, flaw_of, checksum, crc_of
 
   integer, parameter :: header_length = 64
   integer(int64), parameter :: block_size = 65536     !! bytes read at once
@@ -29,8 +29,17 @@ contains
     integer(int8), intent(in) :: bytes(:)
     character(len=8) :: text
 
-    write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
+    write (text, "(z8.8)") crc_of(bytes, 0_int64)
   end function checksum
+
+  !> The checksum as a number, of some bytes after others.
+  pure function crc_of(bytes, before) result(crc)
+    integer(int8), intent(in) :: bytes(:)
+    integer(int64), intent(in) :: before               !! of the bytes before; 0 if there are none
+    integer(int64) :: crc
+
+    crc = crc32(int(before, c_long), bytes, size(bytes, kind=c_int))
+  end function crc_of
 
   !> Writes the first line of a file, over bytes left free for it, and reads all back: only this reveals a full disk.
   subroutine seal(path, title, done)

@@ -226,7 +226,8 @@ contains
       "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
       "                      the last one for a variable counts, an empty VALUE"//eol// &
       "                      restores the default"//eol// &
-      "  --resume            continue from the checkpoint of a stopped run"//eol// &
+      "  --resume            continue a stopped run; with a stop rule that is not met"//eol// &
+      "                      yet, also one that has finished"//eol// &
       "  --check             read and check everything, run nothing"//eol// &
       "  --force             start over: delete FILE.part and the checkpoints of a run"//eol// &
       "                      that did not finish; at the end, replace a finished FILE"//eol// &

@@ -4,7 +4,7 @@ module checkpoint_checks
   use cadence, only: cadence_t
   use event_driven, only: events_per_epoch
   use kinds, only: int32, int64, real64
-  use output, only: progress_t
+  use progress, only: progress_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use texts, only: written
@@ -151,7 +151,7 @@ contains
       flaw = "progress/events is "//written(progress%events)//" instead of "//written(events)
   end function flaw_of_progress
 
-  !> The last sample lies in the past, but not so far that another one would have been due.
+  !> The last sample lies in the past, and the next ones can be counted. It may have been due by another cadence.
   pure function flaw_of_cadence(cadence, name, sim) result(flaw)
     type(cadence_t), intent(in) :: cadence
     character(len=*), intent(in) :: name
@@ -160,7 +160,6 @@ contains
 
     flaw = ""
     if (cadence%last_time > sim%time() .or. cadence%last_events > sim%events .or. &
-      sim%time() > cadence%last_time + (1 + rounding)*cadence%every_time + spacing(4*sim%time()) .or. &
       sim%time() > countable*cadence%every_time) flaw = "progress/"//name//": the last sample is of time " &
       //written(cadence%last_time)//" and event "//written(cadence%last_events)//", the state of time " &
       //written(sim%time())//" and event "//written(sim%events)

@@ -49,7 +49,7 @@ contains
     integer(int64), intent(in) :: capacities(n_tracks)
     integer, intent(in) :: n
     integer(int64) :: bytes
-    integer(int64), parameter :: constants = 24   !! per disk: id, species, mass, radius [bytes]
+    integer(int64), parameter :: constants = 104  !! per disk: id, species, mass, radius, the last state [bytes]
 
     bytes = int(min(9.0e18_real64, &
       constants*n + sum(real(max(capacities, 2_int64), real64)*real(track%room(), real64))), int64)

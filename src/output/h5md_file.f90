@@ -19,8 +19,10 @@ module h5md_file
     type(hdf5_file_t) :: file
     type(track_t) :: track(n_tracks)
   contains
+    procedure :: capacities
     procedure :: make_tracks
     procedure :: resume_tracks
+    procedure :: commit
     procedure :: replace_by
     procedure :: write_buffers
     procedure :: close => close_file
@@ -29,17 +31,29 @@ module h5md_file
 
 contains
 
-  !> Makes room for samples in a new file.
-  subroutine make_tracks(self, capacities)
-    class(h5md_file_t), intent(inout) :: self
-    integer(int64), intent(in) :: capacities(n_tracks)    !! samples; 0: their number is unknown
-    integer(int64) :: capacity
+  !> The capacities to begin with, where those that are planned are known or not.
+  pure function capacities(self, planned)
+    class(h5md_file_t), intent(in) :: self
+    integer(int64), intent(in) :: planned(n_tracks)       !! samples; 0: their number is unknown
+    integer(int64) :: capacities(n_tracks)
     integer :: k
 
+    capacities = planned
     do k = 1, n_tracks
-      capacity = capacities(k)
-      if (capacity == 0) capacity = self%track(k)%first_capacity()
-      call self%track(k)%make(self%file, capacity)
+      if (planned(k) == 0) capacities(k) = self%track(k)%first_capacity()
+    end do
+  end function capacities
+
+  !> Makes room for samples in a new file.
+  subroutine make_tracks(self, planned)
+    class(h5md_file_t), intent(inout) :: self
+    integer(int64), intent(in) :: planned(n_tracks)       !! samples; 0: their number is unknown
+    integer(int64) :: capacities(n_tracks)
+    integer :: k
+
+    capacities = self%capacities(planned)
+    do k = 1, n_tracks
+      call self%track(k)%make(self%file, capacities(k))
     end do
   end subroutine make_tracks
 
@@ -53,8 +67,18 @@ contains
     do k = 1, n_tracks
       call self%track(k)%resume(self%file, counts(k), unwritten(k))
     end do
-    call self%file%flush()
   end subroutine resume_tracks
+
+  !> Tells readers how far the tracks have gone back.
+  subroutine commit(self)
+    class(h5md_file_t), intent(inout) :: self
+    integer :: k
+
+    do k = 1, n_tracks
+      call self%track(k)%commit(self%file)
+    end do
+    call self%file%flush()
+  end subroutine commit
 
   !> Puts a new file, with the same samples and other capacities, in the place of this one. The new file has
   !> all but the tracks.

@@ -2,8 +2,8 @@
 !> OUT.h5.part, and a lock file keeps other runs away; the name OUT.h5 means that the run is finished.
 module output
   use kinds, only: int64, real64
-  use cadence, only: cadence_t
   use errors, only: error_t, exit_files, fail
+  use checkpoint_contents, only: put_final_state
   use disk_room, only: check_room, keep_room, last_room, planned_room
   use event_log, only: event_log_t
   use evolution, only: limits_t
@@ -11,13 +11,12 @@ module output
   use h5md_layout, only: event_counter, frame_counter, sample_counter
   use hdf5_objects, only: hdf5_file_t
   use observables, only: observed
-  use run_description, only: describe_cost, describe_run
+  use progress, only: progress_t
+  use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_start, is_file, lock, remove_checkpoints, remove_temporaries, run_file, &
     unfinished, unfinished_new
   use run_input, only: run_input_t
   use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
-  use settings, only: output_settings_t
-  use sample_track, only: samples_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use signals, only: record_signals
@@ -25,24 +24,9 @@ module output
     seconds, synchronize
   implicit none
   private
-  public :: output_t, planned_bytes, progress_t
+  public :: output_t, planned_bytes
 
-  integer(int64), parameter :: constants = 24            !! per disk: id, species, mass, radius [bytes]
   real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
-
-  !> How far the output has come: with the state, all that is needed to go on.
-  type :: progress_t
-    type(cadence_t) :: frames, observables
-    integer(int64) :: events = 0                  !! collisions written to the event log
-    real(real64) :: spent = 0.0_real64            !! wall time of earlier parts of the run [s]
-    type(samples_t) :: unwritten(n_tracks)        !! counted above, but not in the file
-  contains
-    procedure, private :: counts
-  end type progress_t
-
-  interface progress_t
-    module procedure new_progress
-  end interface progress_t
 
   type :: output_t
     type(progress_t) :: progress
@@ -60,39 +44,20 @@ module output
     procedure :: write_what_is_due
     procedure :: write_events
     procedure :: finish
+    procedure :: break_off
     procedure :: save
     procedure :: release
-    procedure, private :: claim, plan, create_file, append, rebuild, write_frame, write_observables
+    procedure, private :: claim, plan, create_file, append, rebuild, write_end, write_frame, write_observables
   end type output_t
 
 contains
-
-  !> The progress of a run that has written nothing yet.
-  pure function new_progress(settings) result(progress)
-    type(output_settings_t), intent(in) :: settings
-    type(progress_t) :: progress
-
-    associate (s => settings)
-      progress%frames = cadence_t(s%frames_every_time, s%frames_every_collisions, s%frames_every_events)
-      progress%observables = cadence_t(s%observables_every_time, s%observables_every_collisions, &
-        s%observables_every_events)
-    end associate
-  end function new_progress
-
-  !> Number of samples of each track.
-  pure function counts(self)
-    class(progress_t), intent(in) :: self
-    integer(int64) :: counts(n_tracks)
-
-    counts = [self%frames%count, self%observables%count, self%events]
-  end function counts
 
   !> Opens the output of a new run and writes the first samples.
   subroutine open_output(self, path, input, sim, force, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path          !! of the finished file
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: force                  !! replace, at the end, a finished file
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: capacities(n_tracks), kept
@@ -122,30 +87,38 @@ contains
     if (allocated(error)) call self%release()
   end subroutine open_output
 
-  !> Opens the output of a stopped run, goes back to where its checkpoint stands, and writes what waits there.
-  subroutine resume(self, path, input, sim, progress, error)
+  !> Opens the output of a run that goes on, goes back to where its checkpoint stands, and writes what waits there. That
+  !> of a finished run stays as it is until the longer one has finished. The file must describe the input of now.
+  subroutine resume(self, path, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(in) :: progress
+    logical, intent(in) :: finished
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: source
     integer(int64) :: capacities(n_tracks)
     integer :: k
 
-    if (.not. is_file(run_file(path, unfinished))) then
-      call fail(error, exit_files, run_file(path, unfinished)//": is missing: without the samples written so " &
-        //"far the checkpoint is of no use; --force instead of --resume starts over")
-      return
-    end if
-    call self%claim(path, error)
+    source = run_file(path, unfinished)
+    if (finished) source = path
+    if (.not. is_file(source)) call fail(error, exit_files, source//": is missing: without the samples written so " &
+      //"far the checkpoint is of no use; --force instead of --resume starts over")
+    if (.not. allocated(error)) call self%claim(path, error)
     if (allocated(error)) return
     self%progress = progress
     call self%plan(input, sim, capacities)
     call keep_room(self%reserve, last_room(self%h5md%track, capacities, sim%n_disks()), path, error)
     if (.not. allocated(error)) then
-      call self%h5md%file%open(run_file(path, unfinished), writable=.true.)
+      if (finished) call remove_checkpoints(path)
+      call self%h5md%file%open(source, writable=.not. finished)
       call self%h5md%resume_tracks(progress%counts(), progress%unwritten)
+      if (.not. describes(self%h5md%file, input) .or. finished) then
+        call self%rebuild(max(self%h5md%capacities(capacities), progress%counts()), sim)
+      else
+        call self%h5md%commit()
+      end if
       do k = 1, n_tracks
         if (progress%unwritten(k)%count() > 0) call self%append(k, progress%unwritten(k)%values, sim)
       end do
@@ -218,10 +191,11 @@ contains
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
 
     call file%create(run_file(self%path, unfinished_new), final_path=run_file(self%path, unfinished))
     call describe_run(file, self%input, sim)
+    call put_final_state(file, self%input%groups, sim, self%progress, finished=.false.)
   end subroutine create_file
 
   !> Lowers the limits so that the simulation pauses at the next sample.
@@ -236,7 +210,7 @@ contains
   !> Writes the samples that are due; to be called whenever the simulation pauses.
   subroutine write_what_is_due(self, sim, error)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
     logical :: due(2)
 
@@ -252,7 +226,7 @@ contains
   !> Writes one frame.
   subroutine write_frame(self, sim)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
 
     call self%append(frame_track, frame_sample(sim, self%progress%frames%count), sim)
     call self%progress%frames%take(sim)
@@ -261,7 +235,7 @@ contains
   !> Writes one sample of the observables.
   subroutine write_observables(self, sim)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
 
     call self%append(observable_track, observable_sample(sim, self%progress%observables%count), sim)
     call self%progress%observables%take(sim)
@@ -270,7 +244,7 @@ contains
   !> Takes over the collisions that the log holds, and empties it; `write_what_is_due` tells of a failure.
   subroutine write_events(self, sim, log)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     type(event_log_t), intent(inout) :: log
 
     if (log%n == 0) return
@@ -284,7 +258,7 @@ contains
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
     real(real64), intent(in) :: samples(:, :)     !! (width,count)
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     integer(int64) :: capacities(n_tracks)
 
     capacities = self%h5md%track%capacity
@@ -297,7 +271,7 @@ contains
   subroutine rebuild(self, capacities, sim)
     class(output_t), intent(inout) :: self
     integer(int64), intent(in) :: capacities(n_tracks)
-    type(simulation_t), intent(in) :: sim
+    type(simulation_t), intent(inout) :: sim
     type(h5md_file_t) :: new
     integer(int64) :: needed
 
@@ -337,13 +311,13 @@ contains
     end do
   end subroutine save
 
-  !> Ends the output of a finished run: the last samples, unused room given up, a check of the file, its final
-  !> name. If that fails, a checkpoint written afterwards leads back to the moment before.
-  subroutine finish(self, sim, wall_seconds, rate, error)
+  !> Ends the output of a finished run: a check of the file, its final name. If that fails, a checkpoint written
+  !> afterwards leads back to the moment before.
+  subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: wall_seconds      !! since the start or the last resume [s]
-    real(real64), intent(in) :: rate              !! collisions per processor time since then [1/s]
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: cost(2)           !! see `write_end`
+    character(len=*), intent(in) :: note          !! why it ended if no stop rule was met
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: part
     type(progress_t) :: before
@@ -351,14 +325,9 @@ contains
 
     before = self%progress
     part = run_file(self%path, unfinished)
-    if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
-    if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
-    call self%h5md%write_buffers()
+    call self%write_end(sim, cost, note, finished=.true.)
     call self%h5md%file%report(error)
     if (.not. allocated(error)) then
-      call self%reserve%give_up()          ! for the copy; if that fails its room is free for a checkpoint
-      if (any(self%h5md%track%appended /= self%h5md%track%capacity)) call self%rebuild(self%h5md%track%appended, sim)
-      call describe_cost(self%h5md%file, self%progress%spent + wall_seconds, rate)
       call self%h5md%close()
       call self%h5md%file%report(error)
     end if
@@ -379,6 +348,41 @@ contains
       call self%release()
     end if
   end subroutine finish
+
+  !> Writes the last samples, gives up unused room, and says how the run ended. A finished run gets a checkpoint that goes
+  !> on before the last samples: in a longer run they might not be due.
+  subroutine write_end(self, sim, cost, note, finished)
+    class(output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: cost(2)           !! since the start or the last resume: wall time [s], collisions per
+    !! processor time [1/s]
+    character(len=*), intent(in) :: note          !! why the run ended if no stop rule was met
+    logical, intent(in) :: finished
+    type(progress_t) :: before
+
+    before = self%progress
+    before%spent = before%spent + cost(1)
+    if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
+    if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
+    call self%h5md%write_buffers()
+    if (allocated(self%h5md%file%failure)) return
+    call self%reserve%give_up()            ! for the copy; if that fails its room is free for a checkpoint
+    if (any(self%h5md%track%appended /= self%h5md%track%capacity)) call self%rebuild(self%h5md%track%appended, sim)
+    call put_final_state(self%h5md%file, self%input%groups, sim, before, finished)
+    call describe_end(self%h5md%file, before%spent, cost(2), note)
+  end subroutine write_end
+
+  !> Leaves the output of a run that broke off under the name of an unfinished one, with its last state.
+  subroutine break_off(self, sim, cost, note)
+    class(output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: cost(2)           !! see `write_end`
+    character(len=*), intent(in) :: note          !! why
+    type(error_t), allocatable :: uncountable
+
+    call check_counts(sim, uncountable)
+    if (.not. allocated(uncountable)) call self%write_end(sim, cost, note, finished=.false.)
+  end subroutine break_off
 
   !> Closes the files, finished or not, and removes the lock.
   subroutine release(self)

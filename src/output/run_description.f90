@@ -16,9 +16,10 @@ module run_description
   use version, only: program_version
   implicit none
   private
-  public :: describe_run, describe_cost
+  public :: describe_end, describe_run, describes
 
   integer, parameter :: longest_attribute = 1000      !! values; HDF5 has no room for more than 64 kB
+  integer, parameter :: longest_note = 500            !! letters kept for why the run ended
 
 contains
 
@@ -41,7 +42,7 @@ contains
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
     call describe_origin(file)
-    call describe_cost(file, 0.0_real64, 0.0_real64)
+    call describe_end(file, 0.0_real64, 0.0_real64, "")
   end subroutine describe_run
 
   !> Format, author and creator, as H5MD requires.
@@ -103,7 +104,7 @@ contains
   subroutine describe_input(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
-    character(len=:), allocatable :: group, list
+    character(len=:), allocatable :: group
     integer :: g, k
 
     do g = 1, size(input%groups)
@@ -118,12 +119,32 @@ contains
       end associate
     end do
     call file%put(parameters_group//"input", input%text)
-    list = ""
-    do k = 1, size(input%overrides)
-      list = list//input%overrides(k)%text//new_line("a")
-    end do
-    call file%put(parameters_group//"overrides", list)
+    call file%put(parameters_group//"overrides", overrides_text(input))
   end subroutine describe_input
+
+  !> What the command line has changed, one variable to a line.
+  pure function overrides_text(input) result(text)
+    type(run_input_t), intent(in) :: input
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(input%overrides)
+      text = text//input%overrides(k)%text//new_line("a")
+    end do
+  end function overrides_text
+
+  !> Whether a file describes this input.
+  function describes(file, input) result(yes)
+    type(hdf5_file_t), intent(inout) :: file
+    type(run_input_t), intent(in) :: input
+    logical :: yes
+    character(len=:), allocatable :: text, overrides
+
+    call file%fetch_text(parameters_group//"input", text)
+    call file%fetch_text(parameters_group//"overrides", overrides)
+    yes = text == input%text .and. overrides == overrides_text(input)
+  end function describes
 
   !> One variable; nothing if it has no value.
   subroutine describe_value(file, group, value)
@@ -233,13 +254,17 @@ contains
   end subroutine describe_origin
 
   !> Writes, or overwrites, what is known only at the end.
-  subroutine describe_cost(file, wall_seconds, rate)
+  subroutine describe_end(file, wall_seconds, rate, note)
     type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
     real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
+    character(len=*), intent(in) :: note              !! why it ended if no stop rule was met
+    character(len=longest_note) :: padded
 
+    padded = note
     call file%put(provenance//"@wall_time", scalar, [wall_seconds])
     call file%put(provenance//"@collisions_per_second", scalar, [rate])
-  end subroutine describe_cost
+    call file%put(provenance//"@note", padded)
+  end subroutine describe_end
 
 end module run_description

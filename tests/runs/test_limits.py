@@ -159,15 +159,15 @@ def test_the_memory_of_a_run_does_not_grow(program, tmp_path):
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
-    """Two frames: positions, velocities and a count, 40 bytes, and 24 bytes that are written once."""  # noqa: E501
+    """Two frames: positions, velocities and a count, 40 bytes, and once 24 bytes and a state of 80."""  # noqa: E501
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
-    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 104 MB\n"
+    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 184 MB\n"
     assert run.stderr == ""
     many = ["--set", "output.frames_every_collisions=50000", "--set", "stop.collisions=500000"]
     run = ricochet("gas.nml", *grid, *many, "--set", "stop.wall_clock=1e-9")
-    assert run.stderr.splitlines()[0] == "note: the output needs at least 464 MB"
+    assert run.stderr.splitlines()[0] == "note: the output needs at least 544 MB"
 
 
 @pytest.mark.parametrize(

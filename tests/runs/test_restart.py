@@ -178,7 +178,7 @@ def test_how_a_run_is_done_may_change_when_it_goes_on(ricochet, tmp_path, stoppe
         ("run.seed=8", "run.seed = 8"),
         ("species.heavy.mass=3", "species.heavy.mass = 3"),
         ("contact.contact_time=0.002", "contact.contact_time = 0.002"),
-        ("stop.time=1001", "stop.time = 1001"),
+        ("contact.restitution=0.9", "contact.restitution = 0.9"),
         ("output.event_log=.false.", "output.event_log = .false."),
     ],
 )

@@ -1,0 +1,265 @@
+!> What a checkpoint holds: who wrote it, for which input, all that changes in a simulation, and how far its output has
+!> come. It is written to a file of its own, and into the output of a finished run.
+module checkpoint_contents
+  use, intrinsic :: iso_fortran_env, only: int8
+  use kinds, only: int32, int64, never, real64
+  use build_info, only: build_flags
+  use cadence, only: cadence_t
+  use component_file, only: component_file_t
+  use errors, only: error_t, exit_usage, fail
+  use h5md_layout, only: checkpoint_group, provenance
+  use hdf5_objects, only: hdf5_file_t, scalar
+  use parameter_values, only: parameter_group_t, values_text
+  use partners, only: obstacle_code
+  use progress, only: progress_t
+  use sample_track, only: samples_t
+  use sealed_file, only: checksum
+  use simulation_state, only: simulation_t
+  use texts, only: legible, written
+  use version, only: program_version
+  implicit none
+  private
+  public :: check_origin, exchange_contents, exchange_final_state, put_final_state, put_origin
+
+  character(len=*), parameter :: eol = new_line("a")
+
+  !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
+  !> is written. They have no effect on the trajectory.
+  character(len=*), parameter :: free_to_change(*) = [character(len=25) :: "run.title", "run.search", "run.queue", &
+    "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
+
+  ! Ranges of what is read
+  real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
+  real(real64), parameter :: most = 1.0e300_real64          !! of sums: two of them do not overflow
+  real(real64), parameter :: times(2) = [0.0_real64, longest], clocks(2) = [-longest, longest]
+  real(real64), parameter :: sums(2) = [-most, most], not_negative(2) = [0.0_real64, most]
+  real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
+  real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
+  integer(int64), parameter :: counts(2) = [0_int64, 2_int64**53]   !! exact also as reals
+
+contains
+
+  !> The program, with what makes two builds give different bits: the version, and arithmetic that is not exact.
+  pure function program() result(text)
+    character(len=:), allocatable :: text
+
+    text = "ricochet "//program_version
+    if (index(build_flags, "-ffp-contract=off") == 0) text = text//", contracted arithmetic"
+    if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
+  end function program
+
+  !> The input as it was used, without what is free to change: one variable to a line.
+  pure function fixed_input(groups) result(text)
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: text, all
+    integer :: k, g, first, last, length
+
+    all = values_text(groups)
+    text = all
+    length = 0
+    first = 1
+    do while (first <= len(all))
+      last = first + index(all(first:), eol) - 1
+      if (.not. is_free(all(first:last))) then
+        text(length + 1:length + last - first + 1) = all(first:last)
+        length = length + last - first + 1
+      end if
+      first = last + 1
+    end do
+    text = text(:length)
+    do g = 1, size(groups)
+      do k = 1, size(groups(g)%values)
+        if (.not. allocated(groups(g)%values(k)%reals)) cycle
+        if (size(groups(g)%values(k)%reals) <= 100) cycle      ! in the text with all digits
+        text = text//"checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
+          //trim(groups(g)%values(k)%name)//" = " &
+          //checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol
+      end do
+    end do
+  end function fixed_input
+
+  !> Whether a line `variable = value` is of a variable that may change.
+  pure function is_free(line) result(yes)
+    character(len=*), intent(in) :: line
+    logical :: yes
+    integer :: k
+
+    yes = .false.
+    do k = 1, size(free_to_change)
+      yes = yes .or. index(line, trim(free_to_change(k))) == 1
+    end do
+  end function is_free
+
+  !> Writes what `check_origin` will compare.
+  subroutine put_origin(file, groups)
+    type(component_file_t), intent(inout) :: file
+    type(parameter_group_t), intent(in) :: groups(:)
+
+    call file%hdf5%put(file%name_of("program"), program())
+    call file%hdf5%put(file%name_of("input"), fixed_input(groups))
+  end subroutine put_origin
+
+  !> Refuses the checkpoint of another program or another input.
+  subroutine check_origin(file, groups, error)
+    type(component_file_t), intent(inout) :: file
+    type(parameter_group_t), intent(in) :: groups(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: there, here, variable
+
+    call file%hdf5%fetch_text(file%name_of("program"), there)
+    if (there /= program() .and. .not. allocated(file%hdf5%failure)) then
+      call fail(error, exit_usage, file%hdf5%path//": was written by "//legible(there)//", this is "//program())
+      return
+    end if
+    call file%hdf5%fetch_text(file%name_of("input"), there)
+    if (allocated(file%hdf5%failure)) return
+    there = there//eol
+    here = fixed_input(groups)
+    do while (there /= "" .or. here /= "")
+      variable = legible(there(:index(there//eol, eol) - 1))
+      if (here(:index(here//eol, eol) - 1) /= variable) then
+        call fail(error, exit_usage, file%hdf5%path//": belongs to another input: there " &
+          //variable//", here "//here(:index(here//eol, eol) - 1))
+        return
+      end if
+      there = there(min(index(there//eol, eol), len(there)) + 1:)
+      here = here(min(index(here//eol, eol), len(here)) + 1:)
+    end do
+  end subroutine check_origin
+
+  !> Writes or reads all of a checkpoint in a file of its own. When read the simulation must know its box and species.
+  subroutine exchange_contents(file, sim, progress)
+    type(component_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim
+    type(progress_t), intent(inout) :: progress
+    integer :: k
+
+    call exchange_state(file, sim)
+    call exchange_progress(file, progress)
+    call file%exchange("progress/spent", progress%spent, not_negative)
+    do k = 1, size(progress%unwritten)
+      call exchange_samples(file, "unwritten/"//written(k), progress%unwritten(k))
+    end do
+  end subroutine exchange_contents
+
+  !> Writes or reads the checkpoint in the output of a finished run. It depends on the input alone: the time that the run
+  !> took is not in it. A checksum of 0 says that the run has not finished.
+  subroutine exchange_final_state(file, sim, progress, finished)
+    type(component_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim
+    type(progress_t), intent(inout) :: progress
+    logical, intent(in) :: finished
+    integer(int64) :: sum_there(1)
+
+    file%group = checkpoint_group
+    call exchange_state(file, sim)
+    call exchange_progress(file, progress)
+    sum_there = merge(file%crc, 0_int64, finished)
+    if (file%writing) call file%hdf5%put(file%name_of("checksum"), scalar, sum_there)
+    if (.not. file%writing) call file%hdf5%fetch(file%name_of("checksum"), 1, sum_there)
+    if (sum_there(1) /= file%crc .and. .not. (file%writing .or. allocated(file%flaw))) &
+      file%flaw = "the checksum of its last state is wrong"
+    if (.not. file%writing) call file%hdf5%fetch_attribute(provenance//"@wall_time", progress%spent)
+  end subroutine exchange_final_state
+
+  !> Writes it into a file that has it already, or not yet.
+  subroutine put_final_state(output, groups, sim, progress, finished)
+    type(hdf5_file_t), intent(inout) :: output
+    type(parameter_group_t), intent(in) :: groups(:)
+    type(simulation_t), intent(inout) :: sim        !! stays as it is
+    type(progress_t), intent(in) :: progress
+    logical, intent(in) :: finished
+    type(component_file_t) :: file
+    type(progress_t) :: written
+
+    file%hdf5 = output
+    file%writing = .true.
+    file%group = checkpoint_group
+    call put_origin(file, groups)
+    written = progress
+    call exchange_final_state(file, sim, written, finished)
+    output = file%hdf5
+  end subroutine put_final_state
+
+  !> Writes or reads what changes in a simulation. When read it must know its box and species.
+  subroutine exchange_state(file, sim)
+    type(component_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim
+    integer(int64) :: n
+
+    call file%exchange("epoch", sim%epoch, times)
+    call file%exchange("now", sim%now, times)
+    call file%exchange("next_epoch", sim%next_epoch, counts)
+    call file%exchange("events", sim%events, counts)
+    call file%exchange("collisions", sim%collisions, counts)
+    call file%exchange("wall_collisions", sim%wall_collisions, counts)
+    call file%exchange("obstacle_collisions", sim%obstacle_collisions, counts)
+    call file%exchange("wall_impulse", sim%wall_impulse, sums)
+    call file%exchange("virial", sim%virial, sums)
+    call file%exchange("dissipated", sim%dissipated, sums)
+    call file%exchange("start_energy", sim%start_energy, not_negative)
+    n = sum(int(sim%species%count, int64))
+    if (.not. allocated(sim%disk)) then
+      allocate (sim%disk(n), sim%tag(n))
+      allocate (sim%image(2, n), source=0_int64)
+    end if
+    call file%exchange("disks/x1", sim%disk%x(1), places)
+    call file%exchange("disks/x2", sim%disk%x(2), places)
+    call file%exchange("disks/v1", sim%disk%v(1), speeds)
+    call file%exchange("disks/v2", sim%disk%v(2), speeds)
+    call file%exchange("disks/clock", sim%disk%clock, clocks)
+    call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
+    call file%exchange("disks/id", sim%tag%id, [1_int64, n])
+    call file%exchange("disks/collisions", sim%tag%collisions, counts)
+    call file%exchange("disks/stamp", sim%disk%stamp, [-huge(0_int32) - 1_int64, int(huge(0_int32), int64)])
+    call file%exchange("disks/obstacle", sim%tag%obstacle, [int(obstacle_code(sim%box%n_obstacles()), int64), 0_int64])
+    call file%exchange("disks/image1", sim%image(1, :), [-counts(2), counts(2)])
+    call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
+  end subroutine exchange_state
+
+  !> Writes or reads how far the output has come.
+  subroutine exchange_progress(file, progress)
+    type(component_file_t), intent(inout) :: file
+    type(progress_t), intent(inout) :: progress
+
+    call exchange_cadence(file, "frames", progress%frames)
+    call exchange_cadence(file, "observables", progress%observables)
+    call file%exchange("progress/events", progress%events, counts)
+  end subroutine exchange_progress
+
+  !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
+  !> follows from them.
+  subroutine exchange_cadence(file, name, cadence)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(cadence_t), intent(inout) :: cadence
+
+    call file%exchange("progress/"//name//"/count", cadence%count, [1_int64, counts(2)])
+    call file%exchange("progress/"//name//"/last_events", cadence%last_events, counts)
+    call file%exchange("progress/"//name//"/last_time", cadence%last_time, times)
+  end subroutine exchange_cadence
+
+  !> Writes or reads samples, often none.
+  subroutine exchange_samples(file, name, samples)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(samples_t), intent(inout) :: samples
+    real(real64), allocatable :: values(:)
+    integer(int64) :: extent(2)
+    integer :: status
+
+    if (file%writing) then
+      if (samples%count() > 0) call file%hdf5%put(name, shape(samples%values), [samples%values])
+    else if (size(file%hdf5%extents(name)) == 2) then
+      extent = file%hdf5%extents(name)
+      status = -1
+      if (minval(extent) > 0 .and. product(real(extent, real64)) < huge(0)) &
+        allocate (values(product(extent)), stat=status)
+      call file%hdf5%check(-abs(status), "be read: "//name)
+      if (status /= 0) return
+      call file%exchange(name, values, sums)
+      samples%values = reshape(values, extent)
+    end if
+  end subroutine exchange_samples
+
+end module checkpoint_contents
