@@ -50,6 +50,7 @@ contains
     if (allocated(self%x)) deallocate (self%x, self%outside)
     allocate (self%x(2, sim%n_disks()), self%outside(sim%n_disks()))
     call self%near%start()
+    call sim%start_sums()
     self%idle = .false.
   end subroutine start
 

@@ -12,10 +12,11 @@ module checkpoint
   use component_file, only: component_file_t
   use disk_room, only: checkpoint_room
   use errors, only: error_t, exit_files, exit_usage, fail
+  use exact_sums, only: exact_sum_t
   use hdf5_objects, only: hdf5_file_t
   use output, only: output_t, progress_t
   use parameter_values, only: parameter_group_t, values_text
-  use partners, only: obstacle_code
+  use partners, only: n_sides, obstacle_code, side_name
   use run_files, only: check_places, current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
   use run_input, only: run_input_t
   use sample_track, only: samples_t
@@ -232,17 +233,25 @@ contains
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: n
+    integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
     call file%exchange("now", sim%now, times)
-    call file%exchange("next_epoch", sim%next_epoch, counts)
+    call file%exchange("epoch_begin", sim%epoch_begin, times)
+    call file%exchange("epoch_end", sim%epoch_end, [0.0_real64, never])
+    call file%exchange("epoch_events", sim%epoch_events, counts)
+    call file%exchange("blink", sim%blink, not_negative)
+    call file%exchange("last_check", sim%last_check, times)
+    call file%exchange("next_check", sim%next_check, counts)
     call file%exchange("events", sim%events, counts)
     call file%exchange("collisions", sim%collisions, counts)
     call file%exchange("wall_collisions", sim%wall_collisions, counts)
     call file%exchange("obstacle_collisions", sim%obstacle_collisions, counts)
-    call file%exchange("wall_impulse", sim%wall_impulse, sums)
-    call file%exchange("virial", sim%virial, sums)
-    call file%exchange("dissipated", sim%dissipated, sums)
+    do k = 1, n_sides
+      call exchange_sum(file, "wall_impulse_"//trim(side_name(k)), sim%wall_impulse(k))
+    end do
+    call exchange_sum(file, "virial", sim%virial)
+    call exchange_sum(file, "dissipated", sim%dissipated)
     call file%exchange("start_energy", sim%start_energy, not_negative)
     n = sum(int(sim%species%count, int64))
     if (.not. allocated(sim%disk)) then
@@ -257,11 +266,23 @@ contains
     call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
     call file%exchange("disks/id", sim%tag%id, [1_int64, n])
     call file%exchange("disks/collisions", sim%tag%collisions, counts)
-    call file%exchange("disks/stamp", sim%disk%stamp, [-huge(0_int32) - 1_int64, int(huge(0_int32), int64)])
-    call file%exchange("disks/obstacle", sim%tag%obstacle, [int(obstacle_code(sim%box%n_obstacles()), int64), 0_int64])
+    call file%exchange("disks/met", sim%tag%met, [int(obstacle_code(sim%box%n_obstacles()), int64), n])
     call file%exchange("disks/image1", sim%image(1, :), [-counts(2), counts(2)])
     call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
   end subroutine exchange_state
+
+  !> Writes or reads a sum: the two halves of a whole number of units.
+  subroutine exchange_sum(file, name, sum)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(exact_sum_t), intent(inout) :: sum
+    integer(int64) :: halves(2)
+
+    halves = transfer(sum%units, halves)
+    call file%exchange(name//"/units", halves, [-huge(1_int64) - 1, huge(1_int64)])
+    sum%units = transfer(halves, sum%units)
+    call file%exchange(name//"/units_per_one", sum%per_one, not_negative)
+  end subroutine exchange_sum
 
   !> Writes or reads how far the output has come.
   subroutine exchange_progress(file, progress)
