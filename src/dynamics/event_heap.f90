@@ -2,10 +2,10 @@
 !> earliest first, ties in a fixed order that does not depend on which disk expects the event or how it was filed.
 module event_heap
   use kinds, only: int32, real64
-  use disks, only: tag_t
+  use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: event_t, event_heap_t, need_order, precedes
+  public :: event_t, event_heap_t, event_of, need_order, precedes
 
   integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
 
@@ -28,6 +28,15 @@ module event_heap
   end type event_heap_t
 
 contains
+
+  !> The event of disk i.
+  pure function event_of(disk, i) result(event)
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32), intent(in) :: i
+    type(event_t) :: event
+
+    event = event_t(disk(i)%event_time, i, disk(i)%partner)
+  end function event_of
 
   !> Order of events: by time, then by the lower and the higher id of the disks concerned. Both disks of a pair may expect the same
   !> collision; its place does not depend on which of them does. The twin of this rule for candidates of one disk is

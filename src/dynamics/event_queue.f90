@@ -8,7 +8,7 @@ module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
   use disks, only: disk_t, tag_t
-  use event_heap, only: event_heap_t, event_t, need_order, precedes
+  use event_heap, only: event_heap_t, event_of, event_t, need_order, precedes
   implicit none
   private
   public :: event_queue_t
@@ -277,15 +277,6 @@ contains
     n = 0
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
-
-  !> The event of disk i.
-  pure function event_of(disk, i) result(event)
-    type(disk_t), intent(in) :: disk(*)
-    integer(int32), intent(in) :: i
-    type(event_t) :: event
-
-    event = event_t(disk(i)%event_time, i, disk(i)%partner)
-  end function event_of
 
   !> Whether an entry is still what its disk expects.
   pure function expected(disk, event) result(yes)
