@@ -7,13 +7,14 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: begin_first_epoch, last_time, move_epoch, put_check_off
+  public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
 
   !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 20
   integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
-  !> Events between two checks for a collapse: at least these, and these per disk.
-  integer(int64), parameter :: events_per_check = 2000, events_per_check_and_disk = 20
+  !> Events of a collapse: at least these, and these per disk.
+  integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
+  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! epoch, in blinks
   real(real64), parameter :: last_time = 0.5_real64*never
   real(real64), parameter :: densest = 0.9_real64  !! packing fraction
 
@@ -36,7 +37,8 @@ contains
     end do
     sim%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
     call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path(sim)))
-    call put_check_off(sim)
+    sim%last_advance = sim%now
+    sim%events_then = sim%events
   end subroutine begin_first_epoch
 
   !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
@@ -65,19 +67,22 @@ contains
     real(real64), intent(in) :: length             !! [time]
 
     sim%epoch_begin = sim%now
-    sim%epoch_end = min(sim%now + max(length, sim%blink), last_time)
+    sim%epoch_end = min(sim%now + max(length, shortest*sim%blink), last_time)
     sim%epoch_events = sim%events
   end subroutine begin_epoch
 
-  !> At the end of an epoch, moves the origin of time to about now, so that times stay small and keep their digits. As
+  !> Ends the epoch now: moves the origin of time to about now, so that times stay small and keep their digits. As
   !> everything must be predicted again then, it also sorts the disks by cell. The next epoch ends at a time, not after a
   !> number of events, so that parts of a simulation that know nothing of each other agree on it.
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
 
-    sim%now = max(sim%now, sim%epoch_end)
-    length = (sim%epoch_end - sim%epoch_begin)*min(2.0_real64, &
+    if (sim%now - sim%last_advance >= sim%blink) then
+      sim%last_advance = sim%now
+      sim%events_then = sim%events
+    end if
+    length = (sim%now - sim%epoch_begin)*min(2.0_real64, &
       events_per_epoch(sim)/real(max(sim%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
@@ -85,24 +90,25 @@ contains
     sim%disk%stamp = 0
     sim%now = sim%now - shift
     sim%epoch = sim%epoch + shift
+    sim%last_advance = sim%last_advance - shift
     call begin_epoch(sim, length)
-    call put_check_off(sim)
   end subroutine move_epoch
 
-  !> Looks for a collapse only if many events follow: an epoch of the usual length ends before.
-  pure subroutine put_check_off(sim)
-    type(simulation_t), intent(inout) :: sim
-
-    sim%next_check = sim%events + check_interval(sim)
-    sim%last_check = sim%now
-  end subroutine put_check_off
-
-  !> Events of any kind between two checks for a collapse.
-  pure function check_interval(sim) result(n)
+  !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
+  pure function most_events(sim) result(n)
     type(simulation_t), intent(in) :: sim
     integer(int64) :: n
 
-    n = max(events_per_check, events_per_check_and_disk*sim%n_disks())
-  end function check_interval
+    n = sim%epoch_events + 2*events_per_epoch(sim)
+  end function most_events
+
+  !> Whether a long series of events has not advanced the clock, as in a collapse; asked at the end of an epoch.
+  pure function stands_still(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%now - sim%last_advance < sim%blink &
+      .and. sim%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
+  end function stands_still
 
 end module epochs

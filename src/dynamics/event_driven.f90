@@ -7,7 +7,7 @@ module event_driven
   use kinds, only: int32, int64, real64
   use calendar, only: most_coming, stages
   use encounters, only: collide, collide_pair, encounter_text, hit_each_other_last, pass_side, passes
-  use epochs, only: begin_first_epoch, last_time, move_epoch, put_check_off
+  use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
   use event_queue, only: event_queue_t
@@ -20,7 +20,7 @@ module event_driven
   private
   public :: event_driven_t
 
-  integer(int64), parameter :: most_events = 20000  !! between two looks at the number of pair collisions
+  integer(int64), parameter :: events_to_look = 20000  !! between two looks at the number of pair collisions
   integer(int32), parameter :: disks_in_cache = 20000    !! more do not fit into a second-level cache: prefetch
   integer(int64), parameter :: events_ahead = 8    !! after which to prefetch again
 
@@ -92,13 +92,18 @@ contains
           if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
           return
         end if
-        call move_epoch(sim)
-        call rebuild(self, sim)
-        if (limits%epochs) return
-      else if (sim%events >= sim%next_check) then
-        call check_for_collapse(sim, event, error)
-        if (allocated(error)) return
+        sim%now = max(sim%now, sim%epoch_end)
+      else if (sim%events < most_events(sim)) then
+        cycle
       end if
+      if (stands_still(sim)) then
+        call fail(error, exit_broken, "inelastic collapse, time no longer advances: " &
+          //encounter_text(sim, event%disk, event%partner)//remedy(sim, event%disk, event%partner))
+        return
+      end if
+      call move_epoch(sim)
+      call rebuild(self, sim)
+      if (limits%epochs) return
     end do
   end subroutine advance
 
@@ -135,8 +140,8 @@ contains
     type(limits_t), intent(in) :: limits
     integer(int64) :: events
 
-    events = min(sim%next_check, limits%events, &
-      sim%events + min(limits%collisions - sim%collisions, most_events))
+    events = min(most_events(sim), limits%events, &
+      sim%events + min(limits%collisions - sim%collisions, events_to_look))
     if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on() .or. self%search%everyone) &
       events = sim%events + 1
   end function next_pause
@@ -207,18 +212,6 @@ contains
       call predict(self, sim, i)
     end do
   end subroutine predict_all
-
-  !> Ends the run if a long series of events has not advanced the clock. The message names the last of them.
-  subroutine check_for_collapse(sim, event, error)
-    type(simulation_t), intent(inout) :: sim
-    type(event_t), intent(in) :: event
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (sim%now - sim%last_check < sim%blink) call fail(error, exit_broken, &
-      "inelastic collapse, time no longer advances: "//encounter_text(sim, event%disk, event%partner) &
-      //remedy(sim, event%disk, event%partner))
-    call put_check_off(sim)
-  end subroutine check_for_collapse
 
   !> What helps against the collapse of disk i with its partner, as far as it has not been done.
   pure function remedy(sim, i, code) result(text)

@@ -38,7 +38,7 @@ contains
     event = event_t(disk(i)%event_time, i, disk(i)%partner)
   end function event_of
 
-  !> Order of events: by time, then by the lower and the higher id of the disks concerned. Both disks of a pair may expect the same
+  !> Order of events: by time, then by the lower and the higher id of the disks concerned. Both disks of a pair may expect the
   !> collision; its place does not depend on which of them does. The twin of this rule for candidates of one disk is
   !> `neighbour_search: before`; change both or none.
   pure function precedes(a, b, tag) result(yes)

@@ -75,8 +75,10 @@ contains
         flaw = "epoch_events is "//written(sim%epoch_events)//" after "//written(sim%events)//" events"
       else if (sim%epoch_end <= sim%epoch_begin .and. max(sim%epoch_begin, sim%epoch_end, sim%blink) > 0) then
         flaw = "epoch_begin is "//written(sim%epoch_begin)//", epoch_end "//written(sim%epoch_end)
-      else if (sim%last_check > sim%now) then
-        flaw = "last_check is "//written(sim%last_check)//", now "//written(sim%now)
+      else if (sim%last_advance > sim%now) then
+        flaw = "last_advance is "//written(sim%last_advance)//", now "//written(sim%now)
+      else if (sim%events_then > sim%events) then
+        flaw = "events_then is "//written(sim%events_then)//" after "//written(sim%events)//" events"
       end if
     end associate
   end function flaw_of_counts

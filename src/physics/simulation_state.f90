@@ -28,8 +28,8 @@ module simulation_state
     integer(int64) :: epoch_events = 0            !! `events` at the beginning of the epoch
     ! A collapse is an endless series of events during which time does not advance.
     real(real64) :: blink = 0.0_real64            !! in which nothing moves visibly; 0: not known yet [time]
-    real(real64) :: last_check = 0.0_real64       !! when a collapse was last looked for, since the epoch [time]
-    integer(int64) :: next_check = 0              !! number of events at which to look again
+    real(real64) :: last_advance = 0.0_real64     !! when time had last advanced by more than that, since the epoch [time]
+    integer(int64) :: events_then = 0             !! `events` at that time
     ! Counts and sums since the start of the run
     integer(int64) :: events = 0                  !! collisions of any kind
     integer(int64) :: collisions = 0              !! of pairs

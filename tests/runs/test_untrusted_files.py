@@ -142,7 +142,7 @@ FRAMES = "progress/frames/"
         (put("epoch_events", 0, 10**15), "epoch_events is 1000000000000000 after "),
         (put("epoch_begin", 0, 1e9), "epoch_begin is 1e9, epoch_end "),
         (put("epoch_end", 0, 0.0), "epoch_begin is "),
-        (put("last_check", 0, 1e9), "last_check is 1e9, now "),
+        (put("last_advance", 0, 1e9), "last_advance is 1e9, now "),
         (put(FRAMES + "count", 0, 0), "progress/frames/count is 0; possible: 1 to "),
         (put(FRAMES + "last_time", 0, np.nan), "progress/frames/last_time is NaN; possible: "),
         (put(FRAMES + "last_time", 0, 1e9), "progress/frames: the last sample is of time 1e9 and"),

@@ -246,12 +246,12 @@ contains
     text = ""
     if (a%events /= b%events) text = "events"
     if (a%collisions /= b%collisions) text = "collisions"
-    if (a%epoch_events /= b%epoch_events .or. a%next_check /= b%next_check) text = "an event that counts"
+    if (a%epoch_events /= b%epoch_events .or. a%events_then /= b%events_then) text = "an event that counts"
     if (any(a%wall_collisions /= b%wall_collisions)) text = "wall collisions"
     if (a%obstacle_collisions /= b%obstacle_collisions) text = "obstacle collisions"
-    if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_check, &
+    if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_advance, &
       a%virial%value(), a%dissipated%value(), a%wall_impulse%value()], &
-      [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_check, &
+      [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, &
       b%virial%value(), b%dissipated%value(), b%wall_impulse%value()]))) text = "a time or a sum"
     do i = 1, a%n_disks()
       if (text /= "") return
