@@ -30,14 +30,13 @@ contains
     if (bound > 0) self%per_one = scale(1.0_real64, min(digits_of_bound - exponent(bound), maxexponent(bound) - 1))
   end subroutine choose_unit
 
-  !> Adds a term, rounded to the nearest unit.
+  !> Adds a term, less what is below a unit.
   elemental subroutine add(self, term)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: term
     real(real64) :: units
 
     units = term*self%per_one
-    units = units + sign(0.5_real64, units)
     if (abs(units) < most_units) then
       self%units = self%units + int(units, int64)
     else

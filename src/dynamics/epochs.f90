@@ -10,7 +10,7 @@ module epochs
   public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
 
   !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
-  integer(int64), parameter :: epoch_length = 20
+  integer(int64), parameter :: epoch_length = 24
   integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
   !> Events of a collapse: at least these, and these per disk.
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20

@@ -6,7 +6,7 @@
 module event_driven
   use kinds, only: int32, int64, real64
   use calendar, only: most_coming, stages
-  use encounters, only: collide, collide_pair, encounter_text, hit_each_other_last, pass_side, passes
+  use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
@@ -169,7 +169,7 @@ contains
 
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        if (self%log%is_on() .or. hit_each_other_last(sim%tag(i), sim%tag(code))) then  ! seldom
+        if (self%log%is_on() .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
           call collide(sim, i, code, t, self%log)
         else
           call collide_pair(sim, i, code, t)

@@ -4,7 +4,7 @@ module encounters
   use kinds, only: int32, real64
   use box_geometry, only: wall_normal
   use collisions, only: pair_impulse, still_in_contact, wall_rebound
-  use disks, only: disk_t, tag_t
+  use disks, only: disk_t
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
@@ -13,7 +13,7 @@ module encounters
   use texts, only: written
   implicit none
   private
-  public :: collide, collide_pair, encounter_text, hit_each_other_last, pass_side, passes
+  public :: collide, collide_pair, encounter_text, pass_side, passes
 
 contains
 
@@ -112,14 +112,6 @@ contains
     if (restitution < 1) call sim%dissipated%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
 
-  !> Whether the last collision of two disks was one and the same.
-  elemental function hit_each_other_last(one, other) result(yes)
-    type(tag_t), intent(in) :: one, other
-    logical :: yes
-
-    yes = one%met == other%id .and. other%met == one%id
-  end function hit_each_other_last
-
   !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
   !> between them: only rounding can have made them approach again.
   pure function are_together(sim, i, j, t) result(yes)
@@ -129,7 +121,7 @@ contains
     logical :: yes
     real(real64) :: then(2), dx(2)
 
-    yes = hit_each_other_last(sim%tag(i), sim%tag(j))
+    yes = sim%tag(i)%met == sim%tag(j)%id .and. sim%tag(j)%met == sim%tag(i)%id
     if (.not. yes) return
     associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity, period => sim%box%periods())
       then = q%x - p%x
