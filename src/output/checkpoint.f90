@@ -279,7 +279,7 @@ contains
     integer(int64) :: halves(2)
 
     halves = transfer(sum%units, halves)
-    call file%exchange(name//"/units", halves, [-huge(1_int64) - 1, huge(1_int64)])
+    call file%exchange(name//"/units", halves, [ibset(0_int64, 63), huge(1_int64)])
     sum%units = transfer(halves, sum%units)
     call file%exchange(name//"/units_per_one", sum%per_one, not_negative)
   end subroutine exchange_sum
