@@ -5,7 +5,7 @@
 !> moment. The file begins with a checksum of all that follows, which is verified before anything is read.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use checkpoint_checks, only: flaw_of_progress, flaw_of_state
