@@ -175,7 +175,6 @@ contains
     call run%line%start(run%sim, run%stop_rule, run%started)
     do while (.not. is_over(run))
       limits = run%stop_rule%limits
-      limits%events = min(limits%events, run%stop_rule%next_check(run%sim))
       limits%turns = turns
       call run%output%tighten(limits)
       call run%evolution%advance(run%sim, limits, error)
@@ -258,7 +257,7 @@ contains
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
         eol//"total_energy = "//written(total_energy(sim))// &
-        eol//"dissipated_energy = "//written(sim%dissipated)// &
+        eol//"dissipated_energy = "//written(sim%dissipated%value())// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
     end associate

@@ -3,7 +3,9 @@ module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
   private
-  public :: int16, int32, int64, real64, never, pi
+  public :: int16, int32, int64, int128, real64, never, pi
+
+  integer, parameter :: int128 = selected_int_kind(38)
 
   !> Later than any event. Finite, so that sums and products with it are finite too.
   real(real64), parameter :: never = 1.0e150_real64

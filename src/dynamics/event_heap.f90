@@ -2,9 +2,10 @@
 !> earliest first, ties in a fixed order that does not depend on which disk expects the event or how it was filed.
 module event_heap
   use kinds, only: int32, real64
+  use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: event_t, event_heap_t, need_order, precedes
+  public :: event_t, event_heap_t, event_of, need_order, precedes
 
   integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
 
@@ -28,28 +29,48 @@ module event_heap
 
 contains
 
-  !> Order of events: by time, then by the lower and the higher disk concerned. Both disks of a pair may expect the same
+  !> The event of disk i.
+  pure function event_of(disk, i) result(event)
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32), intent(in) :: i
+    type(event_t) :: event
+
+    event = event_t(disk(i)%event_time, i, disk(i)%partner)
+  end function event_of
+
+  !> Order of events: by time, then by the lower and the higher id of the disks concerned. Both disks of a pair may expect the
   !> collision; its place does not depend on which of them does. The twin of this rule for candidates of one disk is
   !> `neighbour_search: before`; change both or none.
-  elemental function precedes(a, b) result(yes)
+  pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
+    type(tag_t), intent(in) :: tag(*)
     logical :: yes
-    integer(int32) :: low_a, low_b
+    integer(int32) :: ids_a(2), ids_b(2)
 
     if (a%time < b%time) then
       yes = .true.
     else if (a%time > b%time) then
       yes = .false.
     else
-      low_a = merge(min(a%disk, a%partner), a%disk, a%partner > 0)
-      low_b = merge(min(b%disk, b%partner), b%disk, b%partner > 0)
-      if (low_a /= low_b) then
-        yes = low_a < low_b
+      ids_a = ids_of(a, tag)
+      ids_b = ids_of(b, tag)
+      if (ids_a(1) /= ids_b(1)) then
+        yes = ids_a(1) < ids_b(1)
       else
-        yes = max(a%partner, merge(a%disk, 0, a%partner > 0)) < max(b%partner, merge(b%disk, 0, b%partner > 0))
+        yes = ids_a(2) < ids_b(2)
       end if
     end if
   end function precedes
+
+  !> The lower and the higher id of the disks concerned; of a single disk only the lower, and 0.
+  pure function ids_of(event, tag) result(ids)
+    type(event_t), intent(in) :: event
+    type(tag_t), intent(in) :: tag(*)
+    integer(int32) :: ids(2)
+
+    ids = [tag(event%disk)%id, 0]
+    if (event%partner > 0) ids = [min(ids(1), tag(event%partner)%id), max(ids(1), tag(event%partner)%id)]
+  end function ids_of
 
   !> Not zero if two simultaneous events need an order: most are one collision that both disks expect.
   elemental function need_order(a, b) result(bits)
@@ -73,9 +94,10 @@ contains
   end subroutine initialise
 
   !> Inserts the event of a disk, or puts it in the place of the one that this disk had.
-  pure subroutine update(self, event)
+  pure subroutine update(self, event, tag)
     class(event_heap_t), intent(inout) :: self
     type(event_t), intent(in) :: event
+    type(tag_t), intent(in) :: tag(*)            !! of all disks
     integer(int32) :: k
 
     k = self%slot(event%disk)
@@ -83,14 +105,15 @@ contains
       self%n = self%n + 1
       k = self%n
     end if
-    call sift_up(self, k, event)
-    if (self%slot(event%disk) == k) call sift_down(self, k, event)
+    call sift_up(self, k, event, tag)
+    if (self%slot(event%disk) == k) call sift_down(self, k, event, tag)
   end subroutine update
 
   !> Removes a disk's event, if there is one.
-  pure subroutine remove(self, disk)
+  pure subroutine remove(self, disk, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: disk
+    type(tag_t), intent(in) :: tag(*)            !! of all disks
     type(event_t) :: last
     integer(int32) :: k
 
@@ -100,8 +123,8 @@ contains
     last = self%entry(self%n)
     self%n = self%n - 1
     if (last%disk == disk) return
-    call sift_up(self, k, last)
-    if (self%slot(last%disk) == k) call sift_down(self, k, last)
+    call sift_up(self, k, last, tag)
+    if (self%slot(last%disk) == k) call sift_down(self, k, last, tag)
   end subroutine remove
 
   !> The earliest event. The heap must not be empty.
@@ -113,16 +136,17 @@ contains
   end function first
 
   !> Moves the hole at `start` up to where `event` belongs and fills it.
-  pure subroutine sift_up(self, start, event)
+  pure subroutine sift_up(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start
     type(event_t), intent(in) :: event
+    type(tag_t), intent(in) :: tag(*)
     integer(int32) :: k, parent
 
     k = start
     do while (k > 1)
       parent = (k - 2)/arity + 1
-      if (.not. precedes(event, self%entry(parent))) exit
+      if (.not. precedes(event, self%entry(parent), tag)) exit
       self%entry(k) = self%entry(parent)
       self%slot(self%entry(k)%disk) = k
       k = parent
@@ -132,10 +156,11 @@ contains
   end subroutine sift_up
 
   !> Moves the hole at `start` down to where `event` belongs and fills it.
-  pure subroutine sift_down(self, start, event)
+  pure subroutine sift_down(self, start, event, tag)
     class(event_heap_t), intent(inout) :: self
     integer(int32), intent(in) :: start
     type(event_t), intent(in) :: event
+    type(tag_t), intent(in) :: tag(*)
     integer(int32) :: k, child, best
 
     k = start
@@ -143,9 +168,9 @@ contains
       best = arity*(k - 1) + 2
       if (best > self%n) exit
       do child = best + 1, min(best + arity - 1, self%n)
-        if (precedes(self%entry(child), self%entry(best))) best = child
+        if (precedes(self%entry(child), self%entry(best), tag)) best = child
       end do
-      if (.not. precedes(self%entry(best), event)) exit
+      if (.not. precedes(self%entry(best), event, tag)) exit
       self%entry(k) = self%entry(best)
       self%slot(self%entry(k)%disk) = k
       k = best

@@ -8,7 +8,7 @@ module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
   use disks, only: disk_t, tag_t
-  use event_heap, only: event_heap_t, event_t, need_order, precedes
+  use event_heap, only: event_heap_t, event_of, event_t, need_order, precedes
   implicit none
   private
   public :: event_queue_t
@@ -123,7 +123,7 @@ contains
     number = disk(i)%event_time*self%per_time
     if (.not. number >= self%next_window) then     ! NaN as well, to be found
       tag(i)%window = window_none
-      call self%insert_near(disk, i)
+      call self%insert_near(disk, tag, i)
       return
     end if
     window = int(merge(number, last_window, number < last_window), int32)
@@ -133,55 +133,59 @@ contains
       call self%calendar%put_near(i, window, full)
       if (.not. full) return
       tag(i)%window = window_none
-      call self%insert_into_heap(disk, i)
+      call self%insert_into_heap(disk, tag, i)
     else
       call self%calendar%put_far(i, window)
     end if
   end subroutine schedule
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
-  subroutine insert_near(self, disk, i)
+  subroutine insert_near(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: i
 
     if (self%near_is_open) then
-      call insert(self%near, self%n_near, event_of(disk, i))
+      call insert(self%near, self%n_near, event_of(disk, i), tag)
       self%n_near = self%n_near + 1
       self%near_is_open = self%n_near < near_capacity
     else
-      call hand_over(self, disk)
-      call self%insert_into_heap(disk, i)
+      call hand_over(self, disk, tag)
+      call self%insert_into_heap(disk, tag, i)
     end if
   end subroutine insert_near
 
   !> Moves the list into the heap.
-  subroutine hand_over(self, disk)
+  subroutine hand_over(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32) :: k
 
     do k = 1, self%n_near
-      if (expected(disk, self%near(k))) call self%heap%update(self%near(k))
+      if (expected(disk, self%near(k))) call self%heap%update(self%near(k), tag)
     end do
     self%n_near = 0
   end subroutine hand_over
 
   !> Into the heap.
-  subroutine insert_into_heap(self, disk, i)
+  subroutine insert_into_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: i
 
-    call self%heap%update(event_of(disk, i))
+    call self%heap%update(event_of(disk, i), tag)
   end subroutine insert_into_heap
 
   !> Inserts an event into a sorted list of n. Times nearly always decide: most simultaneous events are one collision
   !> that both disks expect, and these need no order.
-  pure subroutine insert(list, n, event)
+  pure subroutine insert(list, n, event, tag)
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(in) :: n
     type(event_t), intent(in) :: event
+    type(tag_t), intent(in) :: tag(*)
     integer(int32) :: k
 
     k = n
@@ -190,7 +194,7 @@ contains
       k = k - 1
     end do
     if (need_order(list(k), event) /= 0) then
-      do while (precedes(list(k), event))
+      do while (precedes(list(k), event, tag))
         list(k + 1) = list(k)
         k = k - 1
       end do
@@ -212,7 +216,7 @@ contains
         self%n_near = self%n_near - 1
       end do
       if (self%heap%n > 0) then
-        call self%first_in_heap(disk, i)
+        call self%first_in_heap(disk, tag, i)
         if (i > 0) return
       end if
       call self%open_next_window(disk, tag)
@@ -220,9 +224,10 @@ contains
   end subroutine first
 
   !> The disk with the first event in the heap; 0: none is due in this window.
-  subroutine first_in_heap(self, disk, i)
+  subroutine first_in_heap(self, disk, tag, i)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(out) :: i
     type(event_t) :: event
 
@@ -233,20 +238,21 @@ contains
         if (.not. event%time*self%per_time < self%next_window) exit
         return
       end if
-      call self%heap%remove(i)
+      call self%heap%remove(i, tag)
     end do
     i = 0
   end subroutine first_in_heap
 
   !> Removes the event that `first` found.
-  subroutine drop_first(self, i)
+  subroutine drop_first(self, tag, i)
     class(event_queue_t), intent(inout) :: self
+    type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: i                !! as given by `first`
 
     if (self%n_near > 0) then
       self%n_near = self%n_near - 1
     else
-      call self%heap%remove(i)
+      call self%heap%remove(i, tag)
     end if
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
@@ -272,15 +278,6 @@ contains
     if (self%windowed) call self%calendar%list_coming(tag, self%window, stage, n, disks)
   end subroutine list_coming
 
-  !> The event of disk i.
-  pure function event_of(disk, i) result(event)
-    type(disk_t), intent(in) :: disk(*)
-    integer(int32), intent(in) :: i
-    type(event_t) :: event
-
-    event = event_t(disk(i)%event_time, i, disk(i)%partner)
-  end function event_of
-
   !> Whether an entry is still what its disk expects.
   pure function expected(disk, event) result(yes)
     type(disk_t), intent(in) :: disk(*)
@@ -301,17 +298,18 @@ contains
     self%window = self%window + 1
     self%next_window = self%window + 1
     self%near_is_open = .true.
-    call take_bucket(self%calendar%bucket(iand(self%window, self%calendar%last_bucket)), disk, self%per_time, &
+    call take_bucket(self%calendar%bucket(iand(self%window, self%calendar%last_bucket)), disk, tag, self%per_time, &
       self%next_window, self%near, self%n_near)
-    if (self%heap%n > 0) call self%take_from_heap(disk)
+    if (self%heap%n > 0) call self%take_from_heap(disk, tag)
     if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
   !> Empties a bucket into a sorted list: the events that its disks expect before the next window; other entries are
   !> no longer valid. They are so few that each finds its place by counting the later ones, without a branch on times.
-  pure subroutine take_bucket(bucket, disk, per_time, next_window, list, n)
+  pure subroutine take_bucket(bucket, disk, tag, per_time, next_window, list, n)
     type(bucket_t), intent(inout) :: bucket
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     real(real64), intent(in) :: per_time, next_window
     type(event_t), intent(inout) :: list(0:*)
     integer(int32), intent(out) :: n
@@ -343,23 +341,24 @@ contains
     end do
     if (odd == 0) return
     do k = 1, n
-      call insert(list, k - 1, event_of(disk, due(k)))
+      call insert(list, k - 1, event_of(disk, due(k)), tag)
     end do
   end subroutine take_bucket
 
   !> Moves what is due in this window from the heap into the list; if that overflows, everything into the heap.
-  subroutine take_from_heap(self, disk)
+  subroutine take_from_heap(self, disk, tag)
     class(event_queue_t), intent(inout) :: self
     type(disk_t), intent(in) :: disk(*)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32) :: i
 
     do while (self%near_is_open)
-      call self%first_in_heap(disk, i)
+      call self%first_in_heap(disk, tag, i)
       if (i == 0) return
-      call self%heap%remove(i)
-      call self%insert_near(disk, i)
+      call self%heap%remove(i, tag)
+      call self%insert_near(disk, tag, i)
     end do
-    call hand_over(self, disk)
+    call hand_over(self, disk, tag)
   end subroutine take_from_heap
 
   !> Files the events of the next span into their buckets. If windows have turned out far too narrow or too wide, it
@@ -379,7 +378,7 @@ contains
     call self%calendar%open_span(tag, n, surplus)
     do k = 1, n
       tag(surplus(k))%window = window_none
-      call self%insert_into_heap(disk, surplus(k))
+      call self%insert_into_heap(disk, tag, surplus(k))
     end do
   end subroutine open_next_span
 

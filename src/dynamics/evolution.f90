@@ -14,6 +14,7 @@ module evolution
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! [energy]
+    logical :: epochs = .false.                          !! whenever the epoch has moved
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
   contains
     procedure :: reached
@@ -55,7 +56,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%events >= self%events .or. sim%collisions >= self%collisions .or. sim%dissipated >= self%dissipated
+    yes = sim%events >= self%events .or. sim%collisions >= self%collisions .or. sim%dissipated%value() >= self%dissipated
   end function reached
 
   !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.

@@ -2,7 +2,7 @@
 !>
 !> In a periodic box inelastic disks cool until they all drift together, with only the common momentum that rounding
 !> left. The temperature has lost all its digits long before that, so the run ends when the gas is that cold. This
-!> is checked at fixed numbers of events, so that the end depends on the trajectory alone.
+!> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use evolution, only: limits_t
@@ -12,7 +12,6 @@ module stop_rules
   public :: stop_rule_t, stop_settings_t
 
   real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
-  integer, parameter :: check_interval = 4                   !! events per disk between two checks of it
 
   !> Rules that are not given are `never` (times), `huge` (counts) or 0 (fraction).
   type :: stop_settings_t
@@ -27,10 +26,8 @@ module stop_rules
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
-    integer(int64) :: check_every = huge(0_int64)    !! events between two checks of the temperature
   contains
     procedure :: met
-    procedure :: next_check
     procedure :: too_cold
     procedure :: share
   end type stop_rule_t
@@ -56,7 +53,7 @@ contains
     if (collisions < 9.0e18_real64) rule%limits%collisions = min(rule%limits%collisions, ceiling(collisions, int64))
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
     if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. any(sim%law%restitution < 1)) &
-      rule%check_every = check_interval*int(sim%n_disks(), int64)
+      rule%limits%epochs = .true.
   end function new_stop_rule
 
   !> Whether a rule is met, wall clock aside.
@@ -68,23 +65,14 @@ contains
     yes = sim%time() >= self%limits%time .or. self%limits%reached(sim)
   end function met
 
-  !> The number of events at which to pause and check the temperature.
-  pure function next_check(self, sim) result(events)
-    class(stop_rule_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int64) :: events
-
-    events = self%check_every*(sim%events/self%check_every + 1)
-  end function next_check
-
-  !> Whether the motion relative to the common motion has practically died out.
+  !> Whether the motion relative to the common motion had practically died out when the epoch began.
   pure function too_cold(self, sim) result(yes)
     class(stop_rule_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
     yes = .false.
-    if (sim%events > 0 .and. modulo(sim%events, self%check_every) == 0) &
+    if (self%limits%epochs .and. sim%events > 0 .and. sim%events == sim%epoch_events) &
       yes = relative_energy(sim) <= coldest*sim%start_energy
   end function too_cold
 
@@ -116,7 +104,7 @@ contains
     real(real64), parameter :: least = 1/never     ! a limit may be 0
 
     done = max(sim%time()/max(self%limits%time, least), real(sim%collisions, real64)/max(self%limits%collisions, 1_int64), &
-      real(sim%events, real64)/max(self%limits%events, 1_int64), sim%dissipated/max(self%limits%dissipated, least), &
+      real(sim%events, real64)/max(self%limits%events, 1_int64), sim%dissipated%value()/max(self%limits%dissipated, least), &
       elapsed/max(self%wall_clock, least))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share

@@ -53,6 +53,7 @@ contains
     self%at%radius = sim%disk%radius
     self%at%period = sim%box%periods()
     call self%near%start()
+    call sim%start_sums()
     self%idle = .false.
   end subroutine start
 

@@ -2,7 +2,6 @@
 !> that nobody has changed the file since it was sealed. What is wrong is named by its dataset.
 module checkpoint_checks
   use cadence, only: cadence_t
-  use event_driven, only: events_per_epoch
   use kinds, only: int32, int64, real64
   use progress, only: progress_t
   use settings, only: settings_t
@@ -72,9 +71,14 @@ contains
         flaw = "events is "//written(sim%events)//", but "//written(sim%collisions + fixed)//" are counted by kind"
       else if (own < 2*sim%collisions + fixed .or. own > 2*sim%collisions + fixed) then
         flaw = "disks/collisions add up to "//written(own)//" instead of "//written(2*sim%collisions + fixed)
-      else if (sim%next_epoch /= 0 .and. (sim%next_epoch < sim%events .or. &
-        sim%next_epoch > sim%events + events_per_epoch(sim))) then
-        flaw = "next_epoch is "//written(sim%next_epoch)//" after "//written(sim%events)//" events"
+      else if (sim%epoch_events > sim%events) then
+        flaw = "epoch_events is "//written(sim%epoch_events)//" after "//written(sim%events)//" events"
+      else if (sim%epoch_end <= sim%epoch_begin .and. max(sim%epoch_begin, sim%epoch_end, sim%blink) > 0) then
+        flaw = "epoch_begin is "//written(sim%epoch_begin)//", epoch_end "//written(sim%epoch_end)
+      else if (sim%last_advance > sim%now) then
+        flaw = "last_advance is "//written(sim%last_advance)//", now "//written(sim%now)
+      else if (sim%events_then > sim%events) then
+        flaw = "events_then is "//written(sim%events_then)//" after "//written(sim%events)//" events"
       end if
     end associate
   end function flaw_of_counts
@@ -99,8 +103,10 @@ contains
       if (flaw /= "") return
     end do
     energy = sim%kinetic_energy()
-    if (abs(energy - (sim%start_energy - sim%dissipated)) > rounding*sim%start_energy + (1 + rounding)*fall) flaw = &
-      "start_energy less dissipated is "//written(sim%start_energy - sim%dissipated)//", but the disks have "//written(energy)
+    associate (left => sim%start_energy - sim%dissipated%value())
+      if (abs(energy - left) > rounding*sim%start_energy + (1 + rounding)*fall) &
+        flaw = "start_energy less dissipated is "//written(left)//", but the disks have "//written(energy)
+    end associate
   end function flaw_of_motion
 
   !> The same of one disk. Without a flaw the text is not touched, as there may be many disks.

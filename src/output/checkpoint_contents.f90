@@ -2,15 +2,16 @@
 !> come. It is written to a file of its own, and into the output of a finished run.
 module checkpoint_contents
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
   use errors, only: error_t, exit_usage, fail
+  use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, values_text
-  use partners, only: obstacle_code
+  use partners, only: n_sides, obstacle_code, side_name
   use progress, only: progress_t
   use sample_track, only: samples_t
   use sealed_file, only: checksum
@@ -186,17 +187,25 @@ contains
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: n
+    integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
     call file%exchange("now", sim%now, times)
-    call file%exchange("next_epoch", sim%next_epoch, counts)
+    call file%exchange("epoch_begin", sim%epoch_begin, times)
+    call file%exchange("epoch_end", sim%epoch_end, [0.0_real64, never])
+    call file%exchange("epoch_events", sim%epoch_events, counts)
+    call file%exchange("blink", sim%blink, not_negative)
+    call file%exchange("last_advance", sim%last_advance, clocks)
+    call file%exchange("events_then", sim%events_then, counts)
     call file%exchange("events", sim%events, counts)
     call file%exchange("collisions", sim%collisions, counts)
     call file%exchange("wall_collisions", sim%wall_collisions, counts)
     call file%exchange("obstacle_collisions", sim%obstacle_collisions, counts)
-    call file%exchange("wall_impulse", sim%wall_impulse, sums)
-    call file%exchange("virial", sim%virial, sums)
-    call file%exchange("dissipated", sim%dissipated, sums)
+    do k = 1, n_sides
+      call exchange_sum(file, "wall_impulse_"//trim(side_name(k)), sim%wall_impulse(k))
+    end do
+    call exchange_sum(file, "virial", sim%virial)
+    call exchange_sum(file, "dissipated", sim%dissipated)
     call file%exchange("start_energy", sim%start_energy, not_negative)
     n = sum(int(sim%species%count, int64))
     if (.not. allocated(sim%disk)) then
@@ -211,11 +220,23 @@ contains
     call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
     call file%exchange("disks/id", sim%tag%id, [1_int64, n])
     call file%exchange("disks/collisions", sim%tag%collisions, counts)
-    call file%exchange("disks/stamp", sim%disk%stamp, [-huge(0_int32) - 1_int64, int(huge(0_int32), int64)])
-    call file%exchange("disks/obstacle", sim%tag%obstacle, [int(obstacle_code(sim%box%n_obstacles()), int64), 0_int64])
+    call file%exchange("disks/met", sim%tag%met, [int(obstacle_code(sim%box%n_obstacles()), int64), n])
     call file%exchange("disks/image1", sim%image(1, :), [-counts(2), counts(2)])
     call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
   end subroutine exchange_state
+
+  !> Writes or reads a sum: the two halves of a whole number of units.
+  subroutine exchange_sum(file, name, sum)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(exact_sum_t), intent(inout) :: sum
+    integer(int64) :: halves(2)
+
+    halves = transfer(sum%units, halves)
+    call file%exchange(name//"/units", halves, [ibset(0_int64, 63), huge(1_int64)])
+    sum%units = transfer(halves, sum%units)
+    call file%exchange(name//"/units_per_one", sum%per_one, not_negative)
+  end subroutine exchange_sum
 
   !> Writes or reads how far the output has come.
   subroutine exchange_progress(file, progress)

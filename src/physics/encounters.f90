@@ -4,7 +4,7 @@ module encounters
   use kinds, only: int32, real64
   use box_geometry, only: wall_normal
   use collisions, only: pair_impulse, still_in_contact, wall_rebound
-  use disks, only: disk_t, of_same_collision, stamp_after_passing, stamp_of
+  use disks, only: disk_t
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
@@ -28,16 +28,17 @@ contains
     real(real64) :: v(2)
     integer(int32) :: first
 
-    first = merge(min(i, code), i, code > 0)
+    first = i
     if (code > 0) then
-      if (are_together(sim, first, max(i, code), t)) then
-        call keep_apart(sim, first, max(i, code), t)
+      if (are_together(sim, i, code, t)) then
+        call keep_apart(sim, i, code, t)
         return
       end if
+      first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
     end if
     v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
     if (code > 0) then
-      call collide_pair(sim, first, max(i, code), t)
+      call collide_pair(sim, i, code, t)
     else
       call collide_wall(sim, i, code, t)
     end if
@@ -62,6 +63,7 @@ contains
     disk%x = flight(disk%x, disk%v, gravity, s)
     disk%v = flight_velocity(disk%v, gravity, s)
     disk%clock = t
+    disk%stamp = disk%stamp + 1
   end subroutine land
 
   !> Whether disk i is still in contact at the time t, by the contact law.
@@ -74,7 +76,7 @@ contains
     yes = still_in_contact(sim%law, sim%tag(i)%collisions, t - sim%disk(i)%clock)
   end function in_contact
 
-  !> Collides the disks i < j at the time t.
+  !> Collides the disks i and j at the time t. Which of them is i changes no bit.
   subroutine collide_pair(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
@@ -102,14 +104,12 @@ contains
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
-    sim%tag(i)%obstacle = 0
-    sim%tag(j)%obstacle = 0
+    sim%tag(i)%met = sim%tag(j)%id
+    sim%tag(j)%met = sim%tag(i)%id
     sim%events = sim%events + 1
-    sim%disk(i)%stamp = stamp_of(sim%events)
-    sim%disk(j)%stamp = stamp_of(sim%events)
     sim%collisions = sim%collisions + 1
-    sim%virial = sim%virial - q*distance2
-    sim%dissipated = sim%dissipated + 0.5_real64*(1 - restitution)*q*b
+    call sim%virial%add(-q*distance2)
+    if (restitution < 1) call sim%dissipated%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
 
   !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
@@ -121,7 +121,7 @@ contains
     logical :: yes
     real(real64) :: then(2), dx(2)
 
-    yes = of_same_collision(sim%disk(i)%stamp, sim%disk(j)%stamp)
+    yes = sim%tag(i)%met == sim%tag(j)%id .and. sim%tag(j)%met == sim%tag(i)%id
     if (.not. yes) return
     associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity, period => sim%box%periods())
       then = q%x - p%x
@@ -142,8 +142,6 @@ contains
     associate (p => sim%disk(i), q => sim%disk(j))
       call land(p, sim%box%gravity, t)
       call land(q, sim%box%gravity, t)
-      p%stamp = stamp_after_passing(p%stamp)
-      q%stamp = stamp_after_passing(q%stamp)
       dx = q%x - p%x
       dx = dx - nearest_image(dx, sim%box%periods())
       mass_i = sim%species(sim%tag(i)%species)%mass
@@ -179,7 +177,7 @@ contains
     period = sense_of(code)
     associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
-      d%stamp = stamp_after_passing(d%stamp)
+      d%stamp = d%stamp + 1
       sim%image(axis, i) = sim%image(axis, i) + period
     end associate
   end subroutine pass_side
@@ -201,15 +199,14 @@ contains
     v = sim%disk(i)%v
     sim%disk(i)%v = wall_rebound(v, normal, restitution, sim%law%wall_rule)
     mass = sim%species(sim%tag(i)%species)%mass
-    sim%dissipated = sim%dissipated + 0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v))
+    call sim%dissipated%add(0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v)))
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
-    sim%tag(i)%obstacle = merge(0, code, is_side(code))
+    sim%tag(i)%met = merge(0, code, is_side(code))
     sim%events = sim%events + 1
-    sim%disk(i)%stamp = stamp_of(sim%events)
     if (is_side(code)) then
       k = wall_index(code)
       sim%wall_collisions(k) = sim%wall_collisions(k) + 1
-      sim%wall_impulse(k) = sim%wall_impulse(k) + mass*dot_product(sim%disk(i)%v - v, normal)
+      call sim%wall_impulse(k)%add(mass*dot_product(sim%disk(i)%v - v, normal))
     else
       sim%obstacle_collisions = sim%obstacle_collisions + 1
     end if

@@ -53,11 +53,11 @@ contains
     call list%add("total_energy", [sums(0)%kinetic + sums(0)%potential])
     call list%add("momentum", sums(0)%momentum)
     call list%add("pressure", [pressure(sim, sums(0)%kinetic)])
-    call list%add("virial", [sim%virial])
-    call list%add("dissipated_energy", [sim%dissipated])
+    call list%add("virial", [sim%virial%value()])
+    call list%add("dissipated_energy", [sim%dissipated%value()])
     call list%add("collisions", real([sim%collisions], real64), is_count=.true.)
     call list%add("wall_collisions", real(sim%wall_collisions, real64), is_count=.true.)
-    call list%add("wall_impulse", sim%wall_impulse)
+    call list%add("wall_impulse", sim%wall_impulse%value())
     call list%add("obstacle_collisions", real([sim%obstacle_collisions], real64), is_count=.true.)
   end function observed
 
@@ -185,7 +185,7 @@ contains
     real(real64) :: pressure
 
     pressure = kinetic
-    if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%virial/sim%time()
+    if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%virial%value()/sim%time()
     pressure = pressure/free_area(sim%box)
   end function pressure
 

@@ -6,6 +6,7 @@ module simulation_state
   use partners, only: n_sides
   use collisions, only: contact_law_t
   use disks, only: disk_t, species_t, tag_t
+  use exact_sums, only: exact_sum_t
   use free_flight, only: flight, flight_velocity
   implicit none
   private
@@ -22,15 +23,21 @@ module simulation_state
     integer(int64), allocatable :: image(:, :)    !! (2,n) periods travelled: true position = x + image*edges
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
-    integer(int64) :: next_epoch = 0              !! number of events at which the epoch moves
+    real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
+    real(real64) :: epoch_end = 0.0_real64        !! when the epoch moves, since the epoch; 0: not known yet [time]
+    integer(int64) :: epoch_events = 0            !! `events` at the beginning of the epoch
+    ! A collapse is an endless series of events during which time does not advance.
+    real(real64) :: blink = 0.0_real64            !! in which nothing moves visibly; 0: not known yet [time]
+    real(real64) :: last_advance = 0.0_real64     !! when time had last advanced by more than that, since the epoch [time]
+    integer(int64) :: events_then = 0             !! `events` at that time
     ! Counts and sums since the start of the run
     integer(int64) :: events = 0                  !! collisions of any kind
     integer(int64) :: collisions = 0              !! of pairs
     integer(int64) :: wall_collisions(n_sides) = 0      !! left, right, bottom, top
     integer(int64) :: obstacle_collisions = 0
-    real(real64) :: wall_impulse(n_sides) = 0.0_real64  !! sum of |change of normal momentum|
-    real(real64) :: virial = 0.0_real64           !! sum of impulse times distance over pair collisions
-    real(real64) :: dissipated = 0.0_real64       !! kinetic energy lost in collisions
+    type(exact_sum_t) :: wall_impulse(n_sides)    !! of |change of normal momentum| [mass length/time]
+    type(exact_sum_t) :: virial                   !! of impulse times distance over pair collisions [energy]
+    type(exact_sum_t) :: dissipated               !! kinetic energy lost in collisions [energy]
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
   contains
     procedure :: time
@@ -38,6 +45,7 @@ module simulation_state
     procedure :: position
     procedure :: velocity
     procedure :: kinetic_energy
+    procedure :: start_sums
   end type simulation_t
 
 contains
@@ -92,5 +100,25 @@ contains
       energy = energy + 0.5_real64*self%species(self%tag(i)%species)%mass*dot_product(v, v)
     end do
   end function kinetic_energy
+
+  !> Chooses how fine the sums are, from what a collision can contribute at most. Nothing is lost if it is more: disks
+  !> that fall through periodic sides gain energy for ever.
+  pure subroutine start_sums(self)
+    class(simulation_t), intent(inout) :: self
+    real(real64) :: energy, impulse, mass
+    integer(int32) :: i
+
+    if (self%dissipated%per_one > 0 .or. self%n_disks() == 0) return
+    mass = 0
+    do i = 1, self%n_disks()
+      mass = mass + self%species(self%tag(i)%species)%mass
+    end do
+    energy = self%kinetic_energy() + mass*sum(abs(self%box%gravity)*self%box%edges())
+    mass = maxval(self%species%mass)
+    impulse = sqrt(8*mass*energy)
+    call self%dissipated%choose_unit(energy)
+    call self%wall_impulse%choose_unit(impulse)
+    call self%virial%choose_unit(impulse*2*maxval(self%disk%radius))
+  end subroutine start_sums
 
 end module simulation_state

@@ -38,15 +38,17 @@ contains
     type(prospect_t) :: near
     integer(int32) :: first, k, image_x, image_y, reach(2)
 
+    near%disk = i
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%obstacle, self%obstacle, near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, self%obstacle, near%time, near%partner)
     reach = merge(1, 0, sim%box%periodic)
     do first = 0, sim%n_disks() - 1, list_capacity
       near%n = min(list_capacity, sim%n_disks() - first)
       near%list(:near%n) = [(first + k, k=0, near%n - 1)]
       do image_y = -reach(2), reach(2)
         do image_x = -reach(1), reach(1)
-          call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, [image_x, image_y]*sim%box%edges())
+          call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, &
+            [image_x, image_y]*sim%box%edges())
         end do
       end do
     end do

@@ -216,8 +216,8 @@ contains
 
     call survey(self, disk(i), tag(i), now, known, i, near_i)
     call survey(self, disk(j), tag(j), now, known, j, near_j)
-    call take_earliest(self, disk, tag(i), now, known, i, near_i)
-    call take_earliest(self, disk, tag(j), now, known, j, near_j)
+    call take_earliest(self, disk, tag, now, known, near_i)
+    call take_earliest(self, disk, tag, now, known, near_j)
   end subroutine predict_two
 
   !> Predicts one disk in a plain cell.
@@ -230,7 +230,7 @@ contains
     type(prospect_t) :: near
 
     call survey(self, disk(i), tag(i), now, known, i, near)
-    call take_earliest(self, disk, tag(i), now, known, i, near)
+    call take_earliest(self, disk, tag, now, known, near)
   end subroutine predict_one
 
   !> When disk i leaves its cell, and whom it can meet before.
@@ -243,23 +243,24 @@ contains
     type(prospect_t), intent(out) :: near
 
     call self%faces%next(disk, tag%cell, now, iand(known, no_gravity) == 0, near%time, near%partner)
+    near%disk = i
     near%cell = self%cells%number(tag%cell)
     call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
   end subroutine survey
 
-  !> Writes into disk i the earliest of the events in prospect.
-  subroutine take_earliest(self, disk, tag, now, known, i, near)
+  !> Writes into a disk the earliest of the events in prospect.
+  subroutine take_earliest(self, disk, tag, now, known, near)
     class(cell_grid_t), intent(in) :: self
     type(disk_t), intent(inout) :: disk(*)
-    type(tag_t), intent(inout) :: tag
+    type(tag_t), intent(inout) :: tag(*)
     real(real64), intent(in) :: now
-    integer(int32), value :: known, i
+    integer(int32), value :: known
     type(prospect_t), intent(inout) :: near
 
-    call earliest_contact(disk, i, near, now, self%faces%box%gravity, known)
-    disk(i)%event_time = near%time
-    disk(i)%partner = near%partner
-    tag%partner_stamp = disk(max(near%partner, 1))%stamp   ! without a branch; used if partner > 0
+    call earliest_contact(disk, tag, near, now, self%faces%box%gravity, known)
+    disk(near%disk)%event_time = near%time
+    disk(near%disk)%partner = near%partner
+    tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used if partner > 0
   end subroutine take_earliest
 
   !> Predicts a disk where there is more than nine cells with a few small disks each.
@@ -287,23 +288,24 @@ contains
     type(prospect_t), intent(out) :: near
     integer(int32) :: e
 
+    near%disk = i
     associate (cell => sim%tag(i)%cell)
       call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
       near%cell = self%cells%number(cell)
       call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
       if (at_periodic_edge(self, cell)) then
-        call scan_around_edge(self%cells, self%n, sim, i, near)
+        call scan_around_edge(self%cells, self%n, sim, near)
       else
         call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
-        call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-        call scan_chains_around(self%cells, sim, i, near)
+        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
+        call scan_chains_around(self%cells, sim, near)
       end if
       if (self%big%count == 0) return
       e = self%big%first(cell(1), cell(2))
     end associate
     do while (e > 0)
       associate (listing => self%big%listing(e))
-        call scan_one(sim, i, self%big%disk(listing%number), listing%image*sim%box%edges(), near)
+        call scan_one(sim, self%big%disk(listing%number), listing%image*sim%box%edges(), near)
         e = listing%next
       end associate
     end do
@@ -319,9 +321,10 @@ contains
     real(real64) :: t_margin
     integer(int32) :: number, ix, iy, m, reach(2)
 
+    near%disk = i
     number = self%big%number_of(i)
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%obstacle, [(m, m=1, sim%box%n_obstacles())], &
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(m, m=1, sim%box%n_obstacles())], &
       near%time, near%partner)
     t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
       sim%box%gravity, self%big%margin, inside=.true.)
@@ -331,13 +334,13 @@ contains
     do iy = -reach(2), reach(2)
       do ix = -reach(1), reach(1)
         do m = 1, self%big%count
-          call scan_one(sim, i, self%big%disk(m), [ix, iy]*sim%box%edges(), near)
+          call scan_one(sim, self%big%disk(m), [ix, iy]*sim%box%edges(), near)
         end do
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
-        call scan_cell(self%cells, sim, i, place%cell(1) + self%cells%stride*place%cell(2), &
+        call scan_cell(self%cells, sim, place%cell(1) + self%cells%stride*place%cell(2), &
           -place%image*sim%box%edges(), near)
       end associate
     end do

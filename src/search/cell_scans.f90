@@ -12,22 +12,22 @@ module cell_scans
 contains
 
   !> The contact with one disk, seen `shift` away.
-  pure subroutine scan_one(sim, i, j, shift, near)
+  pure subroutine scan_one(sim, j, shift, near)
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, j
+    integer(int32), intent(in) :: j
     real(real64), intent(in) :: shift(2)           !! [length]
     type(prospect_t), intent(inout) :: near
 
     near%n = 1
     near%list(1) = j - 1
-    call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+    call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, shift)
   end subroutine scan_one
 
   !> Contacts with the disks of one cell, seen `shift` away.
-  pure subroutine scan_cell(cells, sim, i, c, shift, near)
+  pure subroutine scan_cell(cells, sim, c, shift, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, c
+    integer(int32), intent(in) :: c
     real(real64), intent(in) :: shift(2)           !! [length]
     type(prospect_t), intent(inout) :: near
     integer(int64) :: n
@@ -35,15 +35,15 @@ contains
     n = 0
     call append(cells%cell(c), near%list, n)
     near%n = int(n, int32)
-    call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
-    call scan_chain(cells, sim, i, c, near, shift)
+    call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, shift)
+    call scan_chain(cells, sim, c, near, shift)
   end subroutine scan_cell
 
   !> Contacts with the chained disks of a crowded cell.
-  pure subroutine scan_chain(cells, sim, i, c, near, shift)
+  pure subroutine scan_chain(cells, sim, c, near, shift)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, c
+    integer(int32), intent(in) :: c
     type(prospect_t), intent(inout) :: near
     real(real64), intent(in), optional :: shift(2) !! of the cell, seen there [length]
     integer(int32) :: j
@@ -56,32 +56,30 @@ contains
         near%list(near%n) = j - 1
         j = cells%next(j)
       end do
-      call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, shift)
     end do
   end subroutine scan_chain
 
-  !> Contacts with the chained disks of the nine cells around disk i.
-  pure subroutine scan_chains_around(cells, sim, i, near)
+  !> Contacts with the chained disks of the nine cells around a disk.
+  pure subroutine scan_chains_around(cells, sim, near)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
     type(prospect_t), intent(inout) :: near
     integer(int32) :: row, c
 
     do row = near%cell - cells%stride, near%cell + cells%stride, cells%stride
       do c = row - 1, row + 1
-        call scan_chain(cells, sim, i, c, near)
+        call scan_chain(cells, sim, c, near)
       end do
     end do
   end subroutine scan_chains_around
 
   !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
   !> together. In a box of fewer than three columns a cell stands for several of its images.
-  pure subroutine scan_around_edge(cells, n_cells, sim, i, near)
+  pure subroutine scan_around_edge(cells, n_cells, sim, near)
     type(cell_contents_t), intent(in) :: cells
     integer(int32), intent(in) :: n_cells(2)       !! columns, rows
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
     type(prospect_t), intent(inout) :: near
     real(real64) :: shift(2)
     integer(int32) :: there(2, -1:1), image(2, -1:1), k, image_x, image_y, dx, dy, c
@@ -89,7 +87,7 @@ contains
     logical :: crowded
 
     do k = -1, 1
-      there(:, k) = sim%tag(i)%cell + k
+      there(:, k) = sim%tag(near%disk)%cell + k
       image(:, k) = merge(merge(1, 0, there(:, k) > n_cells) - merge(1, 0, there(:, k) < 1), 0, sim%box%periodic)
       there(:, k) = there(:, k) - image(:, k)*n_cells
     end do
@@ -107,12 +105,12 @@ contains
           end do
         end do
         near%n = int(n, int32)
-        call earliest_contact(sim%disk, i, near, sim%now, sim%box%gravity, 0, shift)
+        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, shift)
         if (.not. crowded) cycle
         do dy = -1, 1
           do dx = -1, 1
             if (image(1, dx) /= image_x .or. image(2, dy) /= image_y) cycle
-            call scan_chain(cells, sim, i, there(1, dx) + cells%stride*there(2, dy), near, shift)
+            call scan_chain(cells, sim, there(1, dx) + cells%stride*there(2, dy), near, shift)
           end do
         end do
       end do

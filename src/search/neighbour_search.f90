@@ -1,7 +1,7 @@
 !> The seam between the dynamics and the ways to find what a disk meets next; and the kernel that they share.
 module neighbour_search
   use kinds, only: int32, never, real64
-  use disks, only: disk_t
+  use disks, only: disk_t, tag_t
   use free_flight, only: flight, flight_velocity
   use simulation_state, only: simulation_t
   implicit none
@@ -19,6 +19,7 @@ module neighbour_search
   type :: prospect_t
     real(real64) :: time                      !! of the earliest event [time]
     integer(int32) :: partner                 !! whom it meets then
+    integer(int32) :: disk                    !! whose prospect this is
     integer(int32) :: cell                    !! number of the disk's cell
     integer(int32) :: n                       !! number of candidates
     integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
@@ -84,25 +85,26 @@ contains
     integer(int32), intent(in) :: disks(:)
   end subroutine read_ahead
 
-  !> The earliest contact of disk i with the candidates, if it precedes the event known so far.
+  !> The earliest contact of a disk with the candidates, if it precedes the event known so far.
   !>
   !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks,
   !> and every term keeps its value, or changes sign, when they trade places. So it is the same to the last bit
-  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts the one with the lower disks
+  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts the one with the lower ids
   !> wins (`before`). A contact time before `now` is a rounding artefact: after a perfectly inelastic collision two
-  !> disks stay in contact to the last bits, and shifting one by a period can change those bits.
+  !> disks stay in contact to the last bits, and shifting one by a period can change those bits. Then the contact is
+  !> now or never, and as the shift is an event with a prediction, that is decided then, whoever looks at the pair later.
   !>
   !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant
   !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs. Disks that touch, or overlap by
   !> rounding, and approach collide now.
   !>
   !> Most candidates fail one combined test: the root is not real, or not before the best so far, or not before the
-  !> candidate's own event, when the candidate will predict again with i among its candidates. A root before t
+  !> candidate's own event, when the candidate will predict again with the disk among its candidates. A root before t
   !> needs c < -2 b (t - late), here with a margin above rounding.
-  pure subroutine earliest_contact(disk, i, near, now, gravity, known, shift)
+  pure subroutine earliest_contact(disk, tag, near, now, gravity, known, shift)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
-    integer(int32), value :: i
-    type(prospect_t), intent(inout) :: near   !! i itself is harmless among the candidates
+    type(tag_t), intent(in) :: tag(*)
+    type(prospect_t), intent(inout) :: near   !! the disk itself is harmless among the candidates
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
@@ -114,7 +116,7 @@ contains
 
     fresh = iand(known, latest_clock) > 0
     falling = iand(known, no_gravity) == 0
-    call read_state(disk(i - 1), xi, yi, ui, vi, clock, ri)
+    call read_state(disk(near%disk - 1), xi, yi, ui, vi, clock, ri)
     x = xi; y = yi; u = ui; v = vi; late = clock; best = near%time; partner = near%partner
     margin = margin_of_times*(abs(clock) + tiny(clock)/epsilon(clock)**2)
     from = 2*clock - margin
@@ -153,7 +155,7 @@ contains
         if (t_j < best) then
           best = t_j; partner = j + 1
         else if (.not. t_j > best) then       ! seldom
-          if (before(i, j + 1, partner)) partner = j + 1
+          if (before(tag, near%disk, j + 1, partner)) partner = j + 1
         end if
       end if
     end do
@@ -195,16 +197,23 @@ contains
 
   !> Whether, of simultaneous events, i meets disk j before its other partner (a disk or, if <= 0, a wall). The twin of
   !> this rule for events in the queue is `event_heap: precedes`; change both or none.
-  elemental function before(i, j, other) result(yes)
+  pure function before(tag, i, j, other) result(yes)
+    type(tag_t), intent(in) :: tag(*)
     integer(int32), intent(in) :: i, j, other
     logical :: yes
+    integer(int32) :: id, id_j, id_other
 
+    id = tag(i)%id
+    id_j = tag(j)%id
     if (other <= 0) then
-      yes = j < i
-    else if (min(i, j) /= min(i, other)) then
-      yes = min(i, j) < min(i, other)
+      yes = id_j < id
     else
-      yes = max(i, j) < max(i, other)
+      id_other = tag(other)%id
+      if (min(id, id_j) /= min(id, id_other)) then
+        yes = min(id, id_j) < min(id, id_other)
+      else
+        yes = max(id, id_j) < max(id, id_other)
+      end if
     end if
   end function before
 

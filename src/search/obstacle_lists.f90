@@ -41,7 +41,7 @@ contains
 
     if (.not. allocated(self%first)) return
     c = tag%cell(1) + self%columns*(tag%cell(2) - 1)
-    call next_obstacle(box, disk, tag%obstacle, self%list(self%first(c):self%first(c + 1) - 1), t, code)
+    call next_obstacle(box, disk, tag%met, self%list(self%first(c):self%first(c + 1) - 1), t, code)
   end subroutine next_contact
 
   !> Whether there are obstacles in reach of a cell.

@@ -172,8 +172,7 @@ contains
     do i = 1, sim%n_disks()
       sim%disk(i)%x = sim%position(i)
       sim%disk(i)%clock = sim%now
-      sim%disk(i)%stamp = 0                             ! neighbours grow towards each other
-      sim%tag(i)%obstacle = 0
+      sim%tag(i)%met = 0                                ! neighbours grow towards each other
     end do
   end subroutine move
 

@@ -246,11 +246,13 @@ contains
     text = ""
     if (a%events /= b%events) text = "events"
     if (a%collisions /= b%collisions) text = "collisions"
-    if (a%next_epoch /= b%next_epoch) text = "next epoch"
+    if (a%epoch_events /= b%epoch_events .or. a%events_then /= b%events_then) text = "an event that counts"
     if (any(a%wall_collisions /= b%wall_collisions)) text = "wall collisions"
     if (a%obstacle_collisions /= b%obstacle_collisions) text = "obstacle collisions"
-    if (any(differ([a%epoch, a%now, a%virial, a%dissipated, a%wall_impulse], &
-      [b%epoch, b%now, b%virial, b%dissipated, b%wall_impulse]))) text = "a time or a sum"
+    if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_advance, &
+      a%virial%value(), a%dissipated%value(), a%wall_impulse%value()], &
+      [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, &
+      b%virial%value(), b%dissipated%value(), b%wall_impulse%value()]))) text = "a time or a sum"
     do i = 1, a%n_disks()
       if (text /= "") return
       associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
@@ -274,7 +276,7 @@ contains
     type(simulation_t), intent(in) :: sim
     real(dp) :: energy
     integer(int32) :: i
-    energy = sim%kinetic_energy() + sim%dissipated
+    energy = sim%kinetic_energy() + sim%dissipated%value()
     do i = 1, sim%n_disks()
       energy = energy - mass(sim, i)*dot_product(sim%box%gravity, sim%position(i))
     end do

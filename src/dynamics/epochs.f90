@@ -1,0 +1,114 @@
+!> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
+!> to go on from it agree.
+module epochs
+  use kinds, only: int32, int64, never, pi, real64
+  use renumbering, only: renumber
+  use shapes, only: magnitude
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
+
+  !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
+  integer(int64), parameter :: epoch_length = 24
+  integer, parameter :: significant_bits = 20      !! of an epoch: sums of epochs are exact
+  !> Events of a collapse: at least these, and these per disk.
+  integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
+  real(real64), parameter :: shortest = 2.0_real64**(-20)  !! epoch, in blinks
+  real(real64), parameter :: last_time = 0.5_real64*never
+  real(real64), parameter :: densest = 0.9_real64  !! packing fraction
+
+contains
+
+  !> Chooses the length of the first epoch by a guess at the rate of events, and the time that is too short for any
+  !> disk to move visibly.
+  pure subroutine begin_first_epoch(sim)
+    type(simulation_t), intent(inout) :: sim
+    real(real64) :: fastest, mean
+    integer(int32) :: i
+
+    mean = magnitude(sim%box%gravity)*minval(sim%disk%radius)
+    fastest = mean
+    do i = 1, sim%n_disks()
+      associate (v => sim%disk(i)%v)
+        mean = mean + dot_product(v, v)/sim%n_disks()
+        fastest = max(fastest, dot_product(v, v))
+      end associate
+    end do
+    sim%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
+    call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path(sim)))
+    sim%last_advance = sim%now
+    sim%events_then = sim%events
+  end subroutine begin_first_epoch
+
+  !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
+  !> walls.
+  pure function events_per_path(sim) result(rate)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: rate                           !! [1/length]
+    real(real64) :: packing
+
+    packing = min(pi*sum(sim%disk%radius**2)/product(sim%box%edges()), densest)
+    rate = sqrt(2/pi)*packing*(1 - 7*packing/16)/(1 - packing)**2/(sum(sim%disk%radius)/sim%n_disks()) &
+      + sum(1/sim%box%edges())
+  end function events_per_path
+
+  !> Events of any kind wanted between two epochs.
+  pure function events_per_epoch(sim) result(n)
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: n
+
+    n = epoch_length*sim%n_disks()/2 + 100
+  end function events_per_epoch
+
+  !> An epoch of a given length begins now.
+  pure subroutine begin_epoch(sim, length)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: length             !! [time]
+
+    sim%epoch_begin = sim%now
+    sim%epoch_end = min(sim%now + max(length, shortest*sim%blink), last_time)
+    sim%epoch_events = sim%events
+  end subroutine begin_epoch
+
+  !> Ends the epoch now: moves the origin of time to about now, so that times stay small and keep their digits. As
+  !> everything must be predicted again then, it also sorts the disks by cell. The next epoch ends at a time, not after a
+  !> number of events, so that parts of a simulation that know nothing of each other agree on it.
+  subroutine move_epoch(sim)
+    type(simulation_t), intent(inout) :: sim
+    real(real64) :: shift, length
+
+    if (sim%now - sim%last_advance >= sim%blink) then
+      sim%last_advance = sim%now
+      sim%events_then = sim%events
+    end if
+    length = (sim%now - sim%epoch_begin)*min(2.0_real64, &
+      events_per_epoch(sim)/real(max(sim%events - sim%epoch_events, 1_int64), real64))
+    shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
+    call renumber(sim)
+    sim%disk%clock = sim%disk%clock - shift
+    sim%disk%stamp = 0
+    sim%now = sim%now - shift
+    sim%epoch = sim%epoch + shift
+    sim%last_advance = sim%last_advance - shift
+    call begin_epoch(sim, length)
+  end subroutine move_epoch
+
+  !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
+  pure function most_events(sim) result(n)
+    type(simulation_t), intent(in) :: sim
+    integer(int64) :: n
+
+    n = sim%epoch_events + 2*events_per_epoch(sim)
+  end function most_events
+
+  !> Whether a long series of events has not advanced the clock, as in a collapse; asked at the end of an epoch.
+  pure function stands_still(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = sim%now - sim%last_advance < sim%blink &
+      .and. sim%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
+  end function stands_still
+
+end module epochs
