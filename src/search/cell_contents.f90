@@ -186,21 +186,24 @@ contains
     integer(int32), intent(in) :: c, stride, i
     integer(int32), intent(out) :: list(list_capacity)
     integer(int32), intent(out) :: n               !! number of disks listed
-    integer(int64) :: m, own
+    integer(int64) :: below, here, above, m, own   ! as long as an address: no conversions
 
+    here = c
+    below = here - stride
+    above = here + stride
     m = 0
-    call append(cell(c - stride - 1), list, m)
-    call append(cell(c - stride), list, m)
-    call append(cell(c - stride + 1), list, m)
-    call append(cell(c - 1), list, m)
-    own = m + 1 + slots_before(cell(c), i)
-    call append(cell(c), list, m)
+    call append(cell(below - 1), list, m)
+    call append(cell(below), list, m)
+    call append(cell(below + 1), list, m)
+    call append(cell(here - 1), list, m)
+    own = m + 1 + slots_before(cell(here), i)
+    call append(cell(here), list, m)
     list(own) = list(m)
     m = m - 1
-    call append(cell(c + 1), list, m)
-    call append(cell(c + stride - 1), list, m)
-    call append(cell(c + stride), list, m)
-    call append(cell(c + stride + 1), list, m)
+    call append(cell(here + 1), list, m)
+    call append(cell(above - 1), list, m)
+    call append(cell(above), list, m)
+    call append(cell(above + 1), list, m)
     n = int(m, int32)
   end subroutine gather
 
