@@ -5,7 +5,7 @@ module run
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
-  use initial_state, only: describe_system
+  use initial_state, only: describe_system, restless_disk
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
@@ -136,6 +136,7 @@ contains
     character(len=:), allocatable :: text
 
     text = run%evolution%warning(run%sim)
+    if (text == "" .and. run%input%settings%run%dynamics == "events") text = restless_disk(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"

@@ -130,6 +130,7 @@ contains
     s%name = trim(group%instance)
     s%placement = group%text_of("placement")
     s%file = group%text_of("file")
+    s%scale_positions = group%text_of("scale_positions") == ".true."
     s%region = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
     allocate (region, source=group%reals_of("region"))
     if (size(region) > 0) s%region = region
@@ -149,6 +150,7 @@ contains
     s%velocities = group%text_of("velocities")
     s%speed = group%real_of("speed", 0.0_real64)
     s%temperature = group%real_of("temperature", 0.0_real64)
+    s%exact_temperature = group%real_of("exact_temperature", -1.0_real64)
     call take_pairs(group, "velocity", s%velocity, problems)
     associate (n => size(s%velocity, 2))
       if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
@@ -170,7 +172,7 @@ contains
     pairs = reshape(values, [2, size(values)/2])
   end subroutine take_pairs
 
-  !> The number of disks, given or following from the grid or the list of positions.
+  !> The number of disks, given or following from the grid or the list of positions. That in a file is counted later.
   subroutine take_count(group, s, problems)
     type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
@@ -185,6 +187,7 @@ contains
     if (s%grid(1) > 0) n = product(int(s%grid, int64))
     if (group%faulty("count")) return
     if (n == 0) then
+      if (s%file /= "" .and. .not. group%given("packing_fraction")) return
       if (.not. (group%faulty("position") .or. group%faulty("grid"))) call group%demand("count", problems)
     else if (group%given("count")) then
       if (n /= s%count) call group%complain(source, "holds "//counted(n, "disk")//", but species.count is "// &

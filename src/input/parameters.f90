@@ -91,7 +91,7 @@ module parameters
   type(parameter_t), parameter :: species_rows(*) = [ &
     parameter_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
     parameter_t("species", "count", "integer", 1, "example", "100", &
-      "number of disks; may be left out with grid or position", count_of_disks), &
+      "number of disks; may be left out with grid, position or file", count_of_disks), &
     parameter_t("species", "mass", "real", 1, "default", "1", "mass of a disk", positive, "mass"), &
     parameter_t("species", "radius", "real", 1, "example", "0.01", &
       "radius of a disk; give it or packing_fraction", positive, "length"), &
@@ -103,11 +103,13 @@ module parameters
       "xlo, xhi, ylo, yhi of the part of the box it starts in; default the box", unit="length"), &
     parameter_t("species", "placement", "text", 1, "default", "'random'", &
       "where disks start; follows from grid, position or file if one is given", &
-      choices="random grid lattice dense explicit file"), &
+      choices="random grid lattice dense explicit file grown"), &
     parameter_t("species", "grid", "integer", 2, "optional", "10, 10", &
       "columns and rows of placement = 'grid'", count_of_disks, goes_with="placement grid"), &
     parameter_t("species", "file", "text", 1, "optional", "'runs/gas.h5'", &
-      "text file with lines x y [vx vy], or a run whose last frame is used", goes_with="placement file"), &
+      "text file with lines x y [vx vy], or a run whose last frame is used", goes_with="placement file grown"), &
+    parameter_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
+      "stretch the positions in the file of a run from its box to this one", goes_with="placement file grown"), &
     parameter_t("species", "position", "real", 0, "optional", "0.2, 0.5, 0.8, 0.5", &
       "x1, y1, x2, y2, ... of placement = 'explicit'", unit="length", goes_with="placement explicit"), &
     parameter_t("species", "velocities", "text", 1, "default", "'rest'", &
@@ -118,6 +120,8 @@ module parameters
       goes_with="velocities equal_speed uniform"), &
     parameter_t("species", "temperature", "real", 1, "fallback", "1", "kT of 'maxwell'", not_negative, "energy", &
       goes_with="velocities maxwell"), &
+    parameter_t("species", "exact_temperature", "real", 1, "optional", "1", &
+      "scale the velocities so that kT of the species is exactly this", not_negative, "energy"), &
     parameter_t("species", "velocity", "real", 0, "optional", "1, 0", &
       "vx1, vy1, vx2, vy2, ... of 'explicit'; one pair is used for all disks", unit="length/time", &
       goes_with="velocities explicit")]

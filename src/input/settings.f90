@@ -22,13 +22,15 @@ module settings
   !> A species, and how its disks start.
   type, extends(species_t) :: species_settings_t
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
-    character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit' or 'file'
+    character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
     integer :: grid(2)                                !! nx, ny; 0, 0 when not given
-    character(len=:), allocatable :: file             !! of placement 'file': text columns, or a run's HDF5 file
+    character(len=:), allocatable :: file             !! of placement 'file', 'grown': text columns, or a run's HDF5 file
+    logical :: scale_positions = .false.              !! from the box of that run to this one
     real(real64), allocatable :: position(:, :)       !! (2,count) of 'explicit' [length]; else (2,0)
     character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
     real(real64) :: speed                             !! of 'equal_speed' and 'uniform' (half width) [length/time]
     real(real64) :: temperature                       !! kT of 'maxwell' [energy]
+    real(real64) :: exact_temperature = -1.0_real64   !! kT to scale velocities to; negative: none [energy]
     real(real64), allocatable :: velocity(:, :)       !! (2,count) or one pair for all, of 'explicit'; else (2,0)
   end type species_settings_t
 

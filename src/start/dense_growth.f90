@@ -1,6 +1,7 @@
 !> Dense random packings: disks start small, move as an elastic gas, and grow to their full size (the idea of Lubachevsky
 !> and Stillinger, J. Stat. Phys. 60, 561 (1990)). Here they grow in jumps between short runs, each disk into the gap
-!> around it at that moment, so that the event-driven dynamics serves unchanged.
+!> around it at that moment, so that the event-driven dynamics serves unchanged. They may also start from given places, as
+!> large as these allow.
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
@@ -23,6 +24,8 @@ module dense_growth
   real(real64), parameter :: loose = 0.4_real64         !! packing at which the disks are scattered
   real(real64), parameter :: lead = 1.02_real64         !! of any disk over the smallest, at most
   real(real64), parameter :: caution = 0.9_real64       !! part of the gap to take
+  real(real64), parameter :: smallest = 1.0e-3_real64   !! scale to begin with
+  integer, parameter :: approaches = 6                  !! to this scale: each leaves a tenth of the gap
   integer, parameter :: run_length = 2                  !! collisions per disk between jumps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
   integer, parameter :: jumps_per_check = 50            !! in which a tenth of what is lacking must be gained
@@ -35,7 +38,7 @@ contains
     type(species_t), intent(in) :: species(:)           !! counts and radii to reach
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! shows how far it is
-    real(real64), allocatable, intent(out) :: x(:, :)   !! (2,n) species by species [length]
+    real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) species by species; in: where to start, or none [length]
     type(error_t), allocatable, intent(out) :: error
     type(simulation_t) :: sim
     type(event_driven_t), allocatable :: evolution
@@ -43,7 +46,9 @@ contains
     integer(int32) :: i
     integer :: jump
 
-    call scatter(box, species, stream, line, sim, error)
+    call describe(box, species, sim)
+    if (size(x, 2) == 0) call scatter(stream, line, sim, error)
+    if (size(x, 2) > 0) call begin_at(x, stream, sim, error)
     if (allocated(error)) return
     allocate (evolution)
     allocate (cell_grid_t :: evolution%search)
@@ -66,7 +71,7 @@ contains
       call grow(sim, min(1.0_real64, lead*(1 - lack)))
     end do
     call move(evolution, sim, mixing_length, error)
-    allocate (x(2, size(sim%disk)))
+    if (size(x, 2) == 0) x = reshape(x, [2, size(sim%disk)], pad=[0.0_real64])
     do i = 1, sim%n_disks()
       x(:, sim%tag(i)%id) = sim%disk(i)%x
     end do
@@ -84,18 +89,12 @@ contains
       "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; use fewer or smaller disks")
   end subroutine fail_to_grow
 
-  !> Small disks at random places, with random velocities.
-  subroutine scatter(box, species, stream, line, sim, error)
+  !> Elastic disks in their box, species by species, at no place yet.
+  subroutine describe(box, species, sim)
     type(box_t), intent(in) :: box
     type(species_t), intent(in) :: species(:)
-    type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(inout) :: sim
-    type(error_t), allocatable, intent(out) :: error
-    type(packing_t) :: packing
-    real(real64) :: scale, wanted
-    integer :: k, n
-    logical :: complete
+    integer :: n, k, s
 
     n = sum(species%count)
     sim%box = box
@@ -105,24 +104,59 @@ contains
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     allocate (sim%disk(n), sim%tag(n))
     allocate (sim%image(2, n), source=0_int64)
-    wanted = pi*sum(species%count*species%radius**2)/product(box%edges())
+    sim%tag%id = [(int(k, int32), k=1, n)]
+    sim%tag%species = [([(int(s, int32), k=1, species(s)%count)], s=1, size(species))]
+  end subroutine describe
+
+  !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
+  subroutine begin_at(x, stream, sim, error)
+    real(real64), intent(in) :: x(:, :)                 !! (2,n) [length]
+    type(random_stream_t), intent(inout) :: stream
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: scale
+    integer :: k
+
+    do k = 1, size(x, 2)
+      sim%disk(k)%x = x(:, k)
+      call stream%draw_direction(sim%disk(k)%v)
+    end do
+    sim%disk%radius = smallest*sim%species(sim%tag%species)%radius
+    do k = 1, approaches
+      call grow(sim, 1.0_real64)
+    end do
+    scale = minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
+    sim%disk%radius = scale*sim%species(sim%tag%species)%radius
+    if (scale <= smallest) call fail_to_grow(sim, error)
+  end subroutine begin_at
+
+  !> Small disks at random places, with random velocities.
+  subroutine scatter(stream, line, sim, error)
+    type(random_stream_t), intent(inout) :: stream
+    class(status_line_t), intent(inout) :: line
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    type(packing_t) :: packing
+    real(real64) :: scale, wanted
+    integer :: k
+    logical :: complete
+
+    wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
     scale = sqrt(min(1.0_real64, loose/wanted))
     do
-      packing = packing_t(box, n, size(species))
-      call fill(packing, species, scale, stream, line, complete)
+      packing = packing_t(sim%box, size(sim%disk), size(sim%species))
+      call fill(packing, sim%species, scale, stream, line, complete)
       if (complete) exit
       scale = caution*scale
-      if (scale < 1.0e-3_real64) then
+      if (scale < smallest) then
         call fail_to_grow(sim, error)
         return
       end if
     end do
-    do k = 1, n
+    do k = 1, size(sim%disk)
       sim%disk(k)%x = packing%disk(k)%x
       call stream%draw_direction(sim%disk(k)%v)
-      sim%tag(k)%id = int(k, int32)
-      sim%tag(k)%species = packing%disk(k)%species
-      sim%disk(k)%radius = scale*species(sim%tag(k)%species)%radius
+      sim%disk(k)%radius = scale*sim%species(sim%tag(k)%species)%radius
     end do
   end subroutine scatter
 

@@ -2,17 +2,18 @@
 !> Positions and velocities of each species have random streams of their own, so that a change of one
 !> does not change what the others draw.
 module initial_state
-  use kinds, only: int32, int64
+  use kinds, only: int32, int64, real64
   use errors, only: error_t
   use placement, only: place_disks
   use random_stream, only: random_stream_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
-  use starting_velocities, only: draw_velocities, remove_drift
+  use texts, only: written
+  use starting_velocities, only: draw_velocities, remove_drift, scale_to_temperature
   implicit none
   private
-  public :: create_simulation, describe_system
+  public :: create_simulation, describe_system, restless_disk
 
   integer, parameter :: purpose = 2                         !! of this module's random streams
 
@@ -29,7 +30,7 @@ contains
     call list_disks(sim)
     call place_disks(settings%species, sim%box, settings%run%seed, line, sim%disk, error)
     if (allocated(error)) return
-    call set_in_motion(settings, sim)
+    call set_in_motion(settings, sim, error)
     sim%start_energy = sim%kinetic_energy()
   end subroutine create_simulation
 
@@ -67,9 +68,10 @@ contains
   end subroutine list_disks
 
   !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero.
-  pure subroutine set_in_motion(settings, sim)
+  subroutine set_in_motion(settings, sim, error)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(inout) :: error
     type(random_stream_t) :: stream
     logical :: balanced
     integer :: s, first
@@ -84,6 +86,39 @@ contains
       end associate
     end do
     if (balanced) call remove_drift(settings%species, sim)
+    first = 1
+    do s = 1, size(settings%species)
+      associate (species => settings%species(s))
+        if (species%exact_temperature >= 0 .and. .not. allocated(error)) &
+          call scale_to_temperature(species, sim%disk(first:first + species%count - 1), error)
+        first = first + species%count
+      end associate
+    end do
   end subroutine set_in_motion
+
+  !> Warns of a disk that starts so low above the floor that it would hardly do anything but bounce; empty if there is none.
+  pure function restless_disk(sim) result(text)
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: text
+    real(real64), parameter :: lowest = 1.0e-7_real64         ! height over radius
+    real(real64) :: height, speed
+    integer(int32) :: i
+    integer :: axis
+
+    text = ""
+    do axis = 1, 2
+      associate (g => sim%box%gravity(axis))
+        do i = 1, merge(sim%n_disks(), 0, abs(g) > 0)
+          height = sim%disk(i)%x(axis) - sim%box%lower(axis) - sim%disk(i)%radius
+          if (g > 0) height = sim%box%upper(axis) - sim%disk(i)%x(axis) - sim%disk(i)%radius
+          speed = sqrt(sim%disk(i)%v(axis)**2 + 2*abs(g)*max(height, 0.0_real64))
+          if (.not. speed > 0 .or. speed**2 > 2*abs(g)*lowest*sim%disk(i)%radius) cycle
+          text = "disk "//written(sim%tag(i)%id)//" starts "//written(height)//" above what it falls on: it bounces " &
+            //written(abs(g)/(2*speed))//" times per unit of time; start it higher, or on the wall with dynamics = 'steps'"
+          return
+        end do
+      end associate
+    end do
+  end function restless_disk
 
 end module initial_state

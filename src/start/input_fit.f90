@@ -3,11 +3,14 @@
 module input_fit
   use kinds, only: pi, real64
   use box_geometry, only: box_t, obstacle_t
+  use errors, only: error_t
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text
+  use last_frame, only: count_in_run, is_run
   use packing, only: packing_t
   use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
+  use position_file, only: count_positions
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use texts, only: written
@@ -18,17 +21,17 @@ module input_fit
   real(real64), parameter :: rounding = 1.0e-12_real64        !! relative, of touching disks
   real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
-  real(real64), parameter :: closest_packing = 0.9068_real64  !! pi/sqrt(12), triangular lattice
+  real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 
 contains
 
   !> Checks every species that is known well enough; the others have been reported already.
   subroutine check_fit(settings, groups, problems)
-    type(settings_t), intent(in) :: settings                  !! empty if the text could not be understood
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(settings_t), intent(inout) :: settings               !! empty if the text could not be understood
+    type(parameter_group_t), intent(inout) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     type(species_settings_t), allocatable :: species(:)
-    logical :: sound
+    logical :: sound, alone
     integer :: o(2), s(2), k
 
     if (.not. allocated(settings%species)) return
@@ -39,9 +42,11 @@ contains
       do k = 1, size(box%obstacle)
         call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
       end do
+      call count_disks(groups(s(1):s(2)), settings%species, problems)
       species = settings%species
+      alone = sum(species%count) == 1
       do k = 1, size(species)
-        call check_species(groups(s(1) + k - 1), species(k), box, problems, sound)
+        call check_species(groups(s(1) + k - 1), species(k), box, alone, problems, sound)
         sound = sound .and. species(k)%placement == "explicit" .and. size(species(k)%position, 2) == species(k)%count
         if (sound) cycle
         species(k)%count = 0
@@ -50,6 +55,31 @@ contains
       call check_positions(groups(s(1):s(2)), species, box, problems)
     end associate
   end subroutine check_fit
+
+  !> Counts the disks of species that leave that to their file.
+  subroutine count_disks(groups, species, problems)
+    type(parameter_group_t), intent(inout) :: groups(:)       !! the species
+    type(species_settings_t), intent(inout) :: species(:)
+    type(problem_list_t), intent(inout) :: problems
+    type(error_t), allocatable :: error
+    integer :: k
+
+    do k = 1, size(species)
+      associate (s => species(k))
+        if (s%count > 0 .or. s%file == "" .or. groups(k)%given("count") .or. groups(k)%given("packing_fraction")) cycle
+        if (is_run(s%file)) call count_in_run(s%file, s%name, s%count, error)
+        if (.not. is_run(s%file)) call count_positions(s%file, s%count, error)
+        if (allocated(error)) then
+          call groups(k)%complain("file", error%message, problems)
+        else if (s%count == 0) then
+          call groups(k)%complain("file", s%file//" holds no disks", problems)
+        end if
+        call groups(k)%put_text("count", written(s%count))
+        if (all(s%region([1, 3]) < s%region([2, 4]))) call groups(k)%put_reals("packing_fraction", &
+          [s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))])
+      end associate
+    end do
+  end subroutine count_disks
 
   !> What an obstacle itself finds wrong with its place in the box.
   subroutine check_obstacle(group, obstacle, box, problems)
@@ -66,10 +96,11 @@ contains
   end subroutine check_obstacle
 
   !> A species must have room: in its region, in a period, and in every container.
-  subroutine check_species(group, s, box, problems, sound)
+  subroutine check_species(group, s, box, alone, problems, sound)
     type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
+    logical, intent(in) :: alone                              !! there is one disk in all
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: sound
     integer :: axis, k
@@ -77,7 +108,7 @@ contains
     sound = .false.
     if (s%radius <= 0 .or. s%count < 1 .or. group%faulty("region")) return
     do axis = 1, 2
-      call check_axis(group, s, box, axis, problems, sound)
+      call check_axis(group, s, box, axis, merge(1, 2, alone), problems, sound)
       if (.not. sound) return
     end do
     call check_fraction(group, s, problems)
@@ -89,12 +120,14 @@ contains
     end do
   end subroutine check_species
 
-  !> Along each axis the region must lie in the box and hold a disk; a period must hold two.
-  subroutine check_axis(group, s, box, axis, problems, sound)
+  !> Along each axis the region must lie in the box and hold a disk; a period must hold two, so that no disk touches two
+  !> images of another.
+  subroutine check_axis(group, s, box, axis, together, problems, sound)
     type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
     integer, intent(in) :: axis
+    integer, intent(in) :: together                           !! disks that a period must hold
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: sound
     logical :: endless(2)
@@ -112,9 +145,9 @@ contains
     else if (.not. endless(axis) .and. 2*s%radius > (upper - lower)*(1 + rounding)) then
       call complain("radius", "a disk of diameter "//written(2*s%radius)// &
         " does not fit in its region of width "//written(upper - lower))
-    else if (box%periodic(axis) .and. 4*s%radius > box%upper(axis) - box%lower(axis)) then
-      call complain("radius", "a periodic box must be at least two diameters wide: "// &
-        written(4*s%radius)//" > "//written(box%upper(axis) - box%lower(axis)))
+    else if (box%periodic(axis) .and. 2*together*s%radius > box%upper(axis) - box%lower(axis)) then
+      call complain("radius", "a periodic box must be at least "//trim(merge("one diameter ", "two diameters", together == 1)) &
+        //" wide: "//written(2*together*s%radius)//" > "//written(box%upper(axis) - box%lower(axis)))
     else if (s%radius < resolution*farthest) then
       call complain("radius", written(s%radius)//" is too small to be resolved at coordinates of "//written(farthest))
     else
@@ -141,7 +174,7 @@ contains
     variable = "radius"
     if (group%given("packing_fraction")) variable = "packing_fraction"
     filled = "the disks would fill "//written(packing)//" of their region; "
-    if (packing > closest_packing) then
+    if (packing > closest_packing*(1 + rounding)) then
       call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
     else if (packing > random_limit .and. s%placement == "random") then
       call group%complain(variable, filled//"random placement reaches "//written(random_limit)// &

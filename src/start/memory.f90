@@ -28,7 +28,7 @@ contains
     n = sum(int(settings%species%count, int64))
     each = per_disk
     do k = 1, size(settings%species)
-      if (settings%species(k)%placement == "dense") each = per_growing_disk
+      if (any(settings%species(k)%placement == [character(len=5) :: "dense", "grown"])) each = per_growing_disk
     end do
     if (settings%run%dynamics == "steps") each = max(each, per_stepped_disk)
     needed = n*each + besides

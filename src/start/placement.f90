@@ -1,8 +1,8 @@
 !> Finds a place for every disk.
 !>
 !> First come those that are fixed ('explicit', 'file', 'grid', 'lattice') in the order of the
-!> input; then 'random', the species with the largest disks first; then 'dense', where species with
-!> the same region grow together around the disks that are there already.
+!> input; then 'random', the species with the largest disks first; then 'dense' and 'grown', where species
+!> with the same region grow together around the disks that are there already.
 module placement
   use kinds, only: int32, int64, pi, real64
   use bounds, only: first_outside
@@ -13,7 +13,7 @@ module placement
   use errors, only: error_t, exit_usage, fail
   use h5md_layout, only: position, value_of, velocity
   use known_places, only: add_known, misfit_t, misfit_text, offset
-  use last_frame, only: read_last_frame
+  use last_frame, only: is_run, read_last_frame
   use packing, only: packing_t
   use parameters, only: largest
   use position_file, only: read_positions
@@ -49,7 +49,7 @@ contains
 
     packing = packing_t(box, size(disk), size(species))
     random = [(species(k)%placement == "random", k=1, size(species))]
-    dense = [(species(k)%placement == "dense", k=1, size(species))]
+    dense = [(species(k)%placement == "dense" .or. species(k)%placement == "grown", k=1, size(species))]
     do s = 1, size(species)
       if (.not. (random(s) .or. dense(s))) call place_fixed(packing, species, s, disk, error)
       if (allocated(error)) return
@@ -63,8 +63,8 @@ contains
     do s = 1, size(species)
       if (.not. dense(s)) cycle
       together = dense .and. [(all(species(k)%region <= species(s)%region .and. &
-        species(k)%region >= species(s)%region), k=1, size(species))]
-      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, line, error)
+        species(k)%region >= species(s)%region .and. species(k)%placement == species(s)%placement), k=1, size(species))]
+      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, line, disk, error)
       if (allocated(error)) return
       dense = dense .and. .not. together
     end do
@@ -82,7 +82,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(real64), allocatable :: x(:, :)
     integer, allocatable :: rows(:)
-    integer :: k, columns
 
     allocate (rows(0))
     select case (species(s)%placement)
@@ -93,28 +92,41 @@ contains
     case ("lattice")
       call lattice_positions(species(s), packing%box, x, error)
     case default                                            ! 'file'
-      columns = merge(4, 2, species(s)%velocities == "file")
-      if (is_run(species(s)%file)) then
-        call read_last_frame(species(s)%file, species(s)%name, species(s)%count, columns, x, rows, error)
-      else
-        call read_positions(species(s)%file, species(s)%count, columns, x, rows, error)
-      end if
-      if (.not. allocated(error)) call check_numbers(species(s), x, rows, error)
+      call read_disks(species(s), packing%box, x, rows, disk(offset(species, s) + 1:), error)
       if (allocated(error)) return
-      do k = 1, merge(species(s)%count, 0, columns == 4)
-        disk(offset(species, s) + k)%v = x(3:4, k)
-      end do
     end select
     if (.not. allocated(error)) call add_checked(packing, species, s, x, rows, error)
   end subroutine place_fixed
 
-  !> Whether the file is the output of a run, finished or not.
-  pure function is_run(path) result(yes)
-    character(len=*), intent(in) :: path
-    logical :: yes
+  !> Reads the disks of a species from its file. Velocities go into the disks if they are wanted.
+  subroutine read_disks(species, box, x, rows, disk, error)
+    type(species_settings_t), intent(in) :: species
+    type(box_t), intent(in) :: box
+    real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count), or more rows [length]
+    integer, allocatable, intent(out) :: rows(:)            !! as in `origin`
+    type(disk_t), intent(inout) :: disk(:)                  !! (count), or more
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
 
-    yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
-  end function is_run
+    associate (s => species)
+      allocate (x(merge(4, 2, s%velocities == "file"), s%count))
+      if (.not. is_run(s%file) .and. s%scale_positions) then
+        call fail(error, exit_usage, "species."//s%name//".scale_positions: "//s%file//" is not the file of a run " &
+          //"(.h5), which says how large its box was")
+      else if (.not. is_run(s%file)) then
+        call read_positions(s%file, s%count, x, rows, error)
+      else if (s%scale_positions) then
+        call read_last_frame(s%file, s%name, s%count, x, rows, error, box)
+      else
+        call read_last_frame(s%file, s%name, s%count, x, rows, error)
+      end if
+      if (.not. allocated(error)) call check_numbers(s, x, rows, error)
+      if (allocated(error)) return
+      do k = 1, merge(s%count, 0, size(x, 1) == 4)
+        disk(k)%v = x(3:4, k)
+      end do
+    end associate
+  end subroutine read_disks
 
   !> Where the values of a disk come from, for messages: a line of a text file, a row of a dataset, or a rule.
   pure function origin(species, rows, k, column) result(text)
@@ -206,23 +218,30 @@ contains
     end associate
   end subroutine place_at_random
 
-  !> Grows species that share a region, in a box of its shape.
-  subroutine place_densely(packing, species, group, seed, line, error)
+  !> Grows species that share a region, in a box of its shape; 'grown' ones from where a file has them.
+  subroutine place_densely(packing, species, group, seed, line, disk, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: group(:)                         !! their numbers
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line
+    type(disk_t), intent(inout) :: disk(:)                  !! gets the velocities of a file
     type(error_t), allocatable, intent(out) :: error
     type(random_stream_t) :: stream
-    real(real64), allocatable :: x(:, :)
+    real(real64), allocatable :: x(:, :), from_file(:, :)
+    integer, allocatable :: rows(:)
     type(species_t) :: member(size(group))
     integer :: k, first
 
+    allocate (x(2, 0))
     do k = 1, size(group)
       member(k)%name = species(group(k))%name
       member(k)%count = species(group(k))%count
       member(k)%radius = species(group(k))%radius
+      if (species(group(k))%placement /= "grown") cycle
+      call read_disks(species(group(k)), packing%box, from_file, rows, disk(offset(species, group(k)) + 1:), error)
+      if (allocated(error)) return
+      x = reshape([x, from_file(1:2, :)], [2, size(x, 2) + size(from_file, 2)])
     end do
     call stream%seed(seed, [group(1), purpose])
     call grow_disks(growth_box(packing, species(group(1))%region), member, stream, line, x, error)

@@ -9,25 +9,52 @@ module position_file
   use texts, only: shown, written
   implicit none
   private
-  public :: read_positions
+  public :: count_positions, read_positions
 
   integer, parameter :: longest_line = 1024
 
 contains
 
+  !> Counts the disks.
+  subroutine count_positions(path, count, error)
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: count
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: table(2, 0)
+    integer :: lines(0)
+
+    call read_lines(path, table, lines, count, error)
+  end subroutine count_positions
+
   !> Reads exactly `count` disks.
-  subroutine read_positions(path, count, n_columns, table, lines, error)
+  subroutine read_positions(path, count, table, lines, error)
     character(len=*), intent(in) :: path
     integer, intent(in) :: count
-    integer, intent(in) :: n_columns                        !! needed: 2, or 4 with velocities
-    real(real64), allocatable, intent(out) :: table(:, :)   !! (n_columns,count)
+    real(real64), intent(out) :: table(:, :)                !! (columns,count) x, y, or x, y, vx, vy
     integer, allocatable, intent(out) :: lines(:)           !! (count) in which the disks stand
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n
+
+    table = 0
+    allocate (lines(count), source=0)
+    call read_lines(path, table, lines, n, error)
+    if (n /= count .and. .not. allocated(error)) &
+      call fail(error, exit_usage, path//": "//written(n)//" disks, but species.count is "//written(count))
+  end subroutine read_positions
+
+  !> Reads the disks for which the table has room, and counts them all.
+  subroutine read_lines(path, table, lines, n, error)
+    character(len=*), intent(in) :: path
+    real(real64), intent(inout) :: table(:, :)
+    integer, intent(inout) :: lines(:)
+    integer, intent(out) :: n
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_line) :: line
     character(len=256) :: reason
     character(len=:), allocatable :: problem
-    integer :: unit, status, number, n, before
+    integer :: unit, status, number, before
 
+    n = 0
     problem = opening_problem(path, writable=.false.)
     if (problem == "") then
       open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
@@ -37,8 +64,6 @@ contains
       call fail(error, exit_files, path//": cannot be read: "//problem)
       return
     end if
-    allocate (table(n_columns, count), lines(count))
-    n = 0
     number = 0
     do
       read (unit, "(a)", iostat=status, iomsg=reason) line
@@ -51,19 +76,15 @@ contains
       else
         call read_line(line, n, table, problem)
       end if
-      if (n > before) lines(min(n, count)) = number
+      if (n > before .and. n <= size(lines)) lines(n) = number
       if (problem == "") cycle
       call fail(error, exit_usage, path//":"//written(number)//": "//problem)
       exit
     end do
     close (unit)
     if (allocated(error)) return
-    if (.not. is_iostat_end(status)) then
-      call fail(error, exit_files, path//": "//trim(reason))
-    else if (n /= count) then
-      call fail(error, exit_usage, path//": "//written(n)//" disks, but species.count is "//written(count))
-    end if
-  end subroutine read_positions
+    if (.not. is_iostat_end(status)) call fail(error, exit_files, path//": "//trim(reason))
+  end subroutine read_lines
 
   !> Appends the disk of a line, if there is one, to the table. Columns that are not needed are also
   !> checked.

@@ -1,13 +1,14 @@
 !> How disks start to move, by the rule of their species.
 module starting_velocities
   use kinds, only: real64
+  use errors, only: error_t, exit_usage, fail
   use disks, only: disk_t
   use random_stream, only: random_stream_t
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: draw_velocities, remove_drift
+  public :: draw_velocities, remove_drift, scale_to_temperature
 
 contains
 
@@ -96,5 +97,28 @@ contains
       if (shifted(sim%tag(i)%species)) sim%disk(i)%v = sim%disk(i)%v - momentum/mass
     end do
   end subroutine remove_drift
+
+  !> Scales the velocities of the disks of one species, relative to their mean, to an exact temperature: the momentum stays.
+  subroutine scale_to_temperature(species, disk, error)
+    type(species_settings_t), intent(in) :: species
+    type(disk_t), intent(inout) :: disk(:)          !! (count)
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: mean(2), temperature
+    integer :: i, axis
+
+    mean = [(sum(disk%v(axis))/size(disk), axis=1, 2)]
+    temperature = 0
+    do i = 1, size(disk)
+      temperature = temperature + 0.5_real64*species%mass*sum((disk(i)%v - mean)**2)/size(disk)
+    end do
+    if (.not. temperature > 0) then
+      call fail(error, exit_usage, "species."//species%name//".exact_temperature: the disks do not move relative to each " &
+        //"other, which no factor changes; let them start with velocities = 'maxwell'")
+      return
+    end if
+    do i = 1, size(disk)
+      disk(i)%v = mean + sqrt(species%exact_temperature/temperature)*(disk(i)%v - mean)
+    end do
+  end subroutine scale_to_temperature
 
 end module starting_velocities

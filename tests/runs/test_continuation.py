@@ -158,7 +158,7 @@ def test_without_its_last_state_a_finished_run_is_not_continued(finished, tmp_pa
     assert run.returncode == FILES and "placement = 'file'" in one_line(run)
 
 
-@pytest.mark.parametrize("name", ["disks/x1", "disks/v2", "disks/collisions", "virial", "checksum"])
+@pytest.mark.parametrize("name", ["disks/x1", "disks/v2", "disks/collisions", "now", "checksum"])
 def test_a_damaged_last_state_is_refused(finished, tmp_path, name):
     with h5py.File(tmp_path / "gas.h5", "r+") as file:
         place = file["checkpoint"]

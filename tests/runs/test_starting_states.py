@@ -1,0 +1,203 @@
+"""States that runs start from: counted from files, stretched, grown, at an exact temperature."""
+
+import math
+
+import h5py
+import numpy as np
+import pytest
+
+from whole_runs import FINISHED, USAGE, one_line, write_input
+
+PERIODIC = "&box boundary = 'periodic', 'periodic' upper = {size}, {size} /\n"
+GAS = (
+    PERIODIC.format(size=1)
+    + """&species name = 'light' count = 150 radius = 0.02 velocities = 'maxwell' /
+&species name = 'heavy' count = 50 mass = 4 radius = 0.02 velocities = 'maxwell' /
+&stop collisions_per_disk = 5 /
+"""
+)
+NEXT = """&species name = 'light' radius = {radius} file = 'gas.h5' {more} /
+&species name = 'heavy' mass = 4 radius = {radius} file = 'gas.h5' {more} /
+&stop time = 0 /
+"""
+
+
+@pytest.fixture
+def onward(ricochet, tmp_path):
+    """`onward(size, radius, more)`: a run from the last frame of a gas in a box of another size."""
+    write_input(tmp_path, GAS)
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+
+    def run(size, radius, more=""):
+        write_input(
+            tmp_path, PERIODIC.format(size=size) + NEXT.format(radius=radius, more=more), "next.nml"
+        )
+        return ricochet("next.nml", "-o", "next.h5", "--force")
+
+    return run
+
+
+def last_and_first(folder):
+    """Positions and velocities at the end of one run, and at the beginning of the next."""
+    with h5py.File(folder / "gas.h5") as one, h5py.File(folder / "next.h5") as other:
+        names = [f"particles/disks/{name}/value" for name in ("position", "velocity")]
+        return [one[name][-1] for name in names], [other[name][0] for name in names]
+
+
+def observable(path, name):
+    with h5py.File(path) as file:
+        return file[f"observables/{name}/value"][0]
+
+
+def test_disks_in_the_file_of_a_run_need_no_count(onward, tmp_path):
+    assert onward(1, 0.02).returncode == FINISHED
+    (x, v), (y, w) = last_and_first(tmp_path)
+    assert (x == y).all() and (v == w).all()
+    with h5py.File(tmp_path / "next.h5") as file:
+        assert list(file["parameters/species/counts"]) == [150, 50]
+        assert file["parameters/species/light"].attrs["count"] == 150
+        packing = file["parameters/species/light"].attrs["packing_fraction"]
+        assert packing == pytest.approx(150 * math.pi * 0.02**2)
+
+
+@pytest.mark.parametrize(
+    ("lines", "count"), [("0.2 0.2\n# x\n\n .5,0.5 # y\n0.7 0.7", 3), ("1e-1 .1 1 0\n", 1)]
+)
+def test_disks_in_a_text_need_no_count(ricochet, tmp_path, lines, count):
+    (tmp_path / "disks").write_text(lines)
+    text = "&species radius = 0.05 file = 'disks' velocities = 'rest' / &stop time = 1 /"
+    write_input(tmp_path, text)
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == FINISHED and f"disks = {count}\n" in run.stdout
+    for wrong, says in [
+        ("count=7", "but species.count is 7"),
+        ("file='nothing'", "nothing: cannot be read"),
+        ("scale_positions=.true.", "is not the file of a run"),
+    ]:
+        run = ricochet("gas.nml", "-o", "x.h5", "--set", f"species.species1.{wrong}")
+        assert run.returncode == USAGE and says in one_line(run)
+    (tmp_path / "disks").write_text("# none\n")
+    run = ricochet("gas.nml", "-o", "x.h5")
+    assert run.returncode == USAGE and "holds no disks" in one_line(run)
+
+
+@pytest.mark.parametrize("size", [0.9, 1.3])
+def test_positions_are_stretched_to_another_box(onward, tmp_path, size):
+    radius = 0.01
+    assert onward(size, radius, "scale_positions = .true.").returncode == FINISHED
+    (x, v), (y, w) = last_and_first(tmp_path)
+    assert np.allclose(y, size * x, rtol=1e-14) and (v == w).all()
+
+
+def test_disks_that_a_smaller_box_makes_overlap_are_named(onward):
+    run = onward(0.8, 0.02, "scale_positions = .true.")
+    assert run.returncode == USAGE
+    lines = run.stderr.splitlines()
+    assert all("overlaps disk" in line and line.startswith("gas.h5: ") for line in lines)
+    run = onward(0.8, 0.01)  # not stretched
+    assert run.returncode == USAGE and "is not wholly in its region" in run.stderr
+
+
+def test_disks_grow_from_the_places_in_a_file(ricochet, tmp_path):
+    """A crystal stays one: its disks stay on their sites while it is compressed and grown."""
+    box = f"&box boundary = 'periodic', 'periodic' upper = 10, {5 * math.sqrt(3)!r} /\n"
+    light = "&species name = 'light' count = 100 packing_fraction = 0.75 placement = 'lattice'"
+    light += " temperature = 1 /\n"
+    write_input(tmp_path, box + light + "&stop collisions_per_disk = 20 /\n")
+    assert ricochet("gas.nml", "-o", "gas.h5", "--force").returncode == FINISHED
+    box = f"&box boundary = 'periodic', 'periodic' upper = 20, {10 * math.sqrt(3)!r} /\n"
+    radius = math.sqrt(0.84 / 0.75) * 2 * math.sqrt(0.75 * 50 * math.sqrt(3) / (100 * math.pi))
+    grown = "&species name = 'light' file = 'gas.h5' placement = 'grown' scale_positions = .true."
+    write_input(tmp_path, box + grown + f" radius = {radius} / &stop time = 0 /\n", "next.nml")
+    assert ricochet("next.nml", "-o", "next.h5").returncode == FINISHED
+    (x, v), (y, w) = last_and_first(tmp_path)
+    edges = np.array([20, 10 * math.sqrt(3)])
+    assert (v == w).all()
+    moved = y - 2 * x
+    moved -= np.round(moved / edges) * edges
+    moved -= np.median(moved, axis=0)
+    moved -= np.round(moved / edges) * edges
+    assert np.hypot(*moved.T).max() < 1  # half a spacing
+    apart = y[:, None] - y
+    apart -= np.round(apart / edges) * edges
+    assert (np.hypot(*apart.T) + 9 * np.eye(100)).min() > 2 * radius * (1 - 1e-12)
+
+
+def test_what_cannot_grow_is_told(onward):
+    run = onward(1, 0.0376, "placement = 'grown'")
+    assert run.returncode == USAGE and "of the wanted packing 0.88" in one_line(run)
+
+
+@pytest.mark.parametrize("box", ["wall", "periodic"])
+def test_a_temperature_is_exact_if_wanted(ricochet, tmp_path, box):
+    text = GAS.replace("'periodic', 'periodic'", f"'{box}', '{box}'")
+    write_input(tmp_path, text)
+    exact = [f"species.{name}.exact_temperature={t}" for name, t in [("light", 2), ("heavy", 0.5)]]
+    options = [word for value in exact for word in ("--set", value)]
+    assert ricochet("gas.nml", "-o", "sampled.h5").returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "exact.h5", *options).returncode == FINISHED
+    for name, temperature in [("light", 2), ("heavy", 0.5)]:
+        assert abs(observable(tmp_path / "sampled.h5", f"{name}/temperature") - 1) > 1e-3
+        found = observable(tmp_path / "exact.h5", f"{name}/temperature")
+        assert found == pytest.approx(temperature, rel=1e-13)
+    momenta = [observable(tmp_path / f"{name}.h5", "momentum") for name in ("exact", "sampled")]
+    assert np.allclose(*momenta, atol=1e-12)
+
+
+def test_velocities_from_a_file_are_scaled_to_an_exact_temperature(onward, tmp_path):
+    assert onward(1, 0.02, "exact_temperature = 0.01").returncode == FINISHED
+    for name in ("light", "heavy"):
+        found = observable(tmp_path / "next.h5", f"{name}/temperature")
+        assert found == pytest.approx(0.01, rel=1e-13)
+    run = onward(1, 0.02, "exact_temperature = 1 velocities = 'rest'")
+    assert run.returncode == USAGE and "exact_temperature" in one_line(run)
+
+
+@pytest.mark.parametrize(("packing", "fits"), [(0.90685, True), (0.90689, True), (0.90691, False)])
+def test_a_crystal_may_be_as_dense_as_disks_can_be(ricochet, tmp_path, packing, fits):
+    box = f"&box boundary = 'periodic', 'periodic' upper = 10, {5 * math.sqrt(3)!r} /\n"
+    species = f"&species count = 100 placement = 'lattice' packing_fraction = {packing} /\n"
+    write_input(tmp_path, box + species + "&stop time = 0 /\n")
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == (FINISHED if fits else USAGE)
+    assert fits or "the closest packing is 0.9069" in one_line(run)
+
+
+def test_a_single_disk_may_be_half_as_wide_as_a_period(ricochet, tmp_path):
+    box = "&box boundary = 'periodic', 'wall' upper = 0.3, 1 /\n"
+    write_input(
+        tmp_path, box + "&species count = 1 radius = 0.1 velocity = 0.7, 1 / &stop time = 8.1 /"
+    )
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    assert observable(tmp_path / "gas.h5", "total_energy") == pytest.approx(0.745)
+    with h5py.File(tmp_path / "gas.h5") as file:
+        x, image = (file[f"particles/disks/{name}/value"] for name in ("position", "image"))
+        way = x[-1, 0] + image[-1, 0] * [0.3, 1] - x[0, 0]
+    assert way[0] == pytest.approx(0.7 * 8.1, rel=1e-12)
+    run = ricochet("gas.nml", "-o", "x.h5", "--set", "species.species1.radius=0.16")
+    assert run.returncode == USAGE and "one diameter" in one_line(run)
+
+
+@pytest.mark.parametrize(("height", "warned"), [("0.1000000000000001", True), ("0.101", False)])
+def test_a_disk_that_would_only_bounce_is_warned_of(ricochet, tmp_path, height, warned):
+    text = f"&box gravity = 0, -1 / &species radius = 0.1 position = 0.5, {height}, 0.2, 0.3 /"
+    write_input(tmp_path, text + " &stop events = 10 /")
+    run = ricochet("gas.nml", "-o", "gas.h5", "--quiet", "--check")
+    assert run.returncode == FINISHED and run.stderr == ""
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == FINISHED
+    assert ("warning: disk 1 starts" in run.stderr) == warned
+
+
+def test_a_gas_that_has_cooled_down_says_so_in_its_file(ricochet, tmp_path):
+    text = GAS.replace(
+        "&stop collisions_per_disk = 5", "&contact restitution = 0.5 / &stop time = 1e90"
+    )
+    write_input(
+        tmp_path, text.replace("count = 150", "count = 2").replace("count = 50", "count = 2")
+    )
+    run = ricochet("gas.nml", "-o", "gas.h5", "--quiet")
+    assert run.returncode == FINISHED
+    with h5py.File(tmp_path / "gas.h5") as file:
+        note = file["provenance"].attrs["note"].decode()
+    assert note and f"note = {note}\n" in run.stdout
