@@ -18,9 +18,15 @@ START = 20.0  #: when everything has come to equilibrium
 
 
 def box(
-    v0: float, seed: int, time: float, frames: float | None = None, observed: float = 1.0, **run
+    v0: float,
+    seed: int,
+    time: float,
+    frames: float | None = None,
+    observed: float = 1.0,
+    top: float = 8 + R,
+    **run,
 ) -> Member:
-    """30 + 30 disks in the lower half; centres up to a height of 8."""
+    """30 + 30 disks in the lower half, wholly below `top`: by default centres up to 8."""
     output = {"observables_every_time": observed}
     if frames:
         output["frames_every_time"] = frames
@@ -31,7 +37,7 @@ def box(
             species=[
                 {
                     "name": name, "count": 30, "mass": mass, "radius": R,
-                    "region": (0, 8, 0, 8 + R), "velocities": "uniform", "speed": v0,
+                    "region": (0, 8, 0, top), "velocities": "uniform", "speed": v0,
                 }
                 for name, mass in MASS.items()
             ],
@@ -105,6 +111,7 @@ LONG_RUNS = tuple(
 )
 SCAN = {v0: tuple(box(v0, seed, 2000.0) for seed in range(1, 9)) for v0 in (0.1, 0.5, 1, 2)}
 STARTS = {v0: tuple(box(v0, seed, 1e-3) for seed in range(1, 101)) for v0 in (0.1, 0.5, 1, 2)}
+LOWER = tuple(box(0.5, seed, 1e-3, top=8.0) for seed in range(1, 101))
 ENERGIES = {0.1: 1.47898, 0.5: 1.48198, 1: 1.49136, 2: 1.52886}
 SCAN_KT = {0.1: 0.7302, 0.5: 0.7318, 1: 0.7366, 2: 0.7561}
 
@@ -131,6 +138,11 @@ MEANS = [
         )
         for v0, members in STARTS.items()
     ],
+    Case(
+        "P11-01", "v0 = 0.5, disks wholly below 8: E/N, 100 seeds", LOWER,
+        lambda *runs: over_runs(start_energy, runs),
+        ENERGIES[0.5] - G * np.mean([*MASS.values()]) * R / 2, sigmas(3, 0.03), "D",
+    ),
     Case(
         "P11-02", "5 energies: <K> over kT(E/N)",
         LONG_RUNS, lambda *runs: [kinetic(run) / temperature_of(start_energy(run)) for run in runs],

@@ -40,6 +40,9 @@ NOTES = """
   g Δt / 2s. Two disks overlap on a chord of length 2l, but collide only while they approach, on its
   first half: a contact is visible for the time l / g, not 2l / g (`post/missed.py`). The share is
   then about four times that of the table: at Δt = .001 still within 2 %, at .004 not.
+- **P11-01**: the table lets centres start in [R, 8]. A disk lies wholly in its region, so with
+  `region = 0, 8, 0, 8` they start up to 8 less R, and E / N is lower by g⟨m⟩R / 2 = .00735. Cases
+  take the region up to 8 + R, as the table means it; one takes it up to 8.
 - **P6-03**: R finds 1.39(1) between walls at packing .154 after 2 collisions per disk. The program
   gives 1.468(6), with time steps 1.485(11), in the dilute limit 1.449(8); the Boltzmann equation
   gives 1.455. After 4 and 6 collisions it gives 1.149(6) and 1.055(6), R 1.14(1) and 1.03(1).
