@@ -5,7 +5,7 @@
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-known=(scattering gas mixture cooling crater lab cost billiards gravity state)
+known=(scattering gas mixture cooling crater lab cost billiards gravity state melting)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -95,6 +95,10 @@ HTML
   section correlations 'Bulk: memory, diffusion, order' state
   section rates 'Bulk: pressure in time, free paths' state
   section haff 'Bulk: cooling by the law of Haff' state
+  section melting 'Melting: pressure against packing' melting
+  section melting_0.698 'Direction of the bonds at 0.698' melting
+  section melting_0.708 'Direction of the bonds at 0.708' melting
+  section melting_0.72 'Direction of the bonds at 0.720' melting
   section coverage 'Bulk: how often an error bar holds the truth' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"

@@ -179,7 +179,10 @@ RUNNING = {
         [PAIR + "&species name = 'other' radius = 0.05 position = 0.8, 0.5 /\n" + OUTPUT],
         {"scattering": ()},
     ),
-    "bulk": ([BULK + OUTPUT], {"correlations": (), "equation_of_state": (), "rates": ()}),
+    "bulk": (
+        [BULK + OUTPUT],
+        dict.fromkeys(("correlations", "equation_of_state", "rates", "melting"), ()),
+    ),
     "cooling": ([BULK + "&contact restitution = 0.9 /\n" + OUTPUT], {"haff": ()}),
     "neighbours": (
         [PAIR + OUTPUT, PAIR.replace("0.3, 0.3", "0.3, 0.300001") + OUTPUT],
