@@ -3,7 +3,7 @@
 #
 # 64^2 and 128^2 disks, from crystals, briefly: some minutes. Between 0.70 and 0.72 they have not quite
 # molten by then: the pressure is too low, errors are large, and warnings say so. With FULL=1 long
-# runs, and 256^2 disks: 46 hours of processor time for the largest, hardly any memory.
+# runs, and 256^2 disks: some 40 hours of processor time in all.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
