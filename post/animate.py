@@ -14,6 +14,7 @@ from ricochet.drawing import (
     LABELS,
     caption,
     chosen_colour,
+    colour_map,
     disk_collection,
     draw_box,
     move_disks,
@@ -46,6 +47,8 @@ def film_path(wish: Path | None, run: Run) -> Path:
 
 def colour_limits(run: Run, frames: list[int], colour: str) -> tuple[float, float]:
     """A scale for the whole film, from some of its frames."""
+    if colour == "psi6":
+        return -180.0, 180.0
     some = frames[:: max(1, len(frames) // 20)]
     top = max(float(np.quantile(values_of(run, frame, colour), 0.99)) for frame in some)
     return 0.0, top or 1.0
@@ -68,7 +71,7 @@ def animate(run: Run, frames: list[int], colour: str, path: Path, fps: int) -> N
     if colour == "species":
         species_legend(figure, run)
     else:
-        disks.set_clim(*colour_limits(run, frames, colour))
+        disks.set(cmap=colour_map(colour), clim=colour_limits(run, frames, colour))
         figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
     title = axes.set_title(" ")
     warn(figure, [run.shortcoming] if run.shortcoming else [])

@@ -19,6 +19,7 @@ from ricochet.crater import (
     crater,
     displaced,
     ended_by_time,
+    energy_fraction,
     packing_field,
     projectile,
 )
@@ -137,7 +138,8 @@ def marks(run: Run, size: Crater) -> dict[str, int]:
 def notes(run: Run, size: Crater) -> list[str]:
     """The same in words."""
     found, name = marks(run, size), run.path.name
-    left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, the crater still grows"
+    wanted = f"not the {100 * energy_fraction(run):g} % of stop.energy_fraction"
+    left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, {wanted}"
     box = f"{name}: the crater reaches the floor or the sides, {size.wall_collisions} wall hits"
     return [left] * found["ended_by_time"] + [box] * found["box_takes_part"]
 

@@ -120,6 +120,7 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
 def main() -> None:
     args = command_line(__doc__, "equation_of_state.png", skip=None).parse_args()
     runs = read_all(args.runs)
+    one_radius(runs)  # refuses a mixture among others
     rows, notes = table(grouped(runs, lambda run: round(packing(run), 6)), args.skip)
     title = "Equation of state of hard disks"
     report(args, runs, title, draw(rows, runs), rows, notes=notes)

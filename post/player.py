@@ -49,7 +49,7 @@ def frames_that_fit(run: Run) -> int:
 
 def quantities(run: Run) -> list[str]:
     """What disks can be coloured by, apart from their species."""
-    return [name for name in LABELS if name != "collisions" or run.collisions is not None]
+    return ["speed", "displacement"] + ["collisions"] * (run.collisions is not None)
 
 
 def coded_positions(run: Run, frames: list[int]) -> np.ndarray:
@@ -207,6 +207,8 @@ def main() -> None:
     )
     args = parser.parse_args()
     run = read_run(args.run)
+    if args.colour == "psi6":
+        raise RunError("--colour psi6 is for snapshot.py and animate.py")
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
         raise RunError(f"{path}: a player ends in .html")

@@ -4,9 +4,10 @@
     python post/snapshot.py runs/gas.h5 --frames 0,10,-1 -o gas.png    chosen frames side by side
     python post/snapshot.py runs/gravity.h5 --count 12 --quiver        twelve frames, evenly spread
 
-Colour: species, speed, displacement from the first frame, or collisions so far.  One scale holds
-for all frames, from 0, unless --per-frame; with --log it is logarithmic.  A disk that reaches
-across a periodic side is drawn on both.
+Colour: species, speed, displacement from the first frame, collisions so far, or psi6, the direction
+of the order of the bonds against that of the mean over all disks.  One scale holds for all frames,
+from 0, unless --per-frame; with --log it is logarithmic.  A disk that reaches across a periodic
+side is drawn on both.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from ricochet.drawing import (
     LABELS,
     caption,
     chosen_colour,
+    colour_map,
     disk_collection,
     draw_box,
     panel_grid,
@@ -44,8 +46,10 @@ def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -
     )
 
 
-def scale(values: np.ndarray, log: bool) -> Normalize:
+def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
     """A colour scale without the few largest values; a logarithmic one without the smallest too."""
+    if colour == "psi6":
+        return Normalize(-180, 180)
     moved = values[values > 0]
     if not len(moved):
         return Normalize(0, 1)
@@ -63,8 +67,9 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     )
     if colour != "species":
         values = np.array([values_of(run, frame, colour) for frame in frames])
-        whole = scale(values, args.log)
-        bar = {"label": LABELS[colour], "extend": "both" if args.log else "max"}
+        whole = scale(values, args.log, colour)
+        beyond = "neither" if colour == "psi6" else "both" if args.log else "max"
+        bar = {"label": LABELS[colour], "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
     for k, axes in enumerate(panels.flat):
         if k >= len(frames):
@@ -74,8 +79,8 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         if colour == "species":
             style = {"facecolors": species_colours(run)}
         else:
-            norm = scale(values[k], args.log) if args.per_frame else whole
-            style = {"array": values[k], "norm": norm}
+            norm = scale(values[k], args.log, colour) if args.per_frame else whole
+            style = {"array": values[k], "norm": norm, "cmap": colour_map(colour)}
         disks = disk_collection(axes, run, run.position[frames[k]], **style)
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)

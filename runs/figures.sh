@@ -5,7 +5,7 @@
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-known=(scattering gas mixture cooling crater lab cost billiards gravity state stages)
+known=(scattering gas mixture cooling crater lab cost billiards gravity state stages melting)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -97,6 +97,10 @@ HTML
   section haff 'Bulk: cooling by the law of Haff' state
   section stages 'Stages: compressed and relaxed' stages
   section stages_expanded 'Stages: cooled, heated, expanded' stages
+  section melting 'Melting: pressure against packing' melting
+  section melting_0.698 'Direction of the bonds at 0.698' melting
+  section melting_0.708 'Direction of the bonds at 0.708' melting
+  section melting_0.72 'Direction of the bonds at 0.720' melting
   section coverage 'Bulk: how often an error bar holds the truth' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"

@@ -15,6 +15,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from .files import destination
 from .reader import Run, RunError
+from .structure import bond_order
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
@@ -25,6 +26,7 @@ LABELS = {
     "speed": "speed (reduced units)",
     "displacement": "displacement (reduced units)",
     "collisions": "collisions so far",
+    "psi6": "direction of $\\psi_6$ against the mean one (degrees)",
 }
 
 
@@ -84,10 +86,18 @@ def panel_grid(count: int, aspect: float) -> tuple[int, int]:
 
 
 def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
-    """(..., N) the number that colours each disk, see `LABELS`."""
+    """(..., N) the number that colours each disk, see `LABELS`; psi6 of one frame only."""
     if colour == "collisions":
         return run.collisions[frame].astype(float)
+    if colour == "psi6":
+        psi = bond_order(run, frame)
+        return np.degrees(np.angle(psi * psi.mean().conj()))
     return run.displacement(frame) if colour == "displacement" else run.speed(frame)
+
+
+def colour_map(colour: str) -> str:
+    """The colours of values; a direction comes back to where it was."""
+    return "hsv" if colour == "psi6" else "viridis"
 
 
 def chosen_colour(run: Run, wish: str | None) -> str:

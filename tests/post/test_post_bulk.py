@@ -11,9 +11,11 @@ from scipy.signal import lfilter
 import correlations
 import equation_of_state
 import haff
+import melting
 import rates
 from ricochet import Events, RunError, diffusion, read_run, statistics, structure, thermodynamics
 from ricochet import hard_disks as hd
+from ricochet.drawing import values_of
 from synthetic_run import run_script, write_run
 from validation.estimators import force, hit_rate
 from validation.laws import cooling_ratio, luding, mixture_rates, mixture_z
@@ -351,11 +353,15 @@ def test_what_is_no_gas_in_equilibrium_has_no_correlations(bulk, tmp_path, capsy
     fall = write_run(tmp_path / "fall.h5", x, x, parameters=falling)
     radius = {"radius": [0.01, 0.01, 0.02, 0.02], "species": [1, 1, 2, 2], "names": ("a", "b")}
     mixed = write_run(tmp_path / "mixed.h5", x, x, **radius)
-    for script in ("correlations", "equation_of_state"):
-        for runs in ([bulk[2]], [fall], [bulk[0], mixed]):
+    for script, words in (
+        ("correlations", ("elastic", "without gravity", "not equal disks")),
+        ("equation_of_state", ("not elastic", "falls", "not of one radius")),
+    ):
+        for runs, word in zip(([bulk[2]], [fall], [bulk[0], mixed]), words, strict=True):
             assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
             said = capsys.readouterr().err
             assert said.startswith(f"{script}.py: {runs[-1]}: ") and said.count("\n") == 1
+            assert word in said
 
 
 def test_mixtures_are_not_drawn_on_the_curves_of_equal_disks(tmp_path):
@@ -369,6 +375,40 @@ def test_mixtures_are_not_drawn_on_the_curves_of_equal_disks(tmp_path):
     rows, _ = equation_of_state.table([(0.5, [equal])], None)
     assert rows[0]["Z_reference"] > 1
     assert len(equation_of_state.draw(rows, [equal]).axes[0].lines) > 3
+
+
+def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
+    """The pressure of 4 eta / pi Z; between walls, of mixtures, there is none."""
+    run = steady(tmp_path / "equal.h5", PERIODIC)
+    eta = thermodynamics.packing(run)
+    (row,), _ = melting.table([((100, eta), [run])], None)
+    area, kt = 1.0, thermodynamics.temperature(run)
+    expected = (100 * kt + 300 / 2) / area * 0.02**2 / kt
+    assert row["P"] == pytest.approx(expected, rel=1e-9)
+    axes = melting.draw([row, {**row, "N": 400}], [run]).axes[0]
+    assert {"N = 100", "N = 400"} < set(axes.get_legend_handles_labels()[1])
+    for kind, more in (("walls", {"periodic": (True, False)}), ("mixed", {})):
+        radius = np.repeat([0.01, 0.02], 50) if kind == "mixed" else 0.01
+        other = steady(tmp_path / f"{kind}.h5", radius=radius, **{"periodic": PERIODIC, **more})
+        assert run_script("melting", other.path, "-o", tmp_path / "no.png") == 2
+
+
+def test_published_pressures_near_melting_have_a_loop_that_flattens():
+    depth = {}
+    for name, points in hd.MELTING.items():
+        eta, p = np.transpose(points)
+        assert np.all(np.diff(eta) > 0) and p.min() > 9.15 and p.max() < 9.25
+        depth[name] = p[:-1].max() - p[(eta > 0.702) & (eta < 0.718)].min()
+    assert list(depth.values()) == sorted(depth.values(), reverse=True)
+
+
+def test_disks_are_coloured_by_the_direction_of_their_bonds(tmp_path, rng):
+    x, edges = triangular(12, 14)
+    x = x + rng.normal(0, 1e-6, x.shape)
+    run = written(tmp_path / "c.h5", [x], [x], edges=edges, periodic=PERIODIC)
+    np.testing.assert_allclose(values_of(run, 0, "psi6"), 0, atol=0.01)
+    assert run_script("snapshot", run.path, "--colour", "psi6", "-o", tmp_path / "a.png") == 0
+    assert run_script("player", run.path, "--colour", "psi6", "-o", tmp_path / "a.html") == 2
 
 
 def test_scripts_draw(bulk, tmp_path):

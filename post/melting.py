@@ -1,0 +1,62 @@
+"""Melting of hard disks: pressure against packing fraction, a curve for each number of disks.
+
+    python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
+
+P* = P d^2 / kT by the virial, d the diameter, in equilibrium: from where nothing drifts any more,
+or after --skip.  Equal disks, periodic boxes.  Between liquid (to 0.700) and hexatic (from 0.716)
+both are there, at P* = 9.185.  In a finite box the pressure has a loop instead, made by the line
+between the two, which flattens as N grows.  For comparison: Engel et al., Phys. Rev. E 87, 042134
+(2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).  Memory is long here: mind the
+warnings.
+"""
+
+from ricochet import Run, RunError
+from ricochet.drawing import COLOURS, caption, plt
+from ricochet.hard_disks import MELTING
+from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.statistics import combined, doubts
+from ricochet.thermodynamics import equal_disks, packing, z_virial
+
+import numpy as np
+
+
+def table(groups: list, skip: float | None) -> tuple[list[dict], list[str]]:
+    """A row per number of disks and packing fraction; and what speaks against it."""
+    rows, notes = [], []
+    for (count, eta), runs in groups:
+        members = [z_virial(run, skip).scaled(4 * eta / np.pi) for run in runs]
+        whole = combined(members)
+        row = {"N": count, "packing": eta, "runs": len(runs), **measured("P", whole)}
+        rows.append(row | {"samples": round(whole.samples, 1)})
+        notes += doubts(f"N = {count}, η = {eta:g}", members)
+    return rows, notes
+
+
+def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
+    """Points with error bars, and published ones as lines."""
+    figure, axes = plt.subplots(figsize=(8, 5.5))
+    for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
+        axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)
+    for (count, own), colour in zip(grouped(rows, lambda row: row["N"]), COLOURS, strict=False):
+        x, y, error = ([row[name] for row in own] for name in ("packing", "P", "P_error"))
+        axes.errorbar(x, y, error, marker="o", lw=0.8, color=colour, label=f"N = {count}")
+    axes.set(
+        xlabel="packing fraction $\\eta$", ylabel="$P^* = P\\,d^2\\,/\\,kT$", title=caption(runs)
+    )
+    axes.legend()
+    return figure
+
+
+def main() -> None:
+    args = command_line(__doc__, "melting.png", skip=None).parse_args()
+    runs = read_all(args.runs)
+    for run in runs:
+        if run.restitution != 1 or not run.periodic.all() or not equal_disks(run):
+            raise RunError(f"{run.path}: needs equal elastic disks in a periodic box")
+    groups = grouped(runs, lambda run: (run.count, round(packing(run), 6)))
+    rows, notes = table(groups, args.skip)
+    report(args, runs, "Melting of hard disks", draw(rows, runs), rows, notes=notes)
+
+
+if __name__ == "__main__":
+    launch(main)
