@@ -45,7 +45,6 @@ WAYS = {
     "rename": ["EIO", "EIO+"],
     "unlink": ["EIO", "EIO+"],
     "close": ["EIO", "EIO+"],
-    "ftruncate": ["EIO", "EIO+"],
     "flock": ["ENOLCK"],
     "newfstatat": ["EIO", "EIO+"],
 }
