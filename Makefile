@@ -29,12 +29,12 @@ gnu = $(eval gnu := $(findstring GNU Fortran,$(shell $(FC) --version 2>/dev/null
 ARCH ?= native
 OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),-march=$(ARCH) $(hot) -fno-backtrace))
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
-hot := -flto -flto-partition=none -finline-limit=600 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
+hot := -flto -flto-partition=none -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
   --param=ipa-cp-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
-flags = $(FFLAGS) -ffp-contract=off $(if $(gnu),$(CHECKS) -ffpe-summary=none)
+flags = $(FFLAGS) -ffp-contract=off $(if $(gnu),-fopenmp) $(if $(gnu),$(CHECKS) -ffpe-summary=none)
 # gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
 c_compiler = $(if $(gnu),$(FC),$(CC))
 c_flags = -Wall -Wextra $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
@@ -83,7 +83,10 @@ $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+	$(Q)$(FC) $(flags) $(apart) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
+
+# Its calls would be copies of the innermost loops, at the cost of those that everybody uses.
+$(BUILD)/domain_grid.o: apart = $(if $(gnu),-fno-lto)
 
 $(BUILD)/%_c.o: %.c $(BUILD)/flags
 	@echo "compile $<"

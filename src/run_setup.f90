@@ -12,10 +12,11 @@ module run_setup
   use input_problems, only: problem_list_t
   use input_text, only: read_text
   use namelist_input, only: read_settings
+  use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
   use run_input, only: run_input_t
-  use settings, only: settings_t
+  use settings, only: run_settings_t, settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: text_t
@@ -37,6 +38,7 @@ contains
     call read_text(path, input%text, error)
     if (.not. allocated(error)) &
       call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
+    if (.not. allocated(error)) input%settings%run%threads = threads_for(input%settings%run)
   end subroutine read_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
@@ -70,6 +72,7 @@ contains
     type(settings_t), intent(in) :: settings
     class(evolution_t), allocatable, intent(out) :: evolution
     type(event_driven_t), allocatable :: events
+    type(parallel_events_t), allocatable :: parallel
     type(time_stepped_t), allocatable :: steps
 
     if (settings%run%dynamics == "steps") then
@@ -86,9 +89,29 @@ contains
         events%search%everyone = settings%run%search == "rescan"
       end if
       events%windowed = settings%run%queue == "calendar"
-      call move_alloc(events, evolution)
+      if (settings%run%search == "cells" .and. settings%run%threads > 1) then
+        allocate (parallel)
+        parallel%plain = events
+        parallel%threads = settings%run%threads
+        call move_alloc(parallel, evolution)
+      else
+        call move_alloc(events, evolution)
+      end if
     end if
     if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution
+
+  !> How many threads a run may use: as the input says, or the environment, or one.
+  function threads_for(run) result(n)
+    type(run_settings_t), intent(in) :: run
+    integer :: n, status
+    character(len=16) :: value
+
+    n = run%threads
+    if (n > 0) return
+    call get_environment_variable("OMP_NUM_THREADS", value)
+    read (value, *, iostat=status) n
+    if (status /= 0 .or. n < 1) n = 1
+  end function threads_for
 
 end module run_setup

@@ -66,7 +66,9 @@ module parameters
     parameter_t("run", "search", "text", 1, "default", "'cells'", &
       "cost per collision O(1), O(N) or O(N**2); same trajectory", choices="cells pairs rescan"), &
     parameter_t("run", "queue", "text", 1, "default", "'calendar'", "event queue; same trajectory", &
-      choices="calendar heap")]
+      choices="calendar heap"), &
+    parameter_t("run", "threads", "integer", 1, "default", "0", &
+      "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", not_negative)]
 
   type(parameter_t), parameter :: box_rows(*) = [ &
     parameter_t("box", "lower", "real", 2, "default", "0, 0", "lower left corner", unit="length"), &

@@ -26,7 +26,7 @@ module checkpoint_contents
 
   !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
   !> is written. They have no effect on the trajectory.
-  character(len=*), parameter :: free_to_change(*) = [character(len=25) :: "run.title", "run.search", "run.queue", &
+  character(len=*), parameter :: free_to_change(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
     "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
 
   ! Ranges of what is read

@@ -33,6 +33,7 @@ contains
     call describe_format(file)
     call describe_box(file, sim%box)
     call describe_disks(file, sim)
+    call describe_origin(file)
     call describe_input(file, input)
     call describe_species(file, sim)
     call describe_populations(file, sim)
@@ -41,7 +42,6 @@ contains
       call describe_table(file, input%groups(range(1):range(2)))
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
-    call describe_origin(file)
     call describe_end(file, 0.0_real64, 0.0_real64, "")
   end subroutine describe_run
 
@@ -100,7 +100,8 @@ contains
     call file%put(disk_radius, [size(numbers)], sim%species(numbers)%radius)
   end subroutine describe_disks
 
-  !> The input as it was given, and every variable as it was used.
+  !> The input as it was given, and every variable as it was used. The number of threads changes nothing; so it is told
+  !> apart from what does.
   subroutine describe_input(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -114,6 +115,7 @@ contains
         if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
         call file%make_group(group)
         do k = 1, size(own%values)
+          if (own%name == "run" .and. own%values(k)%name == "threads") group = provenance
           call describe_value(file, group, own%values(k))
         end do
       end associate
@@ -122,7 +124,7 @@ contains
     call file%put(parameters_group//"overrides", overrides_text(input))
   end subroutine describe_input
 
-  !> What the command line has changed, one variable to a line.
+  !> What the command line has changed, one variable to a line; the number of threads changes nothing.
   pure function overrides_text(input) result(text)
     type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -130,7 +132,7 @@ contains
 
     text = ""
     do k = 1, size(input%overrides)
-      text = text//input%overrides(k)%text//new_line("a")
+      if (index(input%overrides(k)%text, "run.threads") /= 1) text = text//input%overrides(k)%text//new_line("a")
     end do
   end function overrides_text
 

@@ -10,7 +10,28 @@ module cell_faces
   use partners, only: crossing, is_wall, sense_of, side_crossed
   implicit none
   private
-  public :: cell_faces_t
+  public :: cell_faces_t, cell_width, patch_t
+
+  !> The cells that a grid holds, of all those that the box is cut into: usually all. A patch may lie across a periodic
+  !> side. Its outer faces are open where they are not sides of the box: what leaves there is lost to it.
+  type :: patch_t
+    integer(int32) :: whole(2) = 0                 !! columns, rows of the box
+    integer(int32) :: first(2) = 1                 !! first column, row of the patch; below 1 beyond a periodic side
+    integer(int32) :: n(2) = 0                     !! columns, rows of the patch
+    real(real64) :: small = 0.0_real64             !! largest radius that the cells are made for [length]
+    real(real64) :: reach = 0.0_real64             !! within which such disks touch [length]
+    real(real64) :: lower(2) = 0.0_real64          !! corner of the box [length]
+    real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
+    ! By axis, if there is a periodic side in the patch: the last cells before it and the first behind it; else 0.
+    integer(int32) :: last(2) = 0
+    integer(int32) :: next(2) = 0
+  contains
+    procedure :: find_sides
+    procedure :: cell_at
+    procedure :: place_of
+    procedure :: holds
+    procedure :: at_seam
+  end type patch_t
 
   !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
   type :: line_t
@@ -35,40 +56,101 @@ module cell_faces
 
 contains
 
-  !> Cuts the box into n(1) columns and n(2) rows of cells, for disks that touch within `reach` of each other.
-  subroutine set(self, box, n, reach)
-    class(cell_faces_t), intent(out) :: self
+  !> Finds the periodic sides in the patch.
+  pure subroutine find_sides(self, periodic)
+    class(patch_t), intent(inout) :: self
+    logical, intent(in) :: periodic(2)
+
+    self%last = modulo(self%whole - self%first, self%whole) + 1
+    self%next = modulo(self%last, self%whole) + 1
+    where (.not. periodic .or. self%last > self%n .or. self%next > self%n)
+      self%last = 0
+      self%next = 0
+    end where
+  end subroutine find_sides
+
+  !> The cell of the patch that a point in the box is in; beyond `n` if in none.
+  pure function cell_at(self, x) result(cell)
+    class(patch_t), intent(in) :: self
+    real(real64), intent(in) :: x(2)               !! [length]
+    integer(int32) :: cell(2)
+
+    cell = min(max(int((x - self%lower)/self%width, int32) + 1, 1), self%whole)
+    if (self%first(1) /= 1 .or. self%first(2) /= 1) cell = modulo(cell - self%first, self%whole) + 1
+  end function cell_at
+
+  !> The column or row of the whole grid that a column or row of the patch is.
+  elemental function place_of(self, cell, axis) result(place)
+    class(patch_t), intent(in) :: self
+    integer(int32), intent(in) :: cell
+    integer, intent(in) :: axis
+    integer(int32) :: place
+
+    place = modulo(self%first(axis) + cell - 2, self%whole(axis)) + 1
+  end function place_of
+
+  !> Whether a cell belongs to the patch, not to what lies beyond its open faces.
+  pure function holds(self, cell) result(yes)
+    class(patch_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    logical :: yes
+
+    yes = all(cell >= 1 .and. cell <= self%n)
+  end function holds
+
+  !> Whether some of the cells around a cell are images beyond a periodic side.
+  pure function at_seam(self, cell) result(yes)
+    class(patch_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)
+    logical :: yes
+
+    yes = any(cell == self%last .or. cell == self%next)
+  end function at_seam
+
+  !> From cell to cell, if the box is cut into n(1) columns and n(2) rows. The last face is not before the side.
+  pure function cell_width(box, n) result(width)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: n(2)
-    real(real64), intent(in) :: reach              !! [length]
+    real(real64) :: width(2)                       !! [length]
 
-    self%width = box%edges()/n*(1 + 4*epsilon(self%width))       ! the last face is not before the side
-    self%overlap = max(self%width - reach, 0.0_real64)
+    width = box%edges()/n*(1 + 4*epsilon(width))
+  end function cell_width
+
+  !> Finds the faces of the cells of a patch.
+  subroutine set(self, box, patch)
+    class(cell_faces_t), intent(out) :: self
+    type(box_t), intent(in) :: box
+    type(patch_t), intent(in) :: patch
+
+    self%width = patch%width
+    self%overlap = max(self%width - patch%reach, 0.0_real64)
     self%falling = box%falling()
     self%box = box
-    call cut(self, 1, n(1), self%column)
-    call cut(self, 2, n(2), self%row)
+    call cut(self, 1, patch, self%column)
+    call cut(self, 2, patch, self%row)
   end subroutine set
 
-  !> The faces of n columns (axis 1) or rows.
-  pure subroutine cut(self, axis, n, line)
+  !> The faces of columns (axis 1) or rows.
+  pure subroutine cut(self, axis, patch, line)
     class(cell_faces_t), intent(in) :: self
-    integer(int32), intent(in) :: axis, n
+    integer(int32), intent(in) :: axis
+    type(patch_t), intent(in) :: patch
     type(line_t), allocatable, intent(out) :: line(:, :)
-    real(real64) :: face
-    integer(int32) :: low, high, inset, k
+    integer(int32) :: low, high, inset, k, place
 
     low = 2 - 2*axis                               ! codes of the two sides
     high = low - 1
     inset = merge(0, 1, self%box%periodic(axis))
-    allocate (line(0:1, n))
-    do k = 1, n - 1
-      face = self%box%lower(axis) + self%width(axis)*k
-      line(1, k) = line_t(face + 0.5_real64*self%overlap(axis), 0.0_real64, crossing(high))
-      line(0, k + 1) = line_t(face - 0.5_real64*self%overlap(axis), 0.0_real64, crossing(low))
+    allocate (line(0:1, patch%n(axis)))
+    do k = 1, patch%n(axis)
+      place = patch%place_of(k, axis)
+      line(0, k) = line_t(self%box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
+        0.0_real64, crossing(low))
+      line(1, k) = line_t(self%box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
+        0.0_real64, crossing(high))
+      if (place == 1) line(0, k) = line_t(self%box%lower(axis), inset, low)
+      if (place == patch%whole(axis)) line(1, k) = line_t(self%box%upper(axis), -inset, high)
     end do
-    line(0, 1) = line_t(self%box%lower(axis), inset, low)
-    line(1, n) = line_t(self%box%upper(axis), -inset, high)
   end subroutine cut
 
   !> Of the cells that contain the disk, the one that it leaves last.

@@ -2,22 +2,22 @@
 !> its own cell and the eight around it before it leaves its cell, which is an event like any other. Wider cells
 !> overlap (see `cell_faces`).
 module cell_grid
-  use kinds, only: int16, int32, real64
+  use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
   use cell_contents, only: cell_contents_t, gather
-  use cell_faces, only: cell_faces_t
+  use cell_faces, only: cell_faces_t, cell_width, patch_t
   use cell_scans, only: scan_around_edge, scan_cell, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use neighbour_search, only: earliest_contact, latest_clock, neighbour_search_t, no_gravity, prospect_t
   use obstacle_lists, only: obstacle_lists_t
-  use partners, only: axis_of, is_wall, leaves_margin, sense_of, side_crossed
+  use partners, only: axis_of, is_wall, leaves_margin, nothing, sense_of, side_crossed
   use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: cell_grid_t
+  public :: cell_grid_t, whole_box
 
   !> Tuning. Fewer disks per cell mean fewer candidates, but more crossings of faces.
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
@@ -25,7 +25,8 @@ module cell_grid
 
   type, extends(neighbour_search_t) :: cell_grid_t
     private
-    integer(int32) :: n(2) = 0                     !! columns, rows
+    type(patch_t), public :: patch                 !! the cells; chosen here unless they are only a part of the box
+    logical, public :: is_part = .false.
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
     logical :: roomy = .false.                     !! cells overlap: a disk that collides chooses its cell again
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
@@ -37,6 +38,8 @@ module cell_grid
     procedure :: predict_both
     procedure :: cross
     procedure :: read_ahead
+    procedure :: insert
+    procedure :: take_out
     procedure, private :: predict_with_care        ! bound, so that it is not inlined into the hot path
     procedure, private :: follow_big
   end type cell_grid_t
@@ -47,35 +50,69 @@ contains
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64) :: small, reach, width, x(2)
     integer(int32) :: i
-    integer(int16) :: ix, iy
+    integer(int16) :: cell(2), ix, iy
 
-    small = largest_small_radius(sim%disk)
-    reach = 2*small*(1 + spare)
-    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
-    self%n = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
-    call self%faces%set(sim%box, self%n, reach)
-    self%roomy = any(self%faces%width > spacious*reach)
-    call self%cells%empty(self%n(1) + 2, self%n(2) + 2, sim%n_disks())
-    do i = 1, sim%n_disks()
-      x = (sim%position(i) - sim%box%lower)/self%faces%width
-      sim%tag(i)%cell = int(min(max(int(x, int32) + 1, 1), self%n), int16)
-      if (sim%disk(i)%radius > small) then
-        sim%tag(i)%cell = 1                        ! one that is marked in any case
-      else
-        call self%cells%insert(self%cells%number(sim%tag(i)%cell), i)
-      end if
-    end do
-    call self%obstacles%renew(sim%box, small, self%n, self%faces)
-    call self%big%start(sim, small, self%n, self%faces)
-    if (.not. any(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. self%big%count == 0) return
-    do iy = 1, int(self%n(2), int16)
-      do ix = 1, int(self%n(1), int16)
-        call mark(self, [ix, iy])
+    if (.not. self%is_part) self%patch = whole_box(sim)
+    associate (patch => self%patch)
+      call self%faces%set(sim%box, patch)
+      self%roomy = any(self%faces%width > spacious*patch%reach)
+      call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
+      do i = 1, sim%n_disks()
+        if (sim%disk(i)%radius > patch%small) then
+          sim%tag(i)%cell = 1                      ! one that is marked in any case
+        else if (sim%tag(i)%id > 0) then
+          cell = int(patch%cell_at(sim%position(i)), int16)
+          call self%insert(sim%tag(i), i, cell)
+        end if
       end do
-    end do
+      call self%obstacles%renew(sim%box, patch, self%faces)
+      call self%big%start(sim, patch%small, patch%n, self%faces)
+      if (.not. any(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. self%big%count == 0 &
+        .and. .not. self%is_part) return
+      do iy = 0, int(patch%n(2) + 1, int16)
+        do ix = 0, int(patch%n(1) + 1, int16)
+          call mark(self, [ix, iy])
+        end do
+      end do
+    end associate
   end subroutine build
+
+  !> The cells that suit all disks of a simulation.
+  pure function whole_box(sim) result(patch)
+    type(simulation_t), intent(in) :: sim
+    type(patch_t) :: patch
+    real(real64) :: width
+
+    patch%small = largest_small_radius(sim%disk)
+    patch%reach = 2*patch%small*(1 + spare)
+    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), patch%reach)
+    patch%whole = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
+    patch%n = patch%whole
+    patch%lower = sim%box%lower
+    patch%width = cell_width(sim%box, patch%whole)
+    call patch%find_sides(sim%box%periodic)
+  end function whole_box
+
+  !> Puts disk i into a cell.
+  subroutine insert(self, tag, i, cell)
+    class(cell_grid_t), intent(inout) :: self
+    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
+    integer(int16), intent(in) :: cell(2)
+
+    tag%cell = cell
+    call self%cells%insert(self%cells%number(cell), i)
+  end subroutine insert
+
+  !> Takes disk i out of its cell.
+  subroutine take_out(self, tag, i)
+    class(cell_grid_t), intent(inout) :: self
+    type(tag_t), intent(in) :: tag
+    integer(int32), intent(in) :: i
+
+    call self%cells%remove(self%cells%number(tag%cell), i)
+  end subroutine take_out
 
   !> Marks a cell if a disk there may meet an obstacle, a big disk, or others beyond a periodic side; or may be big.
   subroutine mark(self, cell)
@@ -83,8 +120,11 @@ contains
     integer(int16), intent(in) :: cell(2)
     logical :: special
 
-    special = at_periodic_edge(self, cell) .or. self%obstacles%reach_into(cell)
-    if (self%big%count > 0) special = special .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
+    special = .not. self%patch%holds(cell)
+    if (.not. special) then
+      special = self%patch%at_seam(cell) .or. self%obstacles%reach_into(cell)
+      if (self%big%count > 0) special = special .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
+    end if
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
@@ -111,8 +151,9 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code
-    integer(int32) :: side, axis, there
+    integer(int32) :: side, axis
     integer(int16) :: cell(2)
+    logical :: inside
 
     if (sim%disk(i)%radius > self%big%small) then
       call self%follow_big(sim, self%big%number_of(i))
@@ -123,11 +164,12 @@ contains
     if (.not. is_wall(code)) side = side_crossed(code)
     axis = axis_of(side)
     cell = sim%tag(i)%cell
-    there = cell(axis) + sense_of(side)
-    if (there < 1) there = self%n(axis)
-    if (there > self%n(axis)) there = 1
-    cell(axis) = int(there, int16)
-    if (self%roomy) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
+    cell(axis) = cell(axis) + int(sense_of(side), int16)
+    if (is_wall(code) .and. self%patch%last(axis) > 0) &
+      cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
+    inside = .true.
+    if (self%is_part) inside = self%patch%holds(cell)
+    if (self%roomy .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
     call self%predict(sim, i)
   end subroutine cross
@@ -153,9 +195,8 @@ contains
     integer(int32), intent(in) :: i
     integer(int16), intent(in) :: cell(2)
 
-    call self%cells%remove(self%cells%number(tag%cell), i)
-    tag%cell = cell
-    call self%cells%insert(self%cells%number(cell), i)
+    call take_out(self, tag, i)
+    call insert(self, tag, i, cell)
   end subroutine move
 
   !> The earliest of: side or cell face, obstacle, disk in the cells around.
@@ -263,7 +304,8 @@ contains
     tag(near%disk)%partner_stamp = disk(max(near%partner, 1))%stamp    ! without a branch; used if partner > 0
   end subroutine take_earliest
 
-  !> Predicts a disk where there is more than nine cells with a few small disks each.
+  !> Predicts a disk where there is more than nine cells with a few small disks each. One that has left the patch is
+  !> lost: nobody meets it any more.
   subroutine predict_with_care(self, sim, i)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -272,6 +314,11 @@ contains
 
     if (sim%disk(i)%radius > self%big%small) then
       call find_event_of_big(self, sim, i, near)
+    else if (.not. self%patch%holds(sim%tag(i)%cell)) then
+      call self%take_out(sim%tag(i), i)
+      sim%disk(i)%stamp = sim%disk(i)%stamp + 1
+      near%time = 2*never
+      near%partner = nothing
     else
       call find_event_of_small(self, sim, i, near)
     end if
@@ -293,8 +340,8 @@ contains
       call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
       near%cell = self%cells%number(cell)
       call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
-      if (at_periodic_edge(self, cell)) then
-        call scan_around_edge(self%cells, self%n, sim, near)
+      if (self%patch%at_seam(cell)) then
+        call scan_around_edge(self%cells, self%patch, sim, near)
       else
         call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
         call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
@@ -345,14 +392,5 @@ contains
       end associate
     end do
   end subroutine find_event_of_big
-
-  !> Whether the cells around lie partly beyond a periodic side.
-  pure function at_periodic_edge(self, cell) result(yes)
-    class(cell_grid_t), intent(in) :: self
-    integer(int16), intent(in) :: cell(2)
-    logical :: yes
-
-    yes = any(self%faces%box%periodic .and. (cell == 1 .or. cell == self%n))
-  end function at_periodic_edge
 
 end module cell_grid

@@ -3,6 +3,7 @@
 module cell_scans
   use kinds, only: int32, int64, real64
   use cell_contents, only: append, cell_contents_t
+  use cell_faces, only: patch_t
   use neighbour_search, only: earliest_contact, list_capacity, prospect_t
   use simulation_state, only: simulation_t
   implicit none
@@ -76,9 +77,9 @@ contains
 
   !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
   !> together. In a box of fewer than three columns a cell stands for several of its images.
-  pure subroutine scan_around_edge(cells, n_cells, sim, near)
+  pure subroutine scan_around_edge(cells, patch, sim, near)
     type(cell_contents_t), intent(in) :: cells
-    integer(int32), intent(in) :: n_cells(2)       !! columns, rows
+    type(patch_t), intent(in) :: patch
     type(simulation_t), intent(in) :: sim
     type(prospect_t), intent(inout) :: near
     real(real64) :: shift(2)
@@ -86,10 +87,11 @@ contains
     integer(int64) :: n
     logical :: crowded
 
+    there(:, 0) = sim%tag(near%disk)%cell
+    there(:, 1) = merge(patch%next, there(:, 0) + 1, there(:, 0) == patch%last)
+    there(:, -1) = merge(patch%last, there(:, 0) - 1, there(:, 0) == patch%next)
     do k = -1, 1
-      there(:, k) = sim%tag(near%disk)%cell + k
-      image(:, k) = merge(merge(1, 0, there(:, k) > n_cells) - merge(1, 0, there(:, k) < 1), 0, sim%box%periodic)
-      there(:, k) = there(:, k) - image(:, k)*n_cells
+      image(:, k) = k*merge(1, 0, there(:, 0) == merge(patch%last, patch%next, k > 0))
     end do
     do image_y = minval(image(2, :)), maxval(image(2, :))
       do image_x = minval(image(1, :)), maxval(image(1, :))

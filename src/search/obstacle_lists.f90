@@ -2,7 +2,7 @@
 module obstacle_lists
   use kinds, only: int16, int32, real64
   use box_geometry, only: box_t, next_obstacle
-  use cell_faces, only: cell_faces_t
+  use cell_faces, only: cell_faces_t, patch_t
   use disks, only: disk_t, tag_t
   use shapes, only: shape_t, spare
   use sorting, only: sort_by_count
@@ -58,11 +58,10 @@ contains
   end function reach_into
 
   !> Lists which obstacles a disk with its centre in a cell can touch, for every cell.
-  subroutine renew(self, box, radius, n, faces)
+  subroutine renew(self, box, patch, faces)
     class(obstacle_lists_t), intent(inout) :: self
     type(box_t), intent(in) :: box
-    real(real64), intent(in) :: radius             !! largest of the disks [length]
-    integer(int32), intent(in) :: n(2)             !! columns and rows of cells
+    type(patch_t), intent(in) :: patch             !! the cells
     type(cell_faces_t), intent(in) :: faces
     type(entries_t) :: entries
     integer(int32), allocatable :: place(:)
@@ -70,51 +69,52 @@ contains
 
     if (allocated(self%first)) deallocate (self%first, self%list)
     if (box%n_obstacles() == 0) return
-    self%columns = n(1)
+    self%columns = patch%n(1)
     allocate (entries%cell(64), entries%obstacle(64))
     do m = 1, box%n_obstacles()
       associate (shape => box%obstacle(m)%shape)
         reach = merge(1, 0, box%periodic .and. .not. shape%encloses)
         do image_y = -reach(2), reach(2)
           do image_x = -reach(1), reach(1)
-            call enter(shape, m, box, [image_x, image_y]*box%edges(), radius, faces, entries)
+            call enter(shape, m, [image_x, image_y]*box%edges() - box%lower, patch, faces, entries)
           end do
         end do
       end associate
     end do
     allocate (place(entries%n), self%list(entries%n))
-    call sort_by_count(entries%cell(:entries%n), product(n), self%first, place)
+    call sort_by_count(entries%cell(:entries%n), product(patch%n), self%first, place)
     self%list(place) = entries%obstacle(:entries%n)
   end subroutine renew
 
-  !> Adds the cells that the image of the m-th obstacle, `shift` away, reaches into.
-  subroutine enter(shape, m, box, shift, radius, faces, entries)
+  !> Adds the cells that an image of the m-th obstacle reaches into.
+  subroutine enter(shape, m, shift, patch, faces, entries)
     class(shape_t), intent(in) :: shape
     integer(int32), intent(in) :: m
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: shift(2), radius   !! [length]
+    real(real64), intent(in) :: shift(2)           !! from the middle of the shape, to the corner of the box [length]
+    type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
     type(entries_t), intent(inout) :: entries
     real(real64) :: half(2), room(2), to_shape(2)
-    integer(int32) :: low(2), high(2), n(2), ix, iy
+    integer(int32) :: low(2), high(2), here(2), ix, iy
 
-    n = [size(faces%column, 2), size(faces%row, 2)]
     half = 0.5_real64*(faces%width + faces%overlap)*(1 + spare)
-    to_shape = shape%middle + shift - box%lower
-    room = (half + shape%extent() + radius)*(1 + spare)
-    low = int(max(min(ceiling((to_shape - room)/faces%width + 0.5_real64), n + 1), 1), int32)
-    high = int(max(min(floor((to_shape + room)/faces%width + 0.5_real64), n), 0), int32)
+    to_shape = shape%middle + shift
+    room = (half + shape%extent() + patch%small)*(1 + spare)
+    low = int(max(min(ceiling((to_shape - room)/faces%width + 0.5_real64), patch%whole + 1), 1), int32)
+    high = int(max(min(floor((to_shape + room)/faces%width + 0.5_real64), patch%whole), 0), int32)
     if (shape%encloses) low = 1
-    if (shape%encloses) high = n
+    if (shape%encloses) high = patch%whole
     do iy = low(2), high(2)
       do ix = low(1), high(1)
-        if (.not. shape%reaches(([ix, iy] - 0.5_real64)*faces%width - to_shape, half, radius)) cycle
+        here = modulo([ix, iy] - patch%first, patch%whole) + 1
+        if (any(here > patch%n)) cycle
+        if (.not. shape%reaches(([ix, iy] - 0.5_real64)*faces%width - to_shape, half, patch%small)) cycle
         entries%n = entries%n + 1
         if (entries%n > size(entries%cell)) then
           entries%cell = [entries%cell, entries%cell]
           entries%obstacle = [entries%obstacle, entries%obstacle]
         end if
-        entries%cell(entries%n) = ix + n(1)*(iy - 1)
+        entries%cell(entries%n) = here(1) + patch%n(1)*(here(2) - 1)
         entries%obstacle(entries%n) = m
       end do
     end do

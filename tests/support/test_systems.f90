@@ -60,15 +60,17 @@ contains
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
   !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the first
   !> disk hits; `inelastic`; `smooth` walls; `contact` time; `few`, `dilute` or `dense`.
-  function system(words, seed) result(sim)
+  function system(words, seed, scale) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
+    integer, intent(in), optional :: scale     !! of the box; there are as many more disks as its square
     type(simulation_t) :: sim
     type(random_stream_t) :: stream
     real(dp) :: spacing, radius
     call stream%seed(seed, [1])
     sim%box%lower = [-1.0_dp, 0.5_dp]
     sim%box%upper = [2.0_dp, 2.5_dp]
+    if (present(scale)) sim%box%upper = sim%box%lower + scale*[3.0_dp, 2.0_dp]
     sim%box%periodic = [has("periodic") .or. has("channel"), has("periodic")]
     if (has("gravity")) sim%box%gravity = merge([0.0_dp, -1.0_dp], [0.5_dp, -1.0_dp], has("channel"))
     call add_obstacles(sim, words)

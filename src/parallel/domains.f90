@@ -1,0 +1,305 @@
+!> One domain of a simulation that several threads share: an engine of its own for the disks in a rectangle of cells and
+!> for copies of those around, up to the ends of a patch. There its world ends: who should come in is missing, and wrong
+!> histories creep inwards, until `domain_borders` puts them right.
+module domains
+  use kinds, only: int32, int64, real64
+  use cell_faces, only: patch_t
+  use disks, only: disk_t, tag_t
+  use domain_grid, only: copy, deep, domain_grid_t, forever, rim, track_t, vacant
+  use errors, only: error_t
+  use event_driven, only: event_driven_t
+  use event_log, only: event_log_t
+  use evolution, only: limits_t
+  use partners, only: nothing
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, report_t
+
+  integer, parameter :: log_capacity = 1024
+
+  !> What an own disk near the border did in a window, and where it is now. Columns and rows are those of the box, beyond
+  !> a periodic side counted on.
+  type :: report_t
+    type(disk_t) :: disk
+    type(tag_t) :: tag
+    type(track_t) :: track
+    integer(int64) :: image(2) = 0
+    integer(int32) :: home = 0                     !! number of the disk in the whole simulation
+    integer(int32) :: low(2) = 0, high(2) = 0      !! columns and rows where it was
+    integer(int32) :: cell(2) = 0
+  end type report_t
+
+  type :: domain_t
+    integer(int32) :: low(2) = 0, high(2) = 0      !! columns, rows of the whole grid that it owns
+    integer(int32) :: halo = 0                     !! columns, rows of copies beyond the domain
+    integer(int32), allocatable :: neighbour(:)    !! domains that have disks in this one's patch
+    type(patch_t) :: patch
+    type(simulation_t) :: sim                      !! own disks and copies in slots, clocks since the epoch of the whole
+    type(event_driven_t) :: engine
+    integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation
+    integer(int32) :: n_reports = 0
+    type(report_t), allocatable :: reported(:)     !! (n_reports, and room for more)
+    type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
+    logical :: done = .false.                      !! the engine came to the end of the window
+    logical :: good = .false.                      !! no own disk can have met a wrong copy
+    integer(int32) :: n_vacant = 0
+    integer(int32), allocatable :: vacancy(:)      !! (n_vacant) slots
+    integer(int32), allocatable, private :: key(:), slot(:)  !! (0:) the copies by their ids: a hash table
+    integer(int32), private :: last_key = 0        !! one less than a power of two
+    logical, allocatable :: same(:)       !! of the reports that came from the neighbours
+  end type domain_t
+
+contains
+
+  !> Fills a domain with the disks that are in its patch, and predicts their events.
+  subroutine load(self, sim, member)
+    type(domain_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: member(:)        !! numbers of the disks
+    integer(int32) :: k, slots
+
+    slots = size(member, kind=int32) + size(member, kind=int32)/8 + 200
+    if (.not. allocated(self%sim%species)) then
+      self%sim%box = sim%box
+      self%sim%law = sim%law
+      self%sim%species = sim%species
+      self%sim%epoch_end = forever
+      self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
+      allocate (domain_grid_t :: self%engine%search)
+    end if
+    if (allocated(self%sim%disk)) then
+      if (size(self%sim%disk) < slots .or. size(self%sim%disk) > 2*slots) deallocate (self%sim%disk)
+    end if
+    if (.not. allocated(self%sim%disk)) then
+      if (allocated(self%home)) deallocate (self%sim%tag, self%sim%image, self%home, self%vacancy)
+      allocate (self%sim%disk(slots), self%sim%tag(slots), self%home(slots), self%vacancy(slots))
+      allocate (self%sim%image(2, merge(slots, 0, any(sim%box%periodic))))
+    end if
+    slots = self%sim%n_disks()
+    do k = 1, size(member, kind=int32)
+      self%sim%disk(k) = sim%disk(member(k))
+      self%sim%tag(k) = sim%tag(member(k))
+      self%home(k) = member(k)
+    end do
+    if (any(sim%box%periodic)) self%sim%image(:, :size(member)) = sim%image(:, member)
+    self%sim%disk(size(member) + 1:) = disk_t()
+    self%sim%tag(size(member) + 1:) = tag_t()
+    self%sim%disk%event_time = forever
+    self%sim%disk%partner = nothing
+    self%n_vacant = slots - size(member, kind=int32)
+    self%vacancy(:self%n_vacant) = [(slots + 1 - k, k=1, self%n_vacant)]
+    self%sim%now = sim%now
+    call self%engine%log%clear()
+    call self%log%clear()
+    call clear_sums(self, sim)
+    select type (grid => self%engine%search)
+    type is (domain_grid_t)
+      call start(self, grid, size(member, kind=int32))
+    end select
+  end subroutine load
+
+  !> Builds cells and queue for the first n slots.
+  subroutine start(self, grid, n)
+    type(domain_t), intent(inout) :: self
+    type(domain_grid_t), intent(inout) :: grid
+    integer(int32), intent(in) :: n
+    logical :: cut_low(2), cut_high(2)
+    integer(int32) :: slots, k
+
+    slots = self%sim%n_disks()
+    grid%is_part = .true.
+    grid%patch = self%patch
+    associate (patch => self%patch)
+      grid%own_low = modulo(self%low - patch%first, patch%whole) + 1
+      grid%own_high = grid%own_low + self%high - self%low
+      cut_low = grid%own_low > 1
+      cut_high = grid%own_high < patch%n
+      grid%deep_low = grid%own_low + merge(self%halo, 0, cut_low)
+      grid%deep_high = grid%own_high - merge(self%halo, 0, cut_high)
+      grid%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
+      grid%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
+        .or. patch%first + patch%n - 1 < patch%whole))
+      if (allocated(grid%reached)) deallocate (grid%reached)
+      allocate (grid%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+    end associate
+    if (allocated(grid%role)) then
+      if (size(grid%role) /= slots) deallocate (grid%role, grid%track)
+    end if
+    if (.not. allocated(grid%role)) allocate (grid%role(slots), grid%track(slots))
+    grid%role = vacant
+    grid%role(:n) = copy
+    call self%engine%start(self%sim)
+    call grid%begin_window()
+    do k = 1, n
+      if (grid%owns(self%sim%tag(k)%cell)) grid%role(k) = rim
+      call grid%begin_track(self%sim%tag(k), k)
+    end do
+    call list_copies(self, grid)
+  end subroutine start
+
+  !> Lists the copies by their ids.
+  subroutine list_copies(self, grid)
+    type(domain_t), intent(inout) :: self
+    type(domain_grid_t), intent(in) :: grid
+    integer(int32) :: n, k, place
+
+    n = int(count(grid%role == copy), int32)
+    if (2*n > self%last_key .or. .not. allocated(self%key)) then
+      self%last_key = 255
+      do while (self%last_key < 4*n)
+        self%last_key = 2*self%last_key + 1
+      end do
+      if (allocated(self%key)) deallocate (self%key, self%slot)
+      allocate (self%key(0:self%last_key), self%slot(0:self%last_key))
+    end if
+    self%key = 0
+    do k = 1, size(grid%role, kind=int32)
+      if (grid%role(k) /= copy) cycle
+      place = place_of(self, self%sim%tag(k)%id)
+      self%key(place) = self%sim%tag(k)%id
+      self%slot(place) = k
+    end do
+  end subroutine list_copies
+
+  !> Where a copy is, or would be, in the table.
+  pure function place_of(self, id) result(place)
+    type(domain_t), intent(in) :: self
+    integer(int32), intent(in) :: id
+    integer(int32) :: place
+
+    place = iand(int(ishft(id*2654435769_int64, -12), int32), self%last_key)
+    do while (self%key(place) /= 0 .and. self%key(place) /= id)
+      place = iand(place + 1, self%last_key)
+    end do
+  end function place_of
+
+  !> The slot of the copy with an id; 0: there is none.
+  pure function copy_of(self, id) result(slot)
+    type(domain_t), intent(in) :: self
+    integer(int32), intent(in) :: id
+    integer(int32) :: slot, place
+
+    place = place_of(self, id)
+    slot = 0
+    if (self%key(place) == id) slot = self%slot(place)
+  end function copy_of
+
+  !> Nothing has been booked yet.
+  subroutine clear_sums(self, sim)
+    type(domain_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+
+    associate (own => self%sim)
+      own%events = 0
+      own%collisions = 0
+      own%wall_collisions = 0
+      own%obstacle_collisions = 0
+      own%virial = sim%virial
+      own%dissipated = sim%dissipated
+      own%wall_impulse = sim%wall_impulse
+      own%virial%units = 0
+      own%dissipated%units = 0
+      own%wall_impulse%units = 0
+    end associate
+    select type (grid => self%engine%search)
+    type is (domain_grid_t)
+      call grid%keep_sums(self%sim)
+    end select
+  end subroutine clear_sums
+
+  !> Follows the domain, copies and all, to the end of a window; gives up after so many turns of the engine.
+  subroutine move_on(self, t_end, turns)
+    type(domain_t), intent(inout) :: self
+    real(real64), intent(in) :: t_end              !! since the epoch [time]
+    integer(int64), intent(in) :: turns
+    type(limits_t) :: limits
+    type(error_t), allocatable :: error
+
+    limits%time = t_end
+    limits%turns = turns
+    do
+      call self%engine%advance(self%sim, limits, error)
+      if (.not. self%engine%log%is_full() .or. allocated(error)) exit
+      call take_log(self)
+    end do
+    call take_log(self)
+    self%done = self%sim%now >= t_end .and. .not. allocated(error)
+  end subroutine move_on
+
+  !> Switches the list of collisions on or off.
+  subroutine keep_log(self, on)
+    type(domain_t), intent(inout) :: self
+    logical, intent(in) :: on
+
+    if (on .eqv. self%engine%log%is_on()) return
+    if (on) then
+      self%engine%log = event_log_t(log_capacity)
+      self%log = event_log_t(log_capacity)
+    else
+      deallocate (self%engine%log%record, self%log%record)
+    end if
+  end subroutine keep_log
+
+  !> Keeps those collisions that are counted here.
+  subroutine take_log(self)
+    type(domain_t), intent(inout) :: self
+    integer :: k
+
+    do k = 1, self%engine%log%n
+      associate (record => self%engine%log%record(:, k))
+        if (copy_of(self, int(record(2), int32)) > 0) cycle
+        call self%log%append(record(1), int(record(2), int32), int(record(3), int32), record(4))
+      end associate
+    end do
+    call self%engine%log%clear()
+  end subroutine take_log
+
+  !> Writes the states of the own disks back into the whole simulation.
+  subroutine gather(self, sim)
+    type(domain_t), intent(in) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32) :: k
+
+    select type (grid => self%engine%search)
+    type is (domain_grid_t)
+      do k = 1, size(grid%role, kind=int32)
+        if (grid%role(k) /= deep .and. grid%role(k) /= rim) cycle
+        sim%disk(self%home(k)) = self%sim%disk(k)
+        sim%tag(self%home(k)) = self%sim%tag(k)
+        if (size(self%sim%image) > 0) sim%image(:, self%home(k)) = self%sim%image(:, k)
+      end do
+    end select
+  end subroutine gather
+
+  !> Merges the logs of all domains in the order of time. Of simultaneous collisions in different domains nobody knows
+  !> which comes first.
+  subroutine merge_logs(domain, merged, good)
+    type(domain_t), intent(inout) :: domain(:)
+    type(event_log_t), intent(out) :: merged       !! with times since the epoch
+    logical, intent(out) :: good
+    integer :: next(size(domain)), k, m
+    real(real64) :: head(size(domain))
+
+    good = .true.
+    merged = event_log_t(1024)
+    next = 1
+    do
+      head = huge(head)
+      do k = 1, size(domain)
+        if (next(k) <= domain(k)%log%n) head(k) = domain(k)%log%record(1, next(k))
+      end do
+      m = minloc(head, dim=1)
+      if (.not. head(m) < huge(head)) exit
+      good = good .and. count(head <= head(m)) == 1
+      associate (record => domain(m)%log%record(:, next(m)))
+        call merged%append(record(1), int(record(2), int32), int(record(3), int32), record(4))
+      end associate
+      next(m) = next(m) + 1
+    end do
+    do k = 1, size(domain)
+      call domain(k)%log%clear()
+    end do
+  end subroutine merge_logs
+
+end module domains

@@ -1,0 +1,377 @@
+!> Event-driven dynamics on several cores, with every bit of one core. Space is cut into domains; each has an engine of
+!> its own, and they compare at the end of every window of time (see `domains`). If a window does not hold, all go back
+!> to the state in which they set out. What is rare and awkward is left to the plain engine: small or idle systems, a
+!> moment within simultaneous collisions, a collapse.
+module parallel_events
+  use kinds, only: int32, int64, real64
+  use cell_faces, only: patch_t
+  use domain_borders, only: publish, refresh, verify
+  use domain_cuts, only: domain_cuts_t
+  use domains, only: clear_sums, domain_t, gather, keep_log, load, merge_logs, move_on
+  use epochs, only: begin_first_epoch, most_events, move_epoch, stands_still
+  use errors, only: error_t
+  use event_driven, only: event_driven_t
+  use event_log, only: event_log_t
+  use evolution, only: evolution_t, limits_t
+  use signals, only: stop_requested
+  use simulation_state, only: simulation_t
+  use system, only: seconds
+  implicit none
+  private
+  public :: parallel_events_t
+
+  real(real64), parameter :: longest_visit = 0.5_real64        !! until the caller can look at signals and clocks [s]
+  integer, parameter :: most_windows = 8                       !! of a visit
+  real(real64), parameter :: turns_per_event = 20.0_real64
+  real(real64), parameter :: shortest = 0.01_real64            !! window to be tried, in usual ones
+  !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
+  real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
+  integer(int64), parameter :: plain_events = 5                !! per disk, after which to try again
+  real(real64), parameter :: rounding = 1.0e-12_real64
+
+  type, extends(evolution_t) :: parallel_events_t
+    type(event_driven_t) :: plain                  !! the engine for all that is not worth more
+    integer(int32) :: threads = 1
+    real(real64) :: window = 1.0_real64            !! collisions per disk in a window of time
+    integer(int32) :: halo = 8                     !! columns and rows of copies around a domain
+    integer(int32) :: least_disks = 1000           !! of a domain
+    integer(int64) :: windows_done = 0, windows_failed = 0
+    type(domain_t), allocatable, private :: domain(:)
+    type(domain_cuts_t), private :: cuts
+    integer(int32), private :: wanted = 1          !! domains
+    integer, private :: holder = 0                 !! of the events predicted: nobody, the plain engine, the domains
+    real(real64), private :: rate = 0.0_real64     !! of events [1/time]
+    real(real64), private :: shortening = 1.0_real64   !! of windows, after failures
+    integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
+  contains
+    procedure :: start
+    procedure :: advance
+    procedure, private :: advance_plainly
+    procedure, private :: end_epoch
+    procedure, private :: visit
+  end type parallel_events_t
+
+  integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
+
+contains
+
+  !> Events are predicted when it is clear by whom.
+  subroutine start(self, sim)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+
+    self%holder = nobody
+    self%idle = .false.
+    self%wanted = min(self%threads, sim%n_disks()/self%least_disks)
+    call sim%start_sums()
+    if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
+  end subroutine start
+
+  !> Goes on to a limit, or for as long as the caller can wait.
+  subroutine advance(self, sim, limits, error)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+    type(limits_t) :: goal
+    logical :: held
+
+    if (limits%reached(sim) .or. self%log%is_full()) return
+    held = worthwhile(self, sim, limits)
+    if (held .and. sim%now >= sim%epoch_end .and. limits%time - sim%epoch > sim%epoch_end) then
+      held = .not. stands_still(sim)
+      if (held) call self%end_epoch(sim)
+      if (held .and. limits%epochs) return
+    end if
+    goal = limits
+    goal%time = min(limits%time - sim%epoch, sim%epoch_end)
+    goal%events = min(limits%events, most_events(sim))
+    goal%dissipated = limits%dissipated - abs(limits%dissipated)*rounding
+    held = held .and. goal%time > sim%now
+    if (held) call self%visit(sim, goal, held)
+    if (.not. held) then
+      call self%advance_plainly(sim, limits, error)
+    else if (sim%events >= most_events(sim)) then
+      call self%end_epoch(sim)
+    end if
+  end subroutine advance
+
+  !> Begins the next epoch, with all events to be predicted again.
+  subroutine end_epoch(self, sim)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+
+    call move_epoch(sim)
+    self%holder = nobody
+  end subroutine end_epoch
+
+  !> Lets the plain engine go on for a while.
+  subroutine advance_plainly(self, sim, limits, error)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+
+    if (self%holder /= plain_engine) call self%plain%start(sim)
+    self%holder = plain_engine
+    self%plain%log = self%log
+    call self%plain%advance(sim, limits, error)
+    self%log = self%plain%log
+    self%idle = self%plain%idle
+  end subroutine advance_plainly
+
+  !> Whether several domains can be faster than the plain engine.
+  pure function worthwhile(self, sim, limits) result(yes)
+    class(parallel_events_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: limits
+    logical :: yes
+    real(real64) :: least
+
+    least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
+    yes = self%wanted > 1 .and. sim%events >= self%plain_until .and. limits%events - sim%events > least &
+      .and. limits%collisions - sim%collisions > least
+  end function worthwhile
+
+  !> Moves on by some windows of time. `held`: it could; else the state is as before, and the plain engine must go on.
+  subroutine visit(self, sim, goal, held)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    logical, intent(out) :: held
+    type(event_log_t) :: merged
+    real(real64) :: began, elapsed, t, t_end
+    integer(int32) :: k
+    integer :: w
+    logical :: counting, good
+
+    if (self%holder /= all_domains) call load_all(self, sim)
+    held = self%cuts%n > 1
+    if (.not. held) return
+    self%holder = all_domains
+    began = seconds()
+    t = sim%now
+    do w = 1, most_windows
+      t_end = window_end(self, sim, t, goal%time)
+      counting = expected(self, sim, t_end - t) >= left(sim, self%domain, goal)
+      if (counting .and. w > 1) exit
+      do k = 1, self%cuts%n
+        call keep_log(self%domain(k), counting .or. self%log%is_on())
+      end do
+      call run_window(self, sim, t, t_end, refreshing=w > 1, good=good)
+      if (.not. good) exit
+      t = t_end
+      elapsed = seconds() - began
+      if (counting .or. .not. t < goal%time .or. elapsed > longest_visit) exit
+      if (stop_requested()) exit
+    end do
+    counting = counting .and. w == 1
+    if (good .and. (counting .or. self%log%is_on())) call merge_logs(self%domain, merged, good)
+    if (good .and. counting) call go_back_to_goal(self, sim, goal, merged, t, good)
+    if (good) held = sim%dissipated%value() + sum(self%domain%sim%dissipated%value()) < goal%dissipated &
+      .and. t - sim%last_advance >= sim%blink      ! else the plain engine looks for a collapse
+    if (good .and. held) then
+      call gather_all(self, sim, t)
+      if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
+      if (all(self%domain%engine%idle)) self%plain_until = sim%events + 1
+    else
+      self%holder = nobody
+      self%shortening = 0.5_real64*self%shortening
+      held = held .and. self%shortening > shortest
+    end if
+    if (held) return
+    self%plain_until = sim%events + plain_events*sim%n_disks()
+    self%shortening = 1
+  end subroutine visit
+
+  !> When the next window ends.
+  pure function window_end(self, sim, t, t_limit) result(t_end)
+    class(parallel_events_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: t, t_limit         !! since the epoch [time]
+    real(real64) :: t_end, length
+
+    length = self%window*self%shortening*sim%n_disks()/(2*rate_of(self, sim))
+    t_end = t + length
+    if (t_end + 0.5_real64*length > t_limit) t_end = t_limit
+  end function window_end
+
+  !> Events in a time, generously.
+  pure function expected(self, sim, length) result(events)
+    class(parallel_events_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: length             !! [time]
+    real(real64) :: events
+
+    events = 1.2_real64*length*rate_of(self, sim) + 100
+  end function expected
+
+  !> Events that may still come before a count is at its limit.
+  pure function left(sim, domain, goal) result(events)
+    type(simulation_t), intent(in) :: sim
+    type(domain_t), intent(in) :: domain(:)
+    type(limits_t), intent(in) :: goal
+    real(real64) :: events
+
+    events = min(real(goal%events - sim%events - sum(domain%sim%events), real64), &
+      real(goal%collisions - sim%collisions - sum(domain%sim%collisions), real64))
+  end function left
+
+  !> If the window passed the limit of a count, does it again up to there. The moment is known from the list of collisions;
+  !> with several at that very moment it is not good enough.
+  subroutine go_back_to_goal(self, sim, goal, merged, t, good)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: goal
+    type(event_log_t), intent(inout) :: merged
+    real(real64), intent(inout) :: t               !! in: end of the window; out: of the shorter one, since the epoch [time]
+    logical, intent(out) :: good
+    integer(int64) :: collisions
+    integer :: k
+
+    good = .true.
+    collisions = sim%collisions
+    do k = 1, merged%n
+      if (merged%record(3, k) > 0) collisions = collisions + 1
+      if (sim%events + k >= goal%events .or. collisions >= goal%collisions) exit
+    end do
+    if (k > merged%n) return
+    if (k < merged%n) good = merged%record(1, k + 1) > merged%record(1, k)
+    if (.not. good) return
+    t = merged%record(1, k)
+    merged%n = k
+    call load_all(self, sim)
+    call run_window(self, sim, sim%now, t, refreshing=.false., good=good)
+    good = good .and. sum(self%domain%sim%events) == k
+    do k = 1, self%cuts%n
+      call self%domain(k)%log%clear()              ! the list is known already
+    end do
+  end subroutine go_back_to_goal
+
+  !> Events per time that are to be expected.
+  pure function rate_of(self, sim) result(rate)
+    class(parallel_events_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: rate
+
+    rate = self%rate
+    if (.not. rate > 0) rate = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
+  end function rate_of
+
+  !> Fills all domains.
+  subroutine load_all(self, sim)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(patch_t), allocatable :: patch(:)
+    integer(int32), allocatable :: first(:), member(:)
+    integer(int32) :: k
+
+    call self%cuts%cut(sim, self%wanted, self%halo)
+    if (self%cuts%n < 2 .or. self%cuts%whole%small < maxval(sim%disk%radius)) then
+      self%cuts%n = 1
+      return
+    end if
+    if (allocated(self%domain)) then
+      if (size(self%domain) /= self%cuts%n) deallocate (self%domain)
+    end if
+    if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
+    patch = [(self%cuts%patch_of(k, sim%box%periodic), k=1, self%cuts%n)]
+    call self%cuts%list_members(sim, patch, first, member)
+    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    do k = 1, self%cuts%n
+      self%domain(k)%patch = patch(k)
+      self%domain(k)%halo = self%halo
+      self%domain(k)%low = self%cuts%low(:, k)
+      self%domain(k)%high = self%cuts%high(:, k)
+      self%domain(k)%neighbour = self%cuts%neighbours_of(k, patch(k))
+      call load(self%domain(k), sim, member(first(k):first(k + 1) - 1))
+    end do
+    !$omp end parallel do
+  end subroutine load_all
+
+  !> Runs one window in all domains. `good`: it holds.
+  subroutine run_window(self, sim, t, t_end, refreshing, good)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: t, t_end           !! since the epoch [time]
+    logical, intent(in) :: refreshing              !! the domains have not yet taken over what came of the window before
+    logical, intent(out) :: good
+    integer(int64) :: events, turns                ! the latter of one engine, of which some collisions take several
+    integer(int32) :: k
+
+    events = sum(self%domain%sim%events)
+    turns = int(turns_per_event*expected(self, sim, t_end - t), int64)
+    self%domain%good = .true.
+    if (refreshing) then
+      !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+      do k = 1, self%cuts%n
+        call refresh(self%domain, k)
+      end do
+      !$omp end parallel do
+    end if
+    good = all(self%domain%good)
+    if (.not. good) return
+    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    do k = 1, self%cuts%n
+      call move_on(self%domain(k), t_end, turns)
+      call publish(self%domain(k))
+    end do
+    !$omp end parallel do
+    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    do k = 1, self%cuts%n
+      call verify(self%domain, k)
+    end do
+    !$omp end parallel do
+    good = all(self%domain%good)
+    self%windows_done = self%windows_done + 1
+    if (.not. good) then
+      self%windows_failed = self%windows_failed + 1
+    else
+      if (t_end > t) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t_end - t)
+      self%shortening = min(1.0_real64, 1.1_real64*self%shortening)
+    end if
+  end subroutine run_window
+
+  !> Adds collisions to a log.
+  pure subroutine append_log(log, epoch, more)
+    type(event_log_t), intent(inout) :: log
+    real(real64), intent(in) :: epoch              !! [time]
+    type(event_log_t), intent(in) :: more          !! with times since the epoch
+    integer :: k
+
+    do k = 1, more%n
+      call log%append(epoch + more%record(1, k), int(more%record(2, k), int32), int(more%record(3, k), int32), &
+        more%record(4, k))
+    end do
+  end subroutine append_log
+
+  !> Brings the whole simulation to the present; the domains go on from there.
+  subroutine gather_all(self, sim, now)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: now                !! since the epoch [time]
+    integer(int32) :: k
+
+    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    do k = 1, self%cuts%n
+      call gather(self%domain(k), sim)
+      call refresh(self%domain, k)
+    end do
+    !$omp end parallel do
+    if (.not. all(self%domain%good)) self%holder = nobody
+    sim%now = now
+    do k = 1, self%cuts%n
+      associate (own => self%domain(k)%sim)
+        sim%events = sim%events + own%events
+        sim%collisions = sim%collisions + own%collisions
+        sim%wall_collisions = sim%wall_collisions + own%wall_collisions
+        sim%obstacle_collisions = sim%obstacle_collisions + own%obstacle_collisions
+        sim%virial%units = sim%virial%units + own%virial%units
+        sim%dissipated%units = sim%dissipated%units + own%dissipated%units
+        sim%wall_impulse%units = sim%wall_impulse%units + own%wall_impulse%units
+      end associate
+      call clear_sums(self%domain(k), sim)
+    end do
+  end subroutine gather_all
+
+end module parallel_events

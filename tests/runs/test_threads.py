@@ -1,0 +1,100 @@
+"""One run on several cores: the bits of one core, whatever is written and however it is stopped."""
+
+import random
+import subprocess
+import time
+
+import pytest
+from whole_runs import FINISHED, STOPPED, differences, write_input
+
+CHECK = pytest.mark.check
+
+#: About the size at which several cores begin to pay.
+GAS = "&species name = 'gas' count = 5000 packing_fraction = {} placement = '{}' temperature = 1 /"
+BIG = "&species name = 'big' count = 3 radius = 0.03 mass = 9 temperature = 1 /\n"
+WALLS = "&box /"
+PERIODIC = "&box boundary = 'periodic', 'periodic' /"
+CHANNEL = "&box boundary = 'periodic', 'wall' gravity = 0, -1 /"
+PEGS = (
+    "&obstacle centre = 0, 0.5 radius = 0.05 / &obstacle centre = 0.7, 0.3 radius = 0.1 /"
+    "&wall from = 0.1, 0.1 to = 0.4, 0.2 /"
+)
+TC = "&contact restitution = 0.9 wall_restitution = 0.95 contact_time = 1e-5 /"
+LOG = " event_log = .true. /"
+SYSTEMS = {
+    "gas": [
+        WALLS,
+        GAS.format(0.5, "lattice"),
+        "&stop time = 0.1 / &output frames_every_time = 0.02 /",
+    ],
+    "thin": [
+        PERIODIC,
+        GAS.format(0.1, "random"),
+        "&stop events = 30000 / &output observables_every_events = 1111" + LOG,
+    ],
+    "dense": [
+        PERIODIC,
+        GAS.format(0.7, "lattice"),
+        "&stop collisions = 40000 / &output frames_every_collisions = 7001 /",
+    ],
+    "pegs": [
+        CHANNEL,
+        PEGS,
+        TC,
+        BIG,
+        GAS.format(0.3, "random"),
+        "&stop time = 0.2 / &output frames_every_time = 0.07 observables_every_collisions = 500"
+        + LOG,
+    ],
+    "cooling": [
+        PERIODIC,
+        "&contact restitution = 0.8 /",
+        GAS.format(0.3, "random"),
+        "&stop energy_fraction = 0.3 / &output observables_every_collisions = 997 /",
+    ],
+    "aligned": [
+        WALLS,
+        GAS.format(0.2, "lattice").replace("temperature = 1", "velocities = 'uniform'"),
+        "&stop collisions_per_disk = 4 / &output frames_every_events = 3001" + LOG,
+    ],
+}
+
+
+def run(program, folder, name, *options):
+    command = [program, "gas.nml", "-o", name, "--quiet", *options]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(params=SYSTEMS)
+def whole(request, program, tmp_path):
+    """A folder with a run on one core."""
+    write_input(tmp_path, "\n".join(SYSTEMS[request.param]) + "\n")
+    assert run(program, tmp_path, "one.h5", "--set=run.threads=1").returncode == FINISHED
+    return tmp_path
+
+
+@pytest.mark.parametrize("threads", [2, pytest.param(3, marks=CHECK), pytest.param(4, marks=CHECK)])
+def test_threads_change_no_bit(program, whole, threads):
+    done = run(program, whole, "many.h5", f"--set=run.threads={threads}")
+    assert done.returncode == FINISHED, done.stderr
+    assert differences(whole / "one.h5", whole / "many.h5") == []
+
+
+@CHECK
+def test_a_run_goes_on_with_other_threads(program, whole):
+    """Stopped at random moments by a signal; the end is that of one core."""
+    rng = random.Random(3)
+    for k in range(20):
+        resume = ["--resume"] if list(whole.glob("parts*.chk.h5")) else []
+        threads = f"--set=run.threads={rng.randint(1, 4)}"
+        command = [program, "gas.nml", "-o", "parts.h5", "--quiet", threads, *resume]
+        process = subprocess.Popen(command, cwd=whole, stderr=subprocess.PIPE, text=True)
+        if k < 8:
+            time.sleep(rng.uniform(0.05, 0.4))
+            process.terminate()
+        message = process.communicate(timeout=300)[1]
+        if process.returncode == FINISHED:
+            break
+        # a signal before there is output ends the program as it would any other
+        assert process.returncode in (STOPPED, -15), message
+    assert differences(whole / "one.h5", whole / "parts.h5") == []
