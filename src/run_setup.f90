@@ -112,6 +112,7 @@ contains
     call get_environment_variable("OMP_NUM_THREADS", value)
     read (value, *, iostat=status) n
     if (status /= 0 .or. n < 1) n = 1
+    n = min(n, 1024)
   end function threads_for
 
 end module run_setup

@@ -53,7 +53,7 @@ contains
     run%dt = group%real_of("dt", 0.0_real64)
     run%search = group%text_of("search")
     run%queue = group%text_of("queue")
-    run%threads = int(min(group%integer_of("threads", 0_int64), 1024_int64))
+    run%threads = int(group%integer_of("threads", 0_int64))
     if (run%dynamics == "steps" .and. .not. group%given("dt")) &
       call group%complain("dt", "is missing; dynamics = 'steps' needs it", problems)
   end subroutine take_run
