@@ -474,7 +474,8 @@ def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
 
 def test_a_member_killed_without_a_checkpoint_is_made_anew(real, tmp_path):
     def start():
-        return real("rough", "--set", "output.checkpoint_every=", members=("--seeds", "1"))
+        changes = ("--set", "output.checkpoint_every=", "--set", "stop.time=400")
+        return real("rough", *changes, members=("--seeds", "1"))
 
     part = tmp_path / "rough" / "seed_1.h5.part"
     launcher = start()
