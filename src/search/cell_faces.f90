@@ -10,7 +10,7 @@ module cell_faces
   use partners, only: crossing, is_wall, sense_of, side_crossed
   implicit none
   private
-  public :: cell_faces_t, cell_width, patch_t
+  public :: all_cells, cell_faces_t, patch_t
 
   !> The cells that a grid holds, of all those that the box is cut into: usually all. A patch may lie across a periodic
   !> side. Its outer faces are open where they are not sides of the box: what leaves there is lost to it.
@@ -55,6 +55,21 @@ module cell_faces
   end type cell_faces_t
 
 contains
+
+  !> The patch of all cells of a box that is cut into n(1) columns and n(2) rows.
+  pure function all_cells(box, n, reach) result(patch)
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: n(2)
+    real(real64), intent(in) :: reach              !! within which disks touch [length]
+    type(patch_t) :: patch
+
+    patch%whole = n
+    patch%n = n
+    patch%reach = reach
+    patch%lower = box%lower
+    patch%width = box%edges()/n*(1 + 4*epsilon(reach))     ! the last face is not before the side
+    call patch%find_sides(box%periodic)
+  end function all_cells
 
   !> Finds the periodic sides in the patch.
   pure subroutine find_sides(self, periodic)
@@ -106,15 +121,6 @@ contains
 
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
-
-  !> From cell to cell, if the box is cut into n(1) columns and n(2) rows. The last face is not before the side.
-  pure function cell_width(box, n) result(width)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: n(2)
-    real(real64) :: width(2)                       !! [length]
-
-    width = box%edges()/n*(1 + 4*epsilon(width))
-  end function cell_width
 
   !> Finds the faces of the cells of a patch.
   subroutine set(self, box, patch)

@@ -6,7 +6,7 @@ module cell_grid
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle, next_side
   use cell_contents, only: cell_contents_t, gather
-  use cell_faces, only: cell_faces_t, cell_width, patch_t
+  use cell_faces, only: all_cells, cell_faces_t, patch_t
   use cell_scans, only: scan_around_edge, scan_cell, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
@@ -82,16 +82,13 @@ contains
   pure function whole_box(sim) result(patch)
     type(simulation_t), intent(in) :: sim
     type(patch_t) :: patch
-    real(real64) :: width
+    real(real64) :: small, reach, width
 
-    patch%small = largest_small_radius(sim%disk)
-    patch%reach = 2*patch%small*(1 + spare)
-    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), patch%reach)
-    patch%whole = int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32)
-    patch%n = patch%whole
-    patch%lower = sim%box%lower
-    patch%width = cell_width(sim%box, patch%whole)
-    call patch%find_sides(sim%box%periodic)
+    small = largest_small_radius(sim%disk)
+    reach = 2*small*(1 + spare)
+    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
+    patch = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
+    patch%small = small
   end function whole_box
 
   !> Puts disk i into a cell.

@@ -164,6 +164,25 @@ contains
     end do
   end subroutine check_numbers
 
+  !> Refuses centres that are not in the region: disks that are to grow have no radius yet.
+  subroutine check_region(species, packing, x, rows, error)
+    type(species_settings_t), intent(in) :: species
+    type(packing_t), intent(in) :: packing
+    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    integer, intent(in) :: rows(:)                          !! as in `origin`
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: lower(2), upper(2)
+    integer :: k
+
+    call centre_range(species%region, packing%box, 0.0_real64, lower, upper)
+    do k = 1, size(x, 2)
+      if (all(x(1:2, k) >= lower .and. x(1:2, k) <= upper)) cycle
+      call fail(error, exit_usage, origin(species, rows, k, 1)//": disk "//written(k)//" at "//written(x(1, k))//", " &
+        //written(x(2, k))//" is not in its region")
+      return
+    end do
+  end subroutine check_region
+
   !> Adds a species at known places, if they are free and in its region.
   subroutine add_checked(packing, species, s, x, rows, error)
     type(packing_t), intent(inout) :: packing
@@ -240,6 +259,7 @@ contains
       member(k)%radius = species(group(k))%radius
       if (species(group(k))%placement /= "grown") cycle
       call read_disks(species(group(k)), packing%box, from_file, rows, disk(offset(species, group(k)) + 1:), error)
+      if (.not. allocated(error)) call check_region(species(group(k)), packing, from_file, rows, error)
       if (allocated(error)) return
       x = reshape([x, from_file(1:2, :)], [2, size(x, 2) + size(from_file, 2)])
     end do
