@@ -87,7 +87,7 @@ contains
     reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
     wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
     advice = "use fewer or smaller disks"
-    if (size(sim%species) == 1) advice = "placement = 'lattice' packs equal disks more densely, or "//advice
+    if (size(sim%species) == 1) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
     call fail(error, exit_usage, "species."//sim%species(1)%name//".placement: dense placement "// &
       "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; "//advice)
   end subroutine fail_to_grow
