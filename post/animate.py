@@ -1,12 +1,13 @@
 """Animate a run: disks of true size in time.
 
-    python post/animate.py runs/gas.h5 -o gas.mp4              mp4 needs ffmpeg; else write .gif
+    python post/animate.py runs/gas.h5 -o gas.mp4              needs ffmpeg, see below
     python post/animate.py runs/crater.h5 --colour speed --count 500 --fps 30
 
 A name without an ending gets .mp4 if ffmpeg is there, and .gif if not; without -o it is that of
-the run.
+the run.  Where the system has no ffmpeg, `.venv/bin/pip install imageio-ffmpeg` brings one.
 """
 
+from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError, read_run
@@ -32,14 +33,24 @@ from matplotlib import animation
 from tqdm import tqdm
 
 
+def find_ffmpeg() -> bool:
+    """Whether there is an ffmpeg: the system's, or that of the package imageio-ffmpeg."""
+    if not animation.FFMpegWriter.isAvailable():
+        with suppress(ImportError, RuntimeError):
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            plt.rcParams["animation.ffmpeg_path"] = get_ffmpeg_exe()
+    return animation.FFMpegWriter.isAvailable()
+
+
 def film_path(wish: Path | None, run: Run) -> Path:
     """Where to write: -o, else the name of the run in the current folder."""
-    ffmpeg = animation.FFMpegWriter.isAvailable()
+    ffmpeg = find_ffmpeg()
     path = wish or Path(run.path.stem)
     if not path.suffix:
         path = path.with_suffix(".mp4" if ffmpeg else ".gif")
     if path.suffix == ".mp4" and not ffmpeg:
-        raise RunError(f"{path}: mp4 needs ffmpeg, which is not installed; write a .gif")
+        raise RunError(f"{path}: mp4 needs ffmpeg: pip install imageio-ffmpeg, or write a .gif")
     if path.suffix not in (".mp4", ".gif"):
         raise RunError(f"{path}: a film ends in .mp4 or .gif")
     return path

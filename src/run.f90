@@ -19,7 +19,7 @@ module run
   use stop_rules, only: stop_rule_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
-  use texts, only: size_text, written
+  use texts, only: counted, size_text, written
   implicit none
   private
   public :: perform_run
@@ -89,8 +89,8 @@ contains
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": valid; "//written(int(run%sim%n_disks()))//" disks; the output needs at least " &
-          //size_text(planned_bytes(run%input, run%sim)), error)
+        call print_text(command%input//": valid; "//counted(int(run%sim%n_disks(), int64), "disk")// &
+          "; the output needs at least "//size_text(planned_bytes(run%input, run%sim)), error)
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))

@@ -1,15 +1,28 @@
-"""Read and analyse the output files of Ricochet.
+"""Start Ricochet, read and analyse its output files.
 
-    from ricochet import read_run
-    run = read_run("runs/gas.h5")
+    import ricochet
+    run = ricochet.run("input/gas.nml")
+    run = ricochet.read_run("runs/gas.h5")
 
-`reader` opens files, `bridges` hands them to other programs; `statistics`, `theory`, `hard_disks`,
-`thermodynamics` and `crater` measure and compare; `drawing` draws disks and walls; `script` is what
-the command-line scripts share; `files` trusts neither what it reads nor where it writes.
+`program` starts simulations, `reader` opens files, `bridges` hands them to other programs;
+`statistics`, `theory`, `hard_disks`, `thermodynamics` and `crater` measure and compare; `drawing`
+draws disks and walls; `script` is what the command-line scripts share; `files` trusts neither what
+it reads nor where it writes.
 """
 
 from . import packages as packages  # first
 from .bridges import mdanalysis_universe
+from .program import ProgramError, run
 from .reader import Events, Obstacle, Run, RunError, Series, read_run
 
-__all__ = ["Events", "Obstacle", "Run", "RunError", "Series", "mdanalysis_universe", "read_run"]
+__all__ = [
+    "Events",
+    "Obstacle",
+    "ProgramError",
+    "Run",
+    "RunError",
+    "Series",
+    "mdanalysis_universe",
+    "read_run",
+    "run",
+]

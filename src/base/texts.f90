@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: size_text
+  public :: counted, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -214,5 +214,15 @@ contains
       text = written((bytes + 500000)/1000000)//" MB"
     end if
   end function size_text
+
+  !> `1 value`, `2 values`
+  pure function counted(number, noun) result(text)
+    integer(int64), intent(in) :: number
+    character(len=*), intent(in) :: noun
+    character(len=:), allocatable :: text
+
+    text = written(number)//" "//noun
+    if (number /= 1) text = text//"s"
+  end function counted
 
 end module texts

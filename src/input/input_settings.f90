@@ -6,12 +6,11 @@ module input_settings
   use input_obstacles, only: take_obstacles
   use input_problems, only: problem_list_t
   use input_species, only: take_species
-  use input_values, only: counted
   use parameter_values, only: parameter_group_t, range_of
   use parameters, only: obstacle_groups, row_of, words_of
   use settings, only: output_settings_t, run_settings_t, settings_t
   use stop_rules, only: stop_settings_t
-  use texts, only: place_of, written
+  use texts, only: counted, place_of, written
   implicit none
   private
   public :: resolve_settings

@@ -4,12 +4,11 @@ module input_species
   use box_geometry, only: box_t
   use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
-  use input_values, only: counted
   use observables, only: own_names
   use parameter_values, only: parameter_group_t
   use parameters, only: either, largest, row_of, smallest, table, words_of
   use settings, only: species_settings_t
-  use texts, only: place_of, shown, suggestion, written
+  use texts, only: counted, place_of, shown, suggestion, written
   implicit none
   private
   public :: take_species, check_name

@@ -5,10 +5,10 @@ module input_values
   use namelist_scanner, only: scanner_t, statement_t, token_t
   use parameter_values, only: parameter_value_t, text_length
   use parameters, only: allowed, largest, parameter_t, smallest, table, words_of
-  use texts, only: lower_case, nearest_word, shown, written
+  use texts, only: counted, lower_case, nearest_word, shown, written
   implicit none
   private
-  public :: store_values, read_real, counted
+  public :: store_values, read_real
 
   integer, parameter :: most_values = 4000000
   character(len=*), parameter :: digits = "0123456789"
@@ -95,16 +95,6 @@ contains
     hint = "; did you mean "//scanner%content(tokens(1))//"."//scanner%content(tokens(2))// &
       "? the decimal sign is a point"
   end function decimal_hint
-
-  !> `1 value`, `2 values`
-  pure function counted(number, noun) result(text)
-    integer(int64), intent(in) :: number
-    character(len=*), intent(in) :: noun
-    character(len=:), allocatable :: text
-
-    text = written(number)//" "//noun
-    if (number /= 1) text = text//"s"
-  end function counted
 
   !> Allocates n values of the variable's kind.
   pure subroutine make_room(slot, n)

@@ -170,11 +170,7 @@ contains
       group = 0
       if (all(group_names /= name)) then
         reading%complete = .false.
-        if (name == "") then
-          call reading%problems%add(line, "&", "the name of a group follows directly after &")
-        else
-          call reading%problems%add(line, "&"//plain(name), "unknown group; "//suggestion(name, group_names))
-        end if
+        call reading%problems%add(line, "&"//plain(name), "unknown group; "//suggestion(name, group_names))
       else if (.not. is_repeated(name)) then
         group = place_of(name, groups%name)
         if (groups(group)%line > 0) call reading%problems%add(line, name, &

@@ -83,10 +83,16 @@ contains
     class(scanner_t), intent(inout) :: self
     type(statement_t), intent(inout) :: statement
     type(problem_list_t), intent(inout) :: problems
+    character(len=:), allocatable :: problem
     integer :: last
 
+    last = self%at
+    problem = "text outside a group; a group is &name ... /, a comment begins with !"
     if (self%character_here() == "&") then
       last = self%word_end(self%at + 1)
+      problem = "the name of a group follows directly after &, without quotes"
+    end if
+    if (last > self%at) then
       statement%kind = group_start
       statement%name = lower_case(self%text(self%at + 1:last))
       self%group = plain(statement%name)
@@ -97,8 +103,7 @@ contains
       return
     end if
     last = self%at + index(self%text(self%at:), eol) - 2
-    call problems%add(self%line, shown(self%text(self%at:last)), &
-      "text outside a group; a group is &name ... /, a comment begins with !")
+    call problems%add(self%line, shown(self%text(self%at:last)), problem)
     self%lost = .true.
     do
       call self%skip_line()

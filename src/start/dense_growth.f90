@@ -82,11 +82,14 @@ contains
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: reached, wanted
+    character(len=:), allocatable :: advice
 
     reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
     wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
+    advice = "use fewer or smaller disks"
+    if (size(sim%species) == 1) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
     call fail(error, exit_usage, "species."//sim%species(1)%name//".placement: dense placement "// &
-      "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; use fewer or smaller disks")
+      "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; "//advice)
   end subroutine fail_to_grow
 
   !> Elastic disks in their box, species by species, at no place yet.

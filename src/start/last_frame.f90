@@ -7,7 +7,7 @@ module last_frame
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use parameters, only: largest, smallest
-  use texts, only: joined, written
+  use texts, only: counted, joined, written
   implicit none
   private
   public :: count_in_run, is_run, read_last_frame
@@ -102,7 +102,7 @@ contains
     call file%close()
     if (.not. allocated(error)) call file%report(error)
     if (size(chosen) /= count .and. .not. allocated(error)) call fail(error, exit_usage, path//": " &
-      //written(size(chosen))//" disks of species """//name//""", but species.count is "//written(count))
+      //counted(size(chosen, kind=int64), "disk")//" of species """//name//""", but species.count is "//written(count))
   end subroutine read_last_frame
 
   !> Reads a vector of each chosen disk from the last frame.

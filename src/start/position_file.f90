@@ -1,12 +1,12 @@
 !> Disks from a text file: a line `x y` or `x y vx vy` for each. Empty lines, and text from a # to the end
 !> of its line, are comments.
 module position_file
-  use kinds, only: real64
+  use kinds, only: int64, real64
   use errors, only: error_t, exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
   use input_values, only: read_real
   use system, only: opening_problem
-  use texts, only: shown, written
+  use texts, only: counted, shown, written
   implicit none
   private
   public :: count_positions, read_positions
@@ -39,7 +39,7 @@ contains
     allocate (lines(count), source=0)
     call read_lines(path, table, lines, n, error)
     if (n /= count .and. .not. allocated(error)) &
-      call fail(error, exit_usage, path//": "//written(n)//" disks, but species.count is "//written(count))
+      call fail(error, exit_usage, path//": "//counted(int(n, int64), "disk")//", but species.count is "//written(count))
   end subroutine read_positions
 
   !> Reads the disks for which the table has room, and counts them all.

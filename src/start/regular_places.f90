@@ -67,29 +67,66 @@ contains
     type(box_t), intent(in) :: box
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
     type(error_t), allocatable, intent(out) :: error
-    real(real64) :: lower(2), upper(2), step(2), best_step(2), distance, best
+    real(real64) :: lower(2), upper(2), step(2), distance, closest
     logical :: periodic(2)
-    integer :: rows, columns, best_columns
+    integer :: columns
 
     periodic = spans(species%region, box)
     call centre_range(species%region, box, species%radius, lower, upper)
-    best = -1
-    best_columns = 0
-    best_step = 0
-    do rows = 1, species%count
-      if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
-      columns = 1 + (species%count - 1)/rows
-      call measure_lattice(columns, rows, upper - lower, periodic, step, distance)
-      if (distance <= best) cycle
-      best = distance
-      best_columns = columns
-      best_step = step
-    end do
-    x = lattice(species%count, best_columns, lower, best_step, periodic)
-    if (best < 2*species%radius*(1 - 2*epsilon(best))) call fail(error, exit_usage, "species."// &
-      species%name//".placement: "//written(species%count)//" disks of diameter "// &
-      written(2*species%radius)//" do not fit; on the lattice their centres are "//written(best)//" apart")
+    call choose_lattice(species%count, upper - lower, periodic, columns, step, distance)
+    x = lattice(species%count, columns, lower, step, periodic)
+    closest = 2*species%radius*(1 - 2*epsilon(closest))
+    if (distance < closest) call fail(error, exit_usage, "species."//species%name//".placement: "// &
+      written(species%count)//" disks of diameter "//written(2*species%radius)// &
+      " do not fit; on the lattice their centres are "//written(distance)//" apart; up to "// &
+      written(lattice_capacity(species%count, closest, upper - lower, periodic))//" fit")
   end subroutine lattice_positions
+
+  !> How many disks, less than `too_many`, the lattice holds no closer than `closest`.
+  pure function lattice_capacity(too_many, closest, extent, periodic) result(n)
+    integer, intent(in) :: too_many
+    real(real64), intent(in) :: closest             !! [length]
+    real(real64), intent(in) :: extent(2)           !! for the centres [length]
+    logical, intent(in) :: periodic(2)
+    real(real64) :: step(2), distance
+    integer :: n, more, middle, columns
+
+    n = 0
+    more = too_many
+    do while (more - n > 1)                         ! the more disks, the closer they are
+      middle = n + (more - n)/2
+      call choose_lattice(middle, extent, periodic, columns, step, distance)
+      if (distance < closest) then
+        more = middle
+      else
+        n = middle
+      end if
+    end do
+  end function lattice_capacity
+
+  !> The lattice for n disks that keeps neighbours farthest apart.
+  pure subroutine choose_lattice(n, extent, periodic, columns, step, distance)
+    integer, intent(in) :: n
+    real(real64), intent(in) :: extent(2)           !! for the centres [length]
+    logical, intent(in) :: periodic(2)
+    integer, intent(out) :: columns
+    real(real64), intent(out) :: step(2), distance  !! [length]
+    real(real64) :: its_step(2), its_distance
+    integer :: rows
+
+    distance = -1
+    columns = 0
+    step = 0
+    do rows = 1, n
+      if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
+      call measure_lattice(1 + (n - 1)/rows, rows, extent, periodic, its_step, its_distance)
+      if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows are only closer
+      if (its_distance <= distance) cycle
+      distance = its_distance
+      columns = 1 + (n - 1)/rows
+      step = its_step
+    end do
+  end subroutine choose_lattice
 
   !> Steps of a lattice from column to column and from row to row, and its shortest distance.
   pure subroutine measure_lattice(columns, rows, extent, periodic, step, distance)

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 import venv
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -209,6 +210,22 @@ def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
         for wall in walls:
             for i in (-1, 0, 1) if periodic[0] else (0,):
                 assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)
+
+
+def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, capsys):
+    still = np.zeros((2, 3, 2))
+    film, path = tmp_path / "film.mp4", write_run(tmp_path / "run.h5", still, still)
+    ffmpeg = tmp_path / "its-ffmpeg"
+    ffmpeg.write_text('#!/bin/sh\nfor film; do :; done\ncat >"$film"\n')
+    ffmpeg.chmod(0o755)
+    with plt.rc_context({"animation.ffmpeg_path": "no-ffmpeg"}):
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
+        assert run_script("animate", path, "-o", film) == 2
+        assert "mp4 needs ffmpeg" in capsys.readouterr().err and not film.exists()
+        package = SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg))
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
+        assert run_script("animate", path, "-o", film) == 0
+    assert film.stat().st_size > 0
 
 
 @pytest.mark.parametrize("script", SCRIPTS)

@@ -155,11 +155,24 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     assert "from ricochet import read_run" in code and "import h5py" in code
     (tmp_path / "runs").mkdir()
     still = np.zeros((2, 3, 2))
-    energies = {"all/kinetic_energy": [0.0, 0.0]}
+    names = "all/kinetic_energy", "total_energy", "pressure"
+    energies = {name: [0.0, 0.0] for name in names}
     write_run(tmp_path / "runs" / "gas.h5", still, still, observables=energies)
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
     assert (tmp_path / "runs" / "gas.png").exists()
+
+
+def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
+    page = (ROOT / "docs" / "output.md").read_text()
+    section = re.search(r"^## Running it from Python$(.*?)^## ", page, re.DOTALL | re.MULTILINE)[1]
+    code = textwrap.dedent("\n".join(re.findall(r"^    .*", section, re.M)))
+    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post"), "RICOCHET": str(program)}
+    command = [sys.executable, "-c", code]
+    said = subprocess.run(command, cwd=tmp_path, env=paths, capture_output=True, text=True)
+    energies = [float(line) for line in said.stdout.splitlines()]
+    assert (said.returncode, said.stderr) == (0, "")
+    assert len(set(energies)) == 3 and all(0 < energy < 250 for energy in energies)
 
 
 def test_the_package_has_the_version_of_the_program(program):

@@ -74,6 +74,12 @@ def test_the_output_file_holds_every_value_as_used(ricochet, tmp_path):
     assert "species.gas.temperature" not in values
 
 
+def test_one_disk_is_a_disk(checked):
+    one = checked("&species radius = 0.1 count = 1 /\n&stop time = 1 /\n")
+    assert ": valid; 1 disk; " in one.stdout
+    assert ": valid; 20 disks; " in checked(GOOD).stdout
+
+
 def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
     run = checked("&species massa = 1 radius = -1 count = 2 /\n&stop tme = 1 /\n", "--set", "a=b")
     lines = lines_of(run)
@@ -226,7 +232,7 @@ def numbers() -> list[str]:
 
 
 def test_all_numbers_of_the_reference_are_tried():
-    assert len(numbers()) == 37
+    assert len(numbers()) == 38
 
 
 @pytest.mark.parametrize("variable", numbers())

@@ -1,0 +1,166 @@
+"""Start the program from Python: an input file or a dictionary in, a `Run` out.
+
+Its standard error is a terminal to the program, which tells a terminal how far it is.
+"""
+
+import atexit
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from .files import RunError
+from .reader import Run, read_run
+
+STOPPED = 75
+PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
+ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
+
+
+class ProgramError(RunError):
+    """The program could not run or finish; the message is its own, `code` its exit code."""
+
+    def __init__(self, message: str, code: int):
+        """The message may have several lines if the input has several mistakes."""
+        super().__init__(message)
+        self.code = code
+
+
+def run(
+    system: str | Path | Mapping,
+    overrides: Mapping[str, object] | None = None,
+    output: str | Path | None = None,
+    force: bool = False,
+    resume: bool = False,
+) -> Run:
+    """Simulate `system` and open the result.
+
+    It is an input file, or its groups as in `{"species": {"count": 9, "radius": 0.1}, ...}`, with
+    a list of dictionaries for a repeated group.  `overrides` are those of --set, as
+    `{"species.gas.mass": 2}`; `force` and `resume` the options of these names.  Without `output`
+    the file is a temporary one, which is there until Python ends.
+    """
+    program = find_program()
+    work = Path(tempfile.mkdtemp(prefix="ricochet-"))
+    atexit.register(shutil.rmtree, work, ignore_errors=True)
+    if isinstance(system, Mapping):
+        text, system = namelist(system), work / "input.nml"
+        system.write_text(text, encoding="utf-8")
+    output = work / "run.h5" if output is None else Path(output)
+    settings = [f"{name}={value_text(value)}" for name, value in (overrides or {}).items()]
+    command = [program, system, "-o", output, *(w for pair in settings for w in ("--set", pair))]
+    command += ["--force"] * force + ["--resume"] * resume
+    code, lines = watched(list(map(str, command)))
+    message = "\n".join(lines).replace(f"{work}{os.sep}", "")
+    if code != 0:
+        raise ProgramError(message or f"{program} ended with exit code {code}", code)
+    if message:
+        print(message, file=sys.stderr)
+    return read_run(output)
+
+
+def find_program() -> str:
+    """What RICOCHET names, else build/ricochet of this clone, else the installed program."""
+    root = Path(__file__).resolve().parents[2]
+    if wish := os.environ.get("RICOCHET"):
+        places = [Path(wish)]
+    else:
+        places = [root / "build/ricochet", Path(shutil.which("ricochet") or "")]
+    for place in places:
+        if place.is_file() and os.access(place, os.X_OK):
+            return str(place.resolve())
+    where = f"at {wish}" if wish else f"in {root / 'build'} or on PATH"
+    raise ProgramError(f"no program ricochet {where}: run make, or set RICOCHET to its place", 3)
+
+
+def watched(command: list[str]) -> tuple[int, list[str]]:
+    """Run the command with a progress bar; its exit code, and its messages.
+
+    If Python is interrupted, the program writes a checkpoint and ends.
+    """
+    import pty  # not on Windows, where files can be read nevertheless
+
+    ours, its = pty.openpty()
+    process = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its
+    )
+    os.close(its)
+    lines = []
+    show = sys.stderr.isatty() or "ipykernel" in sys.modules
+    look = {"bar_format": "{bar:20} {desc}", "dynamic_ncols": True}
+    try:
+        with tqdm(total=100, leave=False, disable=not show, **look) as bar:
+            for line in lines_from(ours):
+                text = ESCAPES.sub("", line).strip()
+                share = re.search(r"([\d.]+) %", text)
+                if not line.startswith(PROGRESS):
+                    lines += [text] if text else []
+                elif share:
+                    bar.n = float(share[1])
+                    bar.set_description_str(text)
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            list(lines_from(ours))  # closed now, the terminal would fail the program's last words
+        process.wait()
+        os.close(ours)
+    return process.returncode, lines
+
+
+def lines_from(terminal: int) -> Iterator[str]:
+    """What is written to a terminal, line by line; a line that is overwritten is one, too."""
+    rest = b""
+    while True:
+        try:
+            data = os.read(terminal, 65536)
+        except OSError:  # how Linux says that nobody writes any more
+            data = b""
+        *lines, rest = re.split(rb"[\r\n]", rest + data)
+        yield from (line.decode(errors="replace") for line in (lines if data else [*lines, rest]))
+        if not data:
+            return
+
+
+# --- the input ---
+
+
+def namelist(groups: Mapping[str, object]) -> str:
+    """The text of an input file; whether it makes sense is for the program to say."""
+    text = []
+    for name, content in groups.items():
+        for group in [content] if isinstance(content, Mapping) else content:
+            if not isinstance(group, Mapping):
+                raise TypeError(f"{name}: a group is a dictionary, or a list of them")
+            lines = [f"  {variable} = {value_text(value)}\n" for variable, value in group.items()]
+            text += [f"&{name}\n", *lines, "/\n"]
+    return "".join(text)
+
+
+def value_text(value: object) -> str:
+    """A value as a namelist writes it; an array as the list of its numbers, row by row."""
+    match value:
+        case bool() | np.bool_():
+            return ".true." if value else ".false."
+        case str() | Path():
+            return "'" + str(value).replace("'", "''") + "'"
+        case int() | float() | np.number():
+            return repr(value.item() if isinstance(value, np.number) else value)
+        case list() | tuple() | np.ndarray():
+            return ", ".join(value_text(part) for part in flat(value))
+    raise TypeError(f"{value!r} is not a number, text, logical, or a list of these")
+
+
+def flat(values) -> Iterator[object]:
+    """The single values in nested lists."""
+    for value in values:
+        if isinstance(value, list | tuple | np.ndarray):
+            yield from flat(value)
+        else:
+            yield value

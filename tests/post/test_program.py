@@ -1,0 +1,115 @@
+"""The program started from Python: `ricochet.run`."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ricochet as package
+from ricochet import ProgramError
+from synthetic_run import ROOT
+from whole_runs import STOPPED, USAGE, differences
+
+#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays.
+GROUPS = {
+    "run": {"title": "it's a test", "seed": 5},
+    "box": {"lower": (-1, 0), "boundary": ["periodic", "wall"]},
+    "species": [
+        {"name": "light", "count": 20, "radius": 0.02, "speed": 1},
+        {"name": "heavy", "position": np.array([[-0.5, 0.2], [0.5, 0.8]]), "radius": 1e-2},
+    ],
+    "stop": {"collisions": 30},
+    "output": {"event_log": True},
+}
+TEXT = """&run title = 'it''s a test' seed = 5 /
+&box lower = -1, 0 boundary = 'periodic', 'wall' /
+&species name = 'light' count = 20 radius = 0.02 speed = 1 /
+&species name = 'heavy' position = -0.5, 0.2, 0.5, 0.8 radius = 1e-2 /
+&stop collisions = 30 /
+&output event_log = .true. /
+"""
+
+
+@pytest.fixture(autouse=True)
+def its_program(program, monkeypatch, tmp_path):
+    """The program under test, in a folder of its own."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_dictionary_is_the_same_run_as_the_file(tmp_path, ricochet):
+    (tmp_path / "gas.nml").write_text(TEXT)
+    assert ricochet("gas.nml", "-o", "a.h5", "--set", "species.light.mass=2.5").returncode == 0
+    heavier = {"species.light.mass": np.float64(2.5)}
+    run = package.run(GROUPS, heavier, tmp_path / "b.h5")
+    assert run.parameter("run", "title") == "it's a test" and run.mass[0] == 2.5
+    of_file = package.run("gas.nml", overrides=heavier)
+    np.testing.assert_array_equal(of_file.position[-1], run.position[-1])
+    told = {"parameters/input", "parameters/overrides"}  # the same words, otherwise written
+    assert {name.strip("/") for name in differences("a.h5", "b.h5")} <= told
+
+
+def test_what_the_program_says_is_the_message(tmp_path):
+    with pytest.raises(ProgramError, match=r"^input\.nml:\d+: species\.massa: unknown") as failure:
+        package.run({"species": {"massa": 1, "count": 1, "radius": 0.1}, "stop": {"time": 1}})
+    assert failure.value.code == USAGE and "\n" not in str(failure.value)
+    package.run(GROUPS, output="a.h5")
+    with pytest.raises(ProgramError, match=r"a\.h5.*exists"):
+        package.run(GROUPS, output="a.h5")
+    assert package.run(GROUPS, {"run.seed": 6}, "a.h5", force=True).seed == 6
+
+
+def test_nothing_is_left_of_a_run_without_output(tmp_path):
+    code = "import ricochet, sys; print(ricochet.run(sys.argv[1]).path)"
+    (tmp_path / "gas.nml").write_text(TEXT)
+    command = [sys.executable, "-c", code, "gas.nml"]
+    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    python = subprocess.run(command, env=paths, capture_output=True, text=True)
+    assert (python.returncode, python.stderr) == (0, "")
+    assert python.stdout.strip() and not Path(python.stdout.strip()).exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, capsys):
+    (tmp_path / "gas.nml").write_text(TEXT)
+    code = "import ricochet; ricochet.run('gas.nml', {'stop.collisions': 10**12}, 'long.h5')"
+    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    python = subprocess.Popen(
+        [sys.executable, "-c", code], env=paths, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        end = time.monotonic() + 30
+        while not (tmp_path / "long.h5.part").exists():
+            assert time.monotonic() < end and python.poll() is None
+            time.sleep(0.05)
+        time.sleep(0.5)
+        python.send_signal(signal.SIGINT)  # as a notebook does, to Python alone
+        assert "KeyboardInterrupt" in python.communicate(timeout=30)[1]
+    finally:
+        python.kill()
+    assert (tmp_path / "long.chk.h5").exists()
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with pytest.raises(ProgramError, match="--resume") as stopped:
+        package.run(
+            *("gas.nml", {"stop.collisions": 10**12, "stop.wall_clock": 1.5}, "long.h5"),
+            resume=True,
+        )
+    assert stopped.value.code == STOPPED
+    assert "collisions" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("groups", [{"run": 3}, {"run": [3]}, {"run": {"seed": None}}])
+def test_what_is_no_input_is_refused(groups):
+    with pytest.raises(TypeError, match=r"is not|is a"):
+        package.run(groups)
+
+
+def test_a_missing_program_is_named(monkeypatch):
+    monkeypatch.setenv("RICOCHET", "nowhere")
+    with pytest.raises(ProgramError, match="no program ricochet at nowhere: run make"):
+        package.run(GROUPS)
