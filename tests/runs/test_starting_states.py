@@ -128,6 +128,17 @@ def test_what_cannot_grow_is_told(onward):
     assert run.returncode == USAGE and "of the wanted packing 0.88" in one_line(run)
 
 
+@pytest.mark.parametrize("place", [-0.1, 1.5, 1e9, 1e99])
+def test_a_disk_that_is_to_grow_outside_its_region_is_named(onward, tmp_path, place):
+    assert onward(1, 0.02).returncode == FINISHED
+    with h5py.File(tmp_path / "gas.h5", "r+") as file:
+        file["particles/disks/position/value"][-1, 3, 0] = place
+    run = onward(1, 0.021, "placement = 'grown'")
+    assert run.returncode == USAGE
+    assert "gas.h5" in one_line(run) and "disk 4 at" in run.stderr
+    assert "is not in its region" in run.stderr
+
+
 @pytest.mark.parametrize("box", ["wall", "periodic"])
 def test_a_temperature_is_exact_if_wanted(ricochet, tmp_path, box):
     text = GAS.replace("'periodic', 'periodic'", f"'{box}', '{box}'")
