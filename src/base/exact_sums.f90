@@ -20,12 +20,11 @@ module exact_sums
 
 contains
 
-  !> An empty sum, fine enough for terms up to a bound.
+  !> Makes a sum, empty or restored, fine enough for terms up to a bound.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound
 
-    self%units = 0
     self%per_one = 1
     if (bound > 0) self%per_one = scale(1.0_real64, min(digits_of_bound - exponent(bound), maxexponent(bound) - 1))
   end subroutine choose_unit

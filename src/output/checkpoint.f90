@@ -132,6 +132,7 @@ contains
     if (allocated(file%hdf5%failure)) flaw = "it cannot "//file%hdf5%failure
     if (flaw /= "") return
     sim%disk%radius = sim%species(sim%tag%species)%radius
+    call sim%choose_units()
     flaw = flaw_of_state(sim, settings)
     if (flaw == "") flaw = flaw_of_progress(progress, sim, settings%output%event_log)
     if (flaw /= "") return

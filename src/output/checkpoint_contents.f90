@@ -225,17 +225,18 @@ contains
     call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
   end subroutine exchange_state
 
-  !> Writes or reads a sum: the two halves of a whole number of units.
+  !> Writes or reads a sum: the halves of a whole number of units, which may grow to twice as much.
   subroutine exchange_sum(file, name, sum)
     type(component_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
     type(exact_sum_t), intent(inout) :: sum
+    integer(int64), parameter :: lowest = ibset(0_int64, 63)
     integer(int64) :: halves(2)
 
     halves = transfer(sum%units, halves)
-    call file%exchange(name//"/units", halves, [ibset(0_int64, 63), huge(1_int64)])
+    call file%exchange(name//"/low", halves(1), [lowest, huge(lowest)])
+    call file%exchange(name//"/high", halves(2), [-2_int64**62, 2_int64**62])
     sum%units = transfer(halves, sum%units)
-    call file%exchange(name//"/units_per_one", sum%per_one, not_negative)
   end subroutine exchange_sum
 
   !> Writes or reads how far the output has come.

@@ -46,6 +46,7 @@ module simulation_state
     procedure :: velocity
     procedure :: kinetic_energy
     procedure :: start_sums
+    procedure :: choose_units
   end type simulation_t
 
 contains
@@ -101,24 +102,27 @@ contains
     end do
   end function kinetic_energy
 
-  !> Chooses how fine the sums are, from what a collision can contribute at most. Nothing is lost if it is more: disks
-  !> that fall through periodic sides gain energy for ever.
+  !> Notes the energy of the start and chooses how fine the sums are, unless that has been done.
   pure subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
-    real(real64) :: energy, impulse, mass
-    integer(int32) :: i
 
     if (self%dissipated%per_one > 0 .or. self%n_disks() == 0) return
-    mass = 0
-    do i = 1, self%n_disks()
-      mass = mass + self%species(self%tag(i)%species)%mass
-    end do
-    energy = self%kinetic_energy() + mass*sum(abs(self%box%gravity)*self%box%edges())
-    mass = maxval(self%species%mass)
-    impulse = sqrt(8*mass*energy)
+    self%start_energy = self%kinetic_energy()
+    call self%choose_units()
+  end subroutine start_sums
+
+  !> The units of the sums, from what a collision can contribute at most given the energy of the start. Nothing is lost
+  !> if it is more: disks that fall through periodic sides gain energy for ever.
+  pure subroutine choose_units(self)
+    class(simulation_t), intent(inout) :: self
+    real(real64) :: energy, impulse, mass
+
+    mass = sum(self%species%count*self%species%mass)
+    energy = self%start_energy + mass*sum(abs(self%box%gravity)*self%box%edges())
+    impulse = sqrt(8*maxval(self%species%mass))*sqrt(energy)
     call self%dissipated%choose_unit(energy)
     call self%wall_impulse%choose_unit(impulse)
-    call self%virial%choose_unit(impulse*2*maxval(self%disk%radius))
-  end subroutine start_sums
+    call self%virial%choose_unit(impulse*2*maxval(self%species%radius))
+  end subroutine choose_units
 
 end module simulation_state

@@ -31,7 +31,7 @@ contains
     call place_disks(settings%species, sim%box, settings%run%seed, line, sim%disk, error)
     if (allocated(error)) return
     call set_in_motion(settings, sim, error)
-    sim%start_energy = sim%kinetic_energy()
+    call sim%start_sums()
   end subroutine create_simulation
 
   !> Box, contact law and species.
