@@ -100,8 +100,7 @@ contains
     call file%put(disk_radius, [size(numbers)], sim%species(numbers)%radius)
   end subroutine describe_disks
 
-  !> The input as it was given, and every variable as it was used. The number of threads changes nothing; so it is told
-  !> apart from what does.
+  !> The input as it was given, and every variable as it was used.
   subroutine describe_input(file, input)
     type(hdf5_file_t), intent(inout) :: file
     type(run_input_t), intent(in) :: input
@@ -115,8 +114,11 @@ contains
         if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
         call file%make_group(group)
         do k = 1, size(own%values)
-          if (own%name == "run" .and. own%values(k)%name == "threads") group = provenance
-          call describe_value(file, group, own%values(k))
+          if (changes_nothing(trim(own%name)//"."//own%values(k)%name)) then
+            call describe_value(file, provenance, own%values(k))
+          else
+            call describe_value(file, group, own%values(k))
+          end if
         end do
       end associate
     end do
@@ -124,7 +126,16 @@ contains
     call file%put(parameters_group//"overrides", overrides_text(input))
   end subroutine describe_input
 
-  !> What the command line has changed, one variable to a line; the number of threads changes nothing.
+  !> Whether a run gives the same bits with any value of a variable (`run.threads`): then it is told apart from those
+  !> that describe the run.
+  pure function changes_nothing(variable) result(yes)
+    character(len=*), intent(in) :: variable      !! may go on with its value
+    logical :: yes
+
+    yes = index(variable, "run.threads") == 1
+  end function changes_nothing
+
+  !> What the command line has changed, one variable to a line.
   pure function overrides_text(input) result(text)
     type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -132,7 +143,7 @@ contains
 
     text = ""
     do k = 1, size(input%overrides)
-      if (index(input%overrides(k)%text, "run.threads") /= 1) text = text//input%overrides(k)%text//new_line("a")
+      if (.not. changes_nothing(input%overrides(k)%text)) text = text//input%overrides(k)%text//new_line("a")
     end do
   end function overrides_text
 
