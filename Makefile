@@ -118,6 +118,11 @@ $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) 
 	@echo "link    $@"
 	$(Q)$(FC) $(flags) $(test_flags) -o $@ $< $(filter %.o,$^) $(PFUNIT_LIBRARIES) $(hints) $(hdf5_libs)
 
+# The engine of docs/how-it-works.md.
+$(BUILD)/four_disks: docs/four_disks.f90 $(objects)
+	@echo "link    $@"
+	$(Q)$(FC) $(flags) -I$(BUILD) -o $@ $^ $(hints) $(hdf5_libs)
+
 $(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
 	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
 
@@ -170,6 +175,7 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 test:  ## sets up, then unit tests and whole runs (two minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) unit-tests
+	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) all
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
 

@@ -23,12 +23,28 @@ INVARIANTS = ROOT / "docs" / "architecture.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
 
 
-def test_the_input_page_is_current(program):
-    source = importlib.util.spec_from_file_location("input_page", ROOT / "docs" / "input_page.py")
+def script_in_docs(name):
+    """A script in docs/ as a module."""
+    source = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(source)
     source.loader.exec_module(module)
+    return module
+
+
+def test_the_input_page_is_current(program):
+    page = script_in_docs("input_page").page(program)
     message = "make it anew: python docs/input_page.py build/ricochet > docs/input.md"
-    assert (ROOT / "docs" / "input.md").read_text() == module.page(program), message
+    assert (ROOT / "docs" / "input.md").read_text() == page, message
+
+
+def test_the_queues_on_the_page_are_those_of_the_engine(program):
+    engine = program.parent / "tests" / "four_disks"
+    if not engine.exists():
+        pytest.skip("make test builds it")
+    pages = script_in_docs("queue_page")
+    tables = [pages.table(*state) for state in pages.states(engine)]
+    page = textwrap.dedent((ROOT / "docs" / "how-it-works.md").read_text()).replace("\n    ", "\n")
+    assert [table for table in tables[:-1] if table not in page] == []
 
 
 def sections_of(page):
