@@ -180,7 +180,7 @@ test:  ## sets up, then unit tests and whole runs (two minutes)
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
 
 check:  ## validates the physics and provokes faults (minutes)
-	@.ci/set-up demo test && $(MAKE) $(jobs) all
+	@.ci/set-up demo test check && $(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'

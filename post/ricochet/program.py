@@ -94,7 +94,7 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
     os.close(its)
     lines = []
     show = sys.stderr.isatty() or "ipykernel" in sys.modules
-    look = {"bar_format": "{bar:20} {desc}", "dynamic_ncols": True}
+    look = {"bar_format": "{bar:20} {desc}", "dynamic_ncols": True, "delay": 0.5}
     try:
         with tqdm(total=100, leave=False, disable=not show, **look) as bar:
             for line in lines_from(ours):
