@@ -3,11 +3,15 @@
     python post/player.py runs/gas.h5 -o gas.html
     python post/player.py runs/crater.h5 --colour displacement
     python post/player.py runs/brownian.h5 --disks 2001       with the trace of a disk
+    python post/player.py runs/gas.h5.part --live             while the run goes on
 
-Disks of true size with walls and obstacles; play, step, speed; colour by species, speed,
-displacement or collisions; a click on a disk shows its trace; the speeds of the frame with the
-Maxwell curve of the same energy; energies per species.  Without --count a film has as many frames,
-evenly spread, as fit into 30 MB.
+Disks of true size with walls and obstacles, in true time: between two frames they fly along their
+paths, if no disk collided more than once or the run has an event log.  Play, step, speed, zoom;
+colour by species, speed, displacement or collisions; a click on a disk shows its trace, and the
+camera follows it; speeds, energies, and for up to 20 disks the events to come.  Without --count a
+film has as many frames, evenly spread, as fit into 30 MB.
+
+--live shows a run on this computer, at an address that is printed, until the run ends.
 """
 
 import base64
@@ -15,36 +19,44 @@ import hashlib
 import html
 import json
 import re
+from argparse import Namespace
 from pathlib import Path
 
 from ricochet import Run, RunError, read_run
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
 from ricochet.files import destination
+from ricochet.live import serve
+from ricochet.paths import MOST_AT_ONCE, Paths
 from ricochet.script import chosen_disks, command_line, film_frames, launch, report
 
 import numpy as np
 from matplotlib.colors import to_hex
 from tqdm import tqdm
 
-PAGE = Path(__file__).with_suffix(".html")
+PAGE = Path(__file__).with_name("page")  # what the page is made of
+SCRIPTS = ("film", "motion", "camera", "stage", "panels", "queue", "controls", "live")
 ROOM = 29e6  # bytes of base64 for the disks
+LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
+TURN = 16 * 4 / 3  # bytes of a collision of a disk between two frames
 MOST_FRAMES = 20000
-MOST_AT_ONCE = 200000  # disks of the frames that are handled together
-FEW_DISKS = 1000  # up to here traces through periodic sides are exact
+FEW_DISKS = 20  # up to here every digit is in the page, which predicts collisions
 BINS = 40  # of the speed histogram
 FEWEST = 10  # disks of a species that has a histogram
+RESTING = 0.02  # of the disks at rest at the end: no gas
+DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 
 
-def frames_that_fit(run: Run) -> int:
+def frames_that_fit(run: Run, room: float) -> int:
     """How many frames the file can hold.
 
     Each disk needs two 16-bit positions and an 8-bit colour per quantity; time, energies and
-    histograms are in words.
+    histograms are in words.  Up to half of the room is for collisions between frames.
     """
-    one = run.count * (4 + len(quantities(run)) + (run.image is not None)) * 4 / 3
-    words = 40 + 200 * len(run.names)
+    one = run.count * (4 + len(quantities(run)) + (run.image is not None) + 1 / 8) * 4 / 3
+    words = 50 + 200 * len(run.names)
     fixed = run.count * 2 * 4 / 3  # the species
-    return int(np.clip((ROOM - fixed) / (one + words), 2, MOST_FRAMES))
+    turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
+    return int(np.clip((room - fixed - min(turns, room / 2)) / (one + words), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:
@@ -53,8 +65,10 @@ def quantities(run: Run) -> list[str]:
 
 
 def coded_positions(run: Run, frames: list[int]) -> np.ndarray:
-    """(T, N, 2) positions in the box as 16-bit integers."""
+    """(T, N, 2) positions in units of the box: 16-bit integers, of few disks every digit."""
     inside = (run.position[frames] - run.lower) / run.edges
+    if run.count <= FEW_DISKS:
+        return inside.astype("<f8")
     return np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
 
 
@@ -69,6 +83,32 @@ def coded_shifts(run: Run, frames: list[int], before: int) -> np.ndarray:
     """(T, N) periods crossed along x and y since the frame before, four bits each."""
     crossed = np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8
     return (16 * crossed[..., 0] + crossed[..., 1]).astype(np.uint8)
+
+
+def coded_turns(run: Run, frames: list[int], room: float) -> tuple[dict[str, bytearray], list[int]]:
+    """Collisions between the frames, and how many disks have guessed paths.
+
+    Of each gap between two frames the number of collisions; of each collision its disk, and three
+    numbers: when, as share of the gap, and where, in units of the box.
+    """
+    kind = "<f8" if run.count <= FEW_DISKS else "<f4"
+    blocks = {name: bytearray() for name in ("gaps", "turning", "turns", "guessed")}
+    guesses, taken = [], 0
+    for k, turns in enumerate(Paths(run).along(frames)):
+        disk, guessed = turns.disk, turns.guessed
+        taken += TURN * len(disk)
+        if taken > room:
+            guessed[disk] = True
+            disk = disk[:0]
+        start, end = run.time[[frames[k], frames[k + 1]]]
+        when = (turns.time - start) / (end - start if end > start else 1)
+        where = (turns.place - run.lower) / run.edges
+        blocks["gaps"] += np.uint32(len(disk)).astype("<u4").tobytes()
+        blocks["turning"] += disk.astype("<u4").tobytes()
+        blocks["turns"] += np.column_stack([when, where])[: len(disk)].astype(kind).tobytes()
+        blocks["guessed"] += np.packbits(guessed, bitorder="little").tobytes()
+        guesses.append(int(guessed.sum()))
+    return blocks, guesses
 
 
 def scale_top(run: Run, frames: list[int], name: str) -> float:
@@ -104,15 +144,37 @@ def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[
     return tuple([list(map(significant, row)) for row in np.transpose(m)] for m in means)
 
 
-def speed_counts(run: Run, frames: list[int], top: float) -> list[list[list[int]]]:
-    """Histograms of the speeds of each species, frame by frame; empty for one of few disks."""
-    bins = np.floor(run.speed(frames) * (BINS / top)).astype(int)
-    bins[bins >= BINS] = BINS  # the fastest, which are not shown
-    bins += (BINS + 1) * np.arange(len(frames))[:, None]
-    size = (BINS + 1) * len(frames)
+def speed_bins(run: Run, frames: list[int], top: float) -> dict:
+    """The axis of the histogram of speeds.
+
+    Where disks are at rest to the end, as around a crater, speeds have no Maxwell curve: bins grow
+    with the speed, up to the fastest disk.
+    """
+    last = run.speed(frames[-1])
+    if np.mean(last == 0) < RESTING or not last.any():
+        return {"edges": np.linspace(0, top, BINS + 1), "rest": False}
+    some = frames[:: max(1, len(frames) // 40)]
+    fastest = 1.01 * float(run.speed(some).max())
+    return {"edges": np.geomspace(fastest / DECADES, fastest, BINS + 1), "rest": True}
+
+
+def speed_counts(run: Run, frames: list[int], bins: dict) -> list[list[list[int]]]:
+    """Histograms of the speeds of each species, frame by frame.
+
+    Empty for a species of few disks if the histogram is to be compared with a Maxwell curve; else
+    the first number is that of the disks at rest.
+    """
+    speeds, size = run.speed(frames), BINS + 2
+    places = np.searchsorted(bins["edges"], speeds, "right")
+    if bins["rest"]:
+        places = np.where(speeds > 0, np.maximum(places, 1), 0)
+    places += size * np.arange(len(frames))[:, None]
+    first = 0 if bins["rest"] else 1
     counts = [
-        np.bincount(bins[:, own].ravel(), minlength=size).reshape(-1, BINS + 1)[:, :BINS].tolist()
-        if own.sum() >= FEWEST
+        np.bincount(places[:, own].ravel(), minlength=size * len(frames))
+        .reshape(-1, size)[:, first : BINS + 1]
+        .tolist()
+        if bins["rest"] or own.sum() >= FEWEST
         else [[]] * len(frames)
         for own in (kind.disks for kind in run.by_species)
     ]
@@ -124,13 +186,15 @@ def significant(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def film(run: Run, frames: list[int], colour: str, traced: list[int]) -> tuple[dict, dict]:
+def film(
+    run: Run, frames: list[int], colour: str, traced: list[int], room: float = ROOM
+) -> tuple[dict, dict]:
     """What the page needs to know, and the arrays that move as name -> bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
-    fastest = 1.3 * tops["speed"]
+    bins = speed_bins(run, frames, 1.3 * tops["speed"])
     blocks = {name: bytearray() for name in ("positions", *tops)}
-    shifted, before = run.image is not None and run.count <= FEW_DISKS, frames[0]
-    shifts = blocks.setdefault("shifts", bytearray()) if shifted else None
+    before = frames[0]
+    shifts = blocks.setdefault("shifts", bytearray()) if run.image is not None else None
     kinetic, potential, counts = [], [], []
     with tqdm(total=len(frames), unit="frame", desc="player", disable=None) as progress:
         at_once = max(1, MOST_AT_ONCE // run.count)
@@ -140,19 +204,24 @@ def film(run: Run, frames: list[int], colour: str, traced: list[int]) -> tuple[d
             for name, top in tops.items():
                 values = values_of(run, some, name)
                 blocks[name] += coded(values, top, name == "collisions").tobytes()
-            if shifted:
+            if shifts is not None:
                 shifts += coded_shifts(run, some, before).tobytes()
                 before = some[-1]
             means = mean_energies(run, some)
             kinetic += means[0]
             potential += means[1]
-            counts += speed_counts(run, some, fastest)
+            counts += speed_counts(run, some, bins)
             progress.update(len(some))
+    turns, guesses = coded_turns(run, frames, room / 2)
+    blocks |= turns
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {
-        "time": [significant(t) for t in run.time[frames]],
+        "time": run.time[frames].tolist(),
         "collisions": run.collisions_per_disk_at(run.time[frames]).round(4).tolist(),
+        "exact": run.count <= FEW_DISKS,
+        "guesses": guesses,
+        "gravity": run.gravity.tolist(),
         "lower": run.lower.tolist(),
         "edges": run.edges.tolist(),
         "periodic": run.periodic.tolist(),
@@ -161,60 +230,79 @@ def film(run: Run, frames: list[int], colour: str, traced: list[int]) -> tuple[d
         "species": species(run),
         "kinetic": kinetic,
         "potential": potential if run.gravity.any() else None,
-        "speeds": {"top": significant(fastest), "bins": BINS, "counts": counts},
+        "speeds": {
+            "edges": [significant(edge) for edge in bins["edges"]],
+            "rest": bins["rest"],
+            "counts": counts,
+        },
         "scales": {name: [LABELS[name], significant(top)] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
+        "logged": bool(run.parameter("output", "event_log", False)),
     }
     return facts, blocks
 
 
-def page(run: Run, facts: dict, blocks: dict) -> str:
-    """The whole file."""
+def texts(facts: dict, blocks: dict) -> dict:
+    """The film in letters: what every page can hold, and the server of --live can send."""
+    return {"facts": facts, "blocks": {k: base64.b64encode(v).decode() for k, v in blocks.items()}}
+
+
+def page(run: Run, film: dict | None) -> str:
+    """The whole file; without a film it asks the server of --live for one."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
-    known = json.dumps(facts, allow_nan=False).replace("<", "\\u003c")
-    data = [f'<script type="application/json" id="film">{known}</script>']
-    for name, block in blocks.items():
-        text = base64.b64encode(block).decode()
-        data.append(f'<script type="text/plain" id="{name}-data">{text}</script>')
-    template = PAGE.read_text(encoding="utf-8")
+    style = (PAGE / "style.css").read_text(encoding="utf-8")
+    script = "\n".join((PAGE / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     fillings = {
-        "policy": policy(template),
+        "policy": policy(style, script, film is None),
         "title": html.escape(title),
         "caption": html.escape(caption([run])),
         "warning": html.escape(run.shortcoming),
         "source": html.escape(f"{run.path.name} (ricochet {commit})"),
-        "data": "\n".join(data),
+        "style": style,
+        "data": json.dumps(film, allow_nan=False).replace("<", "\\u003c"),
+        "script": script,
     }
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
+    template = (PAGE / "page.html").read_text(encoding="utf-8")
     return blank.sub(lambda found: fillings[found[1]], template)
 
 
-def policy(template: str) -> str:
-    """What the page may do: run its own script in its own style, and load nothing."""
+def policy(style: str, script: str, live: bool) -> str:
+    """What the page may do: run its own script in its own style, and load nothing else."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
-    for tag in ("script", "style"):
-        (own,) = re.findall(f"<{tag}>(.*?)</{tag}>", template, re.DOTALL)
+    rules += ["connect-src 'self'"] * live
+    for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
         rules.append(f"{tag}-src 'sha256-{digest}'")
     return "; ".join(rules)
+
+
+def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
+    """The film that the options ask for, and its frames."""
+    frames = film_frames(run, args, frames_that_fit(run, room))
+    traced = chosen_disks(run, args.disks or [])
+    return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
 
 
 def main() -> None:
     parser = command_line(
         __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
     )
+    parser.add_argument("--live", action="store_true", help="show the run while it goes on")
     args = parser.parse_args()
     run = read_run(args.run)
     if args.colour == "psi6":
         raise RunError("--colour psi6 is for snapshot.py and animate.py")
+    if args.live:
+        print(serve(run, page(run, None), lambda now: texts(*chosen_film(now, args, LIVE_ROOM)[1])))
+        return
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
         raise RunError(f"{path}: a player ends in .html")
-    args.count = args.count or frames_that_fit(run)
-    frames, traced = film_frames(run, args), chosen_disks(run, args.disks or [])
-    text = page(run, *film(run, frames, chosen_colour(run, args.colour), traced))
+    frames, parts = chosen_film(run, args, ROOM)
+    text = page(run, texts(*parts))
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
     rows = [{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]

@@ -179,12 +179,15 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
     return equilibrium_frames(run, args.skip, args.apart, frames) or frames[-1:]
 
 
-def film_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """The frames of a film; a single number is refused, it would once have been their count."""
+def film_frames(run: Run, args: argparse.Namespace, most: int | None = None) -> list[int]:
+    """The frames of a film, --count or else at most so many.
+
+    A single number is refused, it would once have been their count.
+    """
     match args.frames:
         case [int(number)] if run.frames > 1:
             raise RunError(f"--frames {number} is a single frame; use --count for how many")
-    return chosen_frames(run, args.frames, args.count)
+    return chosen_frames(run, args.frames, args.count or most)
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:

@@ -1,0 +1,58 @@
+// ---------- which part of the box is seen ----------
+
+// The canvas has the shape of the box. At zoom 1 it shows all of it; a periodic box goes on beyond its sides.
+const camera = { zoom: 1, x: 0, y: 0, follow: -1 };
+const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 };  // of the canvas, in pixels
+const view = { unit: 1, x: 0, y: 0 };  // pixels per length; what is at the lower left corner of the canvas
+
+const across = x => (x - view.x) * view.unit, up = y => page.height - (y - view.y) * view.unit;
+const backAcross = px => view.x + px / view.unit, backUp = py => view.y + (page.height - py) / view.unit;
+const mostZoom = () => Math.max(8, 0.3 * Math.min(...film.edges) / Math.min(...kinds.map(kind => kind.radius)));
+
+function aim() {
+  if (camera.follow >= 0 && camera.zoom > 1) [camera.x, camera.y] = [X[camera.follow], Y[camera.follow]];
+  view.unit = page.unit * camera.zoom;
+  [camera.x, camera.y] = [[camera.x, page.width], [camera.y, page.height]].map(([centre, size], axis) => {
+    const low = film.lower[axis], edge = film.edges[axis], half = size / 2 / view.unit, margin = page.margin / view.unit;
+    if (film.periodic[axis]) return centre - edge * Math.floor((centre - low) / edge);
+    const reach = Math.max(0, edge / 2 + margin - half);  // walls keep the camera in
+    return Math.max(low + edge / 2 - reach, Math.min(low + edge / 2 + reach, centre));
+  });
+  view.x = camera.x - page.width / 2 / view.unit;
+  view.y = camera.y - page.height / 2 / view.unit;
+}
+
+function lookAtAll() {
+  Object.assign(camera, { zoom: 1, x: film.lower[0] + film.edges[0] / 2, y: film.lower[1] + film.edges[1] / 2, follow: -1 });
+}
+
+// Zoom, with the same place below a point of the canvas.
+function zoom(factor, px = page.width / 2, py = page.height / 2) {
+  const x = backAcross(px), y = backUp(py);
+  camera.zoom = Math.max(1, Math.min(mostZoom(), camera.zoom * factor));
+  const unit = page.unit * camera.zoom;
+  camera.x = x + (page.width / 2 - px) / unit;
+  camera.y = y - (page.height / 2 - py) / unit;
+  if (camera.zoom === 1 && camera.follow < 0) lookAtAll();
+}
+
+function pan(dx, dy) {
+  camera.follow = -1;
+  camera.x -= dx / view.unit;
+  camera.y += dy / view.unit;
+}
+
+// The periods by which a thing from low to high is shifted where it is seen: first and last.
+function firstCopy(axis, high) {
+  return film.periodic[axis] ? Math.ceil(((axis ? view.y : view.x) - high) / film.edges[axis]) : 0;
+}
+
+function lastCopy(axis, low) {
+  const end = axis ? view.y + page.height / view.unit : view.x + page.width / view.unit;
+  return film.periodic[axis] ? Math.floor((end - low) / film.edges[axis]) : 0;
+}
+
+function copies([x0, x1], [y0, y1], draw) {
+  for (let a = firstCopy(0, x1); a <= lastCopy(0, x0); a++)
+    for (let b = firstCopy(1, y1); b <= lastCopy(1, y0); b++) draw(a * film.edges[0], b * film.edges[1]);
+}

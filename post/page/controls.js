@@ -1,0 +1,245 @@
+// ---------- what the user chooses ----------
+
+const state = { playing: false, colour: '', traced: [], arrows: false, sofar: false, total: false };
+let pace;  // time of the film per second, at speed 1
+
+function begin() {
+  newMoment();
+  lookAtAll();
+  state.colour = film.colour;
+  state.traced = film.traced;
+  state.sofar = disks < 200;
+  state.total = spread(kinds.map(kind => kind.count)) < spread(kinds.map(() => 1));
+  // The whole film takes a quarter of a minute, but no disk crosses more than half of the box in a second.
+  pace = roundUp(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1);
+  choose('colour', [['species', 'species'], ...Object.keys(film.scales).map(name => [name, name])], state.colour);
+  prepareFilm();
+}
+
+// What depends on the frames that there are.
+function prepareFilm() {
+  sums = null;
+  counted = kinds.map((_, s) => s).filter(s => film.speeds.counts[0][s].length);
+  coming.shown = film.exact;
+  $('coming').hidden = !coming.shown;
+  $('speeds').hidden = !counted.length;
+  $('now').parentElement.hidden = film.speeds.rest;
+  if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed. Curves: Maxwell’s law at the mean kinetic energy of the species.';
+  $('guess').hidden = !film.guesses.some(count => count);
+}
+
+// How far apart the curves of the species would lie: largest over smallest energy, multiplied by these numbers.
+function spread(weights) {
+  const totals = weights.map((weight, s) => weight * film.kinetic.reduce((sum, row) => sum + row[s], 0));
+  return Math.max(...totals) / Math.min(...totals);
+}
+
+function choose(id, options, value) {
+  $(id).replaceChildren(...options.map(([key, words]) => new Option(words, key, false, key === value)));
+}
+
+// ---------- what is shown ----------
+
+let told = 0;  // when words and plots were renewed
+
+function show(time, anew = false) {
+  move(time);
+  updateQueue();
+  drawStage();
+  if (state.playing && !anew && performance.now() - told < 80) return;  // they may come later than disks
+  told = performance.now();
+  $('cursor').style.transform = `translateX(${cursorAt(moment.time)}px)`;
+  drawHistogram(moment.frame);
+  tellEnergies(moment.frame);
+  tell();
+  tellQueue();
+}
+
+function layout() {
+  layOutStage();
+  layOutPlot($('histogram'), 190);
+  layOutPlot($('energy'), 170);
+  layEnergyOut();
+  show(moment.time, true);
+}
+
+function press(pairs) {
+  for (const [id, on] of Object.entries(pairs)) $(id).setAttribute('aria-pressed', on);
+}
+
+function refresh() {
+  drawLegend();
+  press({
+    now: !state.sofar, sofar: state.sofar, mean: !state.total, total: state.total, arrows: state.arrows,
+    follow: camera.follow >= 0,
+  });
+  const speed = 10 ** +$('pace').value;
+  $('times').textContent = `×${+speed.toPrecision(2)} (${short(+(pace * speed).toPrecision(2))}/s)`;
+  $('times').title = `${short(pace * speed)} time units of the run per second`;
+  layout();
+}
+
+// ---------- time ----------
+
+function play(on) {
+  if (state.playing === on) return;
+  state.playing = on;
+  press({ play: on });
+  $('play').setAttribute('aria-label', on ? 'pause' : 'play');
+  if (!on) {
+    show(moment.time, true);
+    remember();
+    return;
+  }
+  if (moment.time === last() && !live.on) show(first());
+  let before = performance.now();
+  requestAnimationFrame(function tick(stamp) {
+    if (!state.playing) return;
+    const passed = Math.min(0.1, Math.max(0, stamp - before) / 1000);
+    before = stamp;
+    show(moment.time + passed * pace * 10 ** +$('pace').value);
+    if (moment.time === last() && !live.on) play(false); else requestAnimationFrame(tick);
+  });
+}
+
+function go(time) {
+  play(false);
+  show(time, true);
+  remember();
+}
+
+const step = frame => go(film.time[Math.max(0, Math.min(frames - 1, frame))]);
+const back = () => step(film.time[moment.frame] < moment.time ? moment.frame : moment.frame - 1);
+
+// A paused film has its moment in the address, as a link to it.
+let remembering;
+function remember() {
+  clearTimeout(remembering);
+  remembering = setTimeout(() => history.replaceState(null, '', '#t=' + +moment.time.toPrecision(10)), 300);
+}
+
+function fromAddress() {
+  const time = parseFloat(new URLSearchParams(location.hash.slice(1)).get('t'));
+  if (isFinite(time)) go(time);
+  return isFinite(time);
+}
+
+// ---------- the stage as a control ----------
+
+const pointers = new Map();  // fingers on the stage
+let moved = 0;               // how far they went
+
+const onStage = ({ clientX, clientY }) => {
+  const box = $('stage').getBoundingClientRect();
+  return [(clientX - box.left) * page.dots, (clientY - box.top) * page.dots];
+};
+
+function look() {
+  $('stage').style.touchAction = camera.zoom > 1 ? 'none' : 'pan-y';  // else a finger scrolls the page
+  press({ follow: camera.follow >= 0 });
+  show(moment.time, true);
+}
+
+function zoomBy(factor, px, py) {
+  zoom(factor, px, py);
+  look();
+}
+
+function pointerMoved(event) {
+  const before = pointers.get(event.pointerId), here = onStage(event);
+  if (!before) return;
+  const others = [...pointers].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
+  pointers.set(event.pointerId, here);
+  const dx = here[0] - before[0], dy = here[1] - before[1];
+  moved += Math.hypot(dx, dy);
+  if (moved < 6 * page.dots) return;
+  if (others.length) {
+    const distance = place => Math.hypot(place[0] - others[0][0], place[1] - others[0][1]);
+    zoom(distance(here) / Math.max(1, distance(before)), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
+  } else if (camera.zoom > 1) pan(dx, dy);
+  look();
+}
+
+function pointerLifted(event) {
+  if (pointers.delete(event.pointerId) && moved < 6 * page.dots && event.type === 'pointerup') pick(...onStage(event));
+}
+
+// The disk nearest to a place, if one is near.
+function pick(px, py) {
+  let nearest = [], least = 12 * page.dots;
+  for (let i = 0; i < disks; i++) {
+    const reach = (radii[speciesOf[i]] + least) / view.unit;
+    copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
+      const gap = Math.hypot(across(X[i] + dx) - px, up(Y[i] + dy) - py) - radii[speciesOf[i]];
+      if (gap < least) [nearest, least] = [[i], gap];
+    });
+  }
+  trace(nearest);
+}
+
+function trace(some) {
+  state.traced = some;
+  camera.follow = some.length === 1 ? some[0] : -1;
+  look();
+}
+
+function followOrNot() {
+  camera.follow = camera.follow < 0 ? state.traced[0] : -1;
+  if (camera.follow >= 0 && camera.zoom === 1) camera.zoom = Math.min(4, mostZoom());
+  look();
+}
+
+function fullScreen() {
+  if (document.fullscreenElement) document.exitFullscreen(); else $('view').requestFullscreen();
+}
+
+// ---------- what acts ----------
+
+function on(id, action) { $(id).addEventListener('click', action); }
+
+const turn = (name, value) => () => { state[name] = value ?? !state[name]; refresh(); };
+const actions = {
+  play: () => play(!state.playing), first: () => step(0), last: () => step(frames - 1), back, next: () => step(moment.frame + 1),
+  clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), now: turn('sofar', false), sofar: turn('sofar', true),
+  mean: turn('total', false), total: turn('total', true), nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
+  whole: () => { lookAtAll(); look(); }, full: fullScreen, theme: () => { theme(!dark()); refresh(); },
+};
+const keys = {
+  ' ': 'play', ArrowLeft: 'back', ArrowRight: 'next', Home: 'first', End: 'last', '+': 'nearer', '=': 'nearer', '-': 'farther',
+  0: 'whole', f: 'full', v: 'arrows',
+};
+
+function theme(night) { document.documentElement.dataset.theme = night ? 'dark' : 'light'; }
+
+function listen() {
+  for (const [id, action] of Object.entries(actions)) on(id, action);
+  $('full').hidden = !document.fullscreenEnabled;
+  $('scrub').addEventListener('input', () => go(first() + $('scrub').value * (last() - first())));
+  $('pace').addEventListener('input', refresh);
+  $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
+  const stage = $('stage');
+  stage.addEventListener('pointerdown', event => {
+    if (!pointers.size) moved = 0;
+    pointers.set(event.pointerId, onStage(event));
+    stage.setPointerCapture(event.pointerId);
+  });
+  stage.addEventListener('pointermove', pointerMoved);
+  for (const type of ['pointerup', 'pointercancel']) stage.addEventListener(type, pointerLifted);
+  stage.addEventListener('wheel', event => {
+    event.preventDefault();
+    zoomBy(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), ...onStage(event));
+  }, { passive: false });
+  addEventListener('keydown', event => {
+    if (event.target.matches('select') || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.matches('input') && event.key.startsWith('Arrow')) return;
+    if (!keys[event.key] || (event.key === ' ' && event.target.matches('button'))) return;
+    event.preventDefault();
+    actions[keys[event.key]]();
+  });
+  addEventListener('resize', layout);
+  addEventListener('hashchange', fromAddress);
+  document.addEventListener('fullscreenchange', layout);
+  const darkness = matchMedia('(prefers-color-scheme: dark)');
+  theme(darkness.matches);
+  darkness.addEventListener('change', () => { theme(darkness.matches); refresh(); });
+}

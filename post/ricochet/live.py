@@ -1,0 +1,116 @@
+"""Show a run in the browsers of this computer while it goes on.
+
+The file is opened anew for each look, without locks, and only what is committed is read: the run
+does not notice.  Requests that do not come from a page of this very address are refused, lest pages
+of other hosts read along under a name that points here (DNS rebinding).
+"""
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import parse_qs, urlsplit
+
+from .files import RunError
+from .reader import Run, read_run
+
+ADDRESS = "127.0.0.1"
+LOOK = 0.5  # seconds between looks whether the run has ended
+PATIENCE = 10.0  # seconds that pages have to fetch the end of the run
+
+
+class Live:
+    """The newest film of a run that may still be going on."""
+
+    def __init__(self, run: Run, filmed: Callable[[Run], dict]) -> None:
+        """Take the unfinished run, and what makes a film of a run."""
+        self.part, self.filmed = run.path, filmed
+        self.final = run.path.with_suffix("")
+        self.lock = threading.Lock()
+        self.stamp, self.news = "", b""
+        self.delivered = False  # a page has the end
+
+    @property
+    def ended(self) -> bool:
+        """The final name means that the run has finished."""
+        return not self.part.exists() and self.final.exists()
+
+    def answer(self, known: str) -> bytes:
+        """What a page does not know yet; nothing if there is nothing new."""
+        with self.lock:
+            ended = self.ended
+            with suppress(RunError):  # caught at an unlucky moment: the next look will do
+                run = read_run(self.final if ended else self.part)
+                over = ended or "broke off" in run.shortcoming
+                stamp = f"{run.frames}{'.' if over else ''}"
+                if stamp != self.stamp:
+                    news = {"stamp": stamp, "over": over, "warning": run.shortcoming}
+                    self.news = json.dumps(news | self.filmed(run), allow_nan=False).encode()
+                    self.stamp = stamp
+            self.delivered = ended and self.stamp.endswith(".")
+            return b"" if known == self.stamp else self.news
+
+
+def handler(live: Live, page: bytes) -> type[BaseHTTPRequestHandler]:
+    """What answers the requests: the page at /, what is new at /film."""
+
+    class Handler(BaseHTTPRequestHandler):
+        server_version, sys_version = "ricochet", ""
+
+        def do_GET(self) -> None:
+            port, url = self.server.server_address[1], urlsplit(self.path)
+            if self.headers.get_all("Host") not in ([f"{ADDRESS}:{port}"], [f"localhost:{port}"]):
+                self.reply(403, "text/plain", b"only for pages of this computer\n")
+            elif url.path == "/":
+                self.reply(200, "text/html; charset=utf-8", page)
+            elif url.path == "/film":
+                known = parse_qs(url.query).get("known", [""])[0]
+                self.reply(200, "application/json", live.answer(known))
+            else:
+                self.reply(404, "text/plain", b"no such page\n")
+
+        def reply(self, code: int, kind: str, body: bytes) -> None:
+            self.send_response(code)
+            for name, value in (
+                ("Content-Type", kind),
+                ("Content-Length", str(len(body))),
+                ("Cache-Control", "no-store"),
+                ("X-Content-Type-Options", "nosniff"),
+                ("Cross-Origin-Resource-Policy", "same-origin"),
+                ("Content-Security-Policy", "frame-ancestors 'none'"),
+            ):
+                self.send_header(name, value)
+            self.end_headers()
+            with suppress(ConnectionError):  # the page was closed meanwhile
+                self.wfile.write(body)
+
+        def log_message(self, *_) -> None:
+            """Nothing: requests are of no interest."""
+
+    return Handler
+
+
+def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
+    """Show the run until it has ended, or until Ctrl-C or TERM; returns what happened."""
+    if run.path.suffix != ".part":
+        raise RunError(f"{run.path}: has finished; leave out --live")
+    live = Live(run, filmed)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with ThreadingHTTPServer((ADDRESS, 0), handler(live, page.encode())) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            print(f"http://{ADDRESS}:{server.server_address[1]}/  (Ctrl-C ends)", flush=True)
+            while not live.ended:
+                time.sleep(LOOK)
+            asked = time.monotonic()
+            while not live.delivered and time.monotonic() < asked + PATIENCE:
+                time.sleep(LOOK)
+            return f"the run has ended: {live.final}"
+        except KeyboardInterrupt:
+            return f"stopped; {live.part.name} goes on unaffected" if not live.ended else "stopped"
+        finally:
+            server.shutdown()
