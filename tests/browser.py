@@ -1,0 +1,153 @@
+"""A real browser for tests of pages: headless Chromium, by the protocol of its driver."""
+
+import base64
+import contextlib
+import json
+import shutil
+import socket
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+]
+
+
+class Browser:
+    """A session of chromedriver, by its own protocol (W3C WebDriver)."""
+
+    def __init__(self, port: int, profile: Path, size: tuple[int, int]) -> None:
+        """Start chromium with an empty profile."""
+        self.root = f"http://127.0.0.1:{port}"
+        arguments = [*FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
+        wanted = {
+            "goog:chromeOptions": {"args": arguments, "binary": shutil.which("chromium")},
+            "goog:loggingPrefs": {"browser": "ALL"},
+        }
+        answer = self.call("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
+        self.root += f"/session/{answer['sessionId']}"
+
+    def call(self, method: str, path: str, body: dict | None = None) -> object:
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.root + path, data, method=method)
+        request.add_header("Content-Type", "application/json")
+        with urllib.request.urlopen(request, timeout=60) as reply:
+            return json.load(reply)["value"]
+
+    def open(self, page: Path | str) -> None:
+        address = page if isinstance(page, str) else page.resolve().as_uri()
+        self.call("POST", "/url", {"url": address})
+
+    def run(self, script: str, *arguments) -> object:
+        return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def resize(self, width: int, height: int, phone: bool = False) -> None:
+        """Set the size of the page itself, as on a device."""
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1}
+        body = {"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics | {"mobile": phone}}
+        self.call("POST", "/goog/cdp/execute", body)
+
+    def complaints(self) -> list[dict]:
+        return self.call("POST", "/se/log", {"type": "browser"})
+
+    def click(self, name: str) -> None:
+        found = self.call("POST", "/element", {"using": "css selector", "value": f"#{name}"})
+        self.call("POST", f"/element/{next(iter(found.values()))}/click", {})
+
+    def point(self, kind: str, *fingers: list[tuple[float, float]]) -> None:
+        """Put down a mouse or fingers on the stage, move each along its places, and lift them.
+
+        Places are in CSS pixels from the corner of the stage.
+        """
+        element = self.call("POST", "/element", {"using": "css selector", "value": "#stage"})
+        box = self.run("return $('stage').getBoundingClientRect().toJSON()")
+        middle = box["width"] / 2, box["height"] / 2
+        moves = []
+        for number, places in enumerate(fingers):
+            to = [
+                {
+                    "type": "pointerMove",
+                    "duration": 30,
+                    "origin": element,
+                    "x": round(x - middle[0]),
+                    "y": round(y - middle[1]),
+                }
+                for x, y in places
+            ]
+            actions = [to[0], {"type": "pointerDown"}, *to[1:], {"type": "pointerUp"}]
+            parameters = {"pointerType": kind}
+            moves.append(
+                {
+                    "type": "pointer",
+                    "id": f"p{number}",
+                    "parameters": parameters,
+                    "actions": actions,
+                }
+            )
+        self.call("POST", "/actions", {"actions": moves})
+        self.call("DELETE", "/actions")
+
+    def wheel(self, x: float, y: float, steps: int) -> None:
+        """Turn the wheel over a place of the stage."""
+        element = self.call("POST", "/element", {"using": "css selector", "value": "#stage"})
+        box = self.run("return $('stage').getBoundingClientRect().toJSON()")
+        place = {"x": round(x - box["width"] / 2), "y": round(y - box["height"] / 2)}
+        scroll = {"type": "scroll", "origin": element, "deltaX": 0, "deltaY": -100, **place}
+        body = {"actions": [{"type": "wheel", "id": "wheel", "actions": [scroll] * steps}]}
+        self.call("POST", "/actions", body)
+
+    def press(self, key: str) -> None:
+        actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        body = {"actions": [{"type": "key", "id": "keys", "actions": actions}]}
+        self.call("POST", "/actions", body)
+
+    def picture(self) -> bytes:
+        """The page as PNG."""
+        return base64.b64decode(self.call("GET", "/screenshot"))
+
+    def close(self) -> None:
+        self.call("DELETE", "")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
+    """A browser with an empty profile, ended with its driver."""
+    missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+    if missing:
+        pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")
+    port = free_port()
+    with (folder / "chromedriver.log").open("w") as log:
+        driver = subprocess.Popen(
+            ["chromedriver", f"--port={port}", "--allowed-ips=127.0.0.1"], stdout=log, stderr=log
+        )
+    try:
+        for _ in range(100):
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
+                break
+            time.sleep(0.1)
+        browser = Browser(port, folder / "profile", size)
+        try:
+            yield browser
+        finally:
+            browser.close()
+    finally:
+        driver.terminate()
+        driver.wait(20)

@@ -1,0 +1,94 @@
+"""Paths between frames against the same run with many more frames."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from ricochet import read_run
+from ricochet.paths import Paths
+from synthetic_run import write_run
+from whole_runs import FINISHED, write_input
+
+SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
+&wall name = 'ramp' from = 0.2, 0.2 to = 0.5, 0.4 /
+"""
+DISKS = """&species name = 'a' count = 20 radius = 0.03 temperature = 1 /
+&species name = 'b' count = 10 radius = 0.05 mass = 4 temperature = 1 /
+"""
+SYSTEMS = {
+    "periodic": "&box boundary = 'periodic', 'periodic' /\n&contact restitution = 0.9 /\n" + SHAPES,
+    "half": "&box boundary = 'periodic', 'wall' gravity = 0.3, -2 /\n" + SHAPES,
+    "rough": "&contact restitution = 0.9 wall_restitution = 0.8 contact_time = 0.02 /\n" + SHAPES,
+    "smooth": "&contact wall_restitution = 0.8 wall_rule = 'normal' /\n&box gravity = 0, -2 /\n",
+    "container": "&obstacle name = 'c' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n",
+    "steps": "&run dynamics = 'steps' dt = 1e-4 /\n" + SHAPES,
+}
+
+
+@pytest.fixture(params=SYSTEMS)
+def runs(request, ricochet, tmp_path):
+    """One trajectory with few frames and an event log, with some, and with many frames."""
+    write_input(tmp_path, SYSTEMS[request.param] + DISKS + "&stop time = 1 /\n")
+    found = []
+    for gap, log in ((0.25, True), (0.05, False), (0.01, False)):
+        settings = f"output.frames_every_time={gap}", f"output.event_log=.{str(log).lower()}."
+        done = ricochet("gas.nml", "-o", f"{gap}.h5", "--set", settings[0], "--set", settings[1])
+        assert done.returncode == FINISHED, done.stderr
+        found.append(read_run(tmp_path / f"{gap}.h5"))
+    return found
+
+
+def places(run, frame, turns, disk, times):
+    """Where the path leads, from one frame to the next."""
+    own = turns.disk == disk
+    t = [run.time[frame], *turns.time[own], run.time[frame + 1]]
+    start, end = run.unwrapped([frame, frame + 1])[:, disk]
+    x = [start, *(turns.place[own] + start - run.position[frame][disk]), end]
+    result = np.column_stack([np.interp(times, t, [place[axis] for place in x]) for axis in (0, 1)])
+    for a, b in pairwise(t):
+        during = (times > a) & (times <= b)
+        bend = 0.5 * (times[during] - a) * (times[during] - b)
+        result[during] += bend[:, None] * run.gravity
+    return result
+
+
+def farthest(run, dense) -> tuple[float, int]:
+    """How far paths miss the places of the denser run, and how many paths are guessed."""
+    gap, guessed = 0.0, 0
+    for frame, turns in enumerate(Paths(run).along(list(range(run.frames)))):
+        inside = (dense.time > run.time[frame]) & (dense.time < run.time[frame + 1])
+        truth = dense.unwrapped(np.flatnonzero(inside).tolist())
+        guessed += turns.guessed.sum()
+        for disk in np.flatnonzero(~turns.guessed):
+            path = places(run, frame, turns, disk, dense.time[inside])
+            gap = max(gap, np.abs(path - truth[:, disk]).max())
+    return gap, guessed
+
+
+def test_the_event_log_gives_the_true_paths(runs):
+    gap, guessed = farthest(runs[0], runs[2])
+    assert gap < 1e-6 and guessed == 0
+
+
+def test_a_single_collision_between_frames_is_found_without_a_log(runs):
+    hits = np.diff(runs[1].collisions[:], axis=0)
+    gap, guessed = farthest(runs[1], runs[2])
+    assert np.sum(hits == 1) > 20
+    assert gap < 1e-6 and guessed == np.sum(hits > 1)
+
+
+def test_a_log_that_leads_elsewhere_is_not_believed(ricochet, tmp_path):
+    """Positions of single precision are too coarse for many collisions between two frames."""
+    write_input(tmp_path, DISKS + "&stop time = 5 /\n&output event_log = .true. /\n")
+    assert ricochet("gas.nml", "-o", "a.h5", "--set", "output.precision='single'").returncode == 0
+    run = read_run(tmp_path / "a.h5")
+    (turns,) = Paths(run).along([0, run.frames - 1])
+    assert turns.guessed.any()
+
+
+def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_path):
+    velocity = np.array([[[0.1, 0.0], [0.1, 0.0]]] * 2)
+    position = np.array([[[0.2, 0.2], [0.2, 0.5]], [[0.3, 0.2], [0.2, 0.6]]])
+    (turns,) = Paths(read_run(write_run(tmp_path / "a.h5", position, velocity))).along([0, 1])
+    assert turns.guessed.tolist() == [False, True]
