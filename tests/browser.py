@@ -86,7 +86,12 @@ class Browser:
                 }
                 for x, y in places
             ]
-            actions = [to[0], {"type": "pointerDown"}, *to[1:], {"type": "pointerUp"}]
+            actions = [
+                to[0],
+                {"type": "pointerDown", "button": 0},
+                *to[1:],
+                {"type": "pointerUp", "button": 0},
+            ]
             parameters = {"pointerType": kind}
             moves.append(
                 {

@@ -127,17 +127,12 @@ function speedsNow() {
   const { frame, gap, share } = moment, h = (film.time[gap + 1] ?? film.time[gap]) - film.time[gap];
   const rounding = Math.max(...film.edges) / grain / h;
   if (!share || frame !== gap || film.guesses[gap] || rounding > 1e-3 * film.scales.speed[1]) return { counts: film.speeds.counts[frame], energies: film.kinetic[frame] };
-  const { edges, rest } = film.speeds, counts = kinds.map(() => new Array(edges.length - 1 + rest).fill(0)), energies = kinds.map(() => 0);
+  const bins = film.speeds.edges.length - 1, width = film.speeds.edges[1];
+  const counts = kinds.map(() => new Array(bins).fill(0)), energies = kinds.map(() => 0);
   for (let i = 0; i < disks; i++) {
-    const s = speciesOf[i], square = VX[i] * VX[i] + VY[i] * VY[i], speed = Math.sqrt(square);
+    const s = speciesOf[i], square = VX[i] * VX[i] + VY[i] * VY[i], bin = Math.floor(Math.sqrt(square) / width);
     energies[s] += kinds[s].mass * square / 2 / kinds[s].count;
-    let bin = 0;  // the number of edges below
-    for (let high = edges.length; bin < high;) {
-      const middle = (bin + high) >> 1;
-      if (edges[middle] <= speed) bin = middle + 1; else high = middle;
-    }
-    if (rest) counts[s][speed > 0 ? Math.max(1, Math.min(bin, edges.length - 1)) : 0]++;
-    else if (bin < edges.length) counts[s][bin - 1]++;
+    if (bin < bins) counts[s][bin]++;
   }
   return { counts, energies };
 }
@@ -145,7 +140,7 @@ function speedsNow() {
 function drawHistogram(frame) {
   if (!counted.length) return;
   if (film.speeds.rest) {
-    drawSpeedsAndRest(speedsNow().counts);
+    drawSpeedsAndRest(film.speeds.counts[frame]);
     return;
   }
   const top = film.speeds.edges.at(-1), width = film.speeds.edges[1];

@@ -111,6 +111,6 @@ def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
                 time.sleep(LOOK)
             return f"the run has ended: {live.final}"
         except KeyboardInterrupt:
-            return f"stopped; {live.part.name} goes on unaffected" if not live.ended else "stopped"
+            return "stopped; the run goes on"
         finally:
             server.shutdown()

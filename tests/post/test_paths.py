@@ -18,9 +18,9 @@ DISKS = """&species name = 'a' count = 20 radius = 0.03 temperature = 1 /
 """
 SYSTEMS = {
     "periodic": "&box boundary = 'periodic', 'periodic' /\n&contact restitution = 0.9 /\n" + SHAPES,
-    "half": "&box boundary = 'periodic', 'wall' gravity = 0.3, -2 /\n" + SHAPES,
+    "half": "&box boundary = 'periodic', 'wall' gravity = 0, -2 /\n" + SHAPES,
     "rough": "&contact restitution = 0.9 wall_restitution = 0.8 contact_time = 0.02 /\n" + SHAPES,
-    "smooth": "&contact wall_restitution = 0.8 wall_rule = 'normal' /\n&box gravity = 0, -2 /\n",
+    "smooth": "&contact wall_restitution = 0.8 wall_rule = 'normal' /\n&box gravity = 0.3, -2 /\n",
     "container": "&obstacle name = 'c' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n",
     "steps": "&run dynamics = 'steps' dt = 1e-4 /\n" + SHAPES,
 }
