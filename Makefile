@@ -160,13 +160,16 @@ unit-tests:
 
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@.ci/set-up demo && $(MAKE) $(jobs) all
-	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002
+	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
+	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
+	  --set output.frames_every_time=0.002 --set output.event_log=.true.
 	$(venv) post/crater.py runs/demo/crater.h5 -o runs/demo/crater.png
 	$(venv) post/player.py runs/demo/crater.h5 -o runs/demo/crater.html --colour displacement
 	$(venv) post/speeds.py runs/demo/gas.h5 -o runs/demo/speeds.png
 	$(venv) post/snapshot.py runs/demo/gas.h5 -o runs/demo/gas.png
-	@echo 'In runs/demo: crater.png; crater.html, a film for the browser; speeds.png and gas.png; the data (crater.h5, gas.h5).'
+	$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html
+	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo && $(MAKE) $(jobs) all

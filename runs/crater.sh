@@ -23,7 +23,8 @@ for seed in {1..8}; do
 done | sort -u | replace "$data/members.txt"
 
 runs/ensemble.sh input/crater.nml -d "$data/one" --seeds 1 \
-  --set output.frames_every_time=0.002 --set output.observables_every_time=0.001 "$@"
+  --set output.frames_every_time=0.002 --set output.observables_every_time=0.001 \
+  --set output.event_log=.true. "$@"
 "$python" post/crater.py "$data/one/seed_1.h5" -o "$figures/crater.png"
 "$python" post/animate.py "$data/one/seed_1.h5" --colour speed -o "$figures/crater_film"
 "$python" post/player.py "$data/one/seed_1.h5" --colour displacement -o "$figures/crater_film.html"

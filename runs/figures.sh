@@ -68,6 +68,7 @@ HTML
   section scattering 'Scattering angle against impact parameter' scattering
   section gas_frames 'A gas: first and last frame' gas
   section gas 'A gas: speeds from equal to Maxwellian' gas
+  section gas_film 'A gas, film: the first collisions' gas
   section mixture 'A mixture: speeds and energies' mixture
   section cooling_velocity 'Cooling; walls slow both components' cooling
   section cooling_normal 'Cooling; walls slow the normal component' cooling

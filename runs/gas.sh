@@ -11,3 +11,9 @@ done
 "$python" post/speeds.py "$data"/*.h5 -o "$figures/gas.png" --csv "$figures/gas.csv"
 "$python" post/snapshot.py "$data/gas.count_1000_seed_1.h5" --frames 0,-1 --colour speed \
   -o "$figures/gas_frames.png"
+
+# A film of the start: equal speeds turn into Maxwell's law within a few collisions per disk.
+runs/ensemble.sh input/gas.nml -d "$data/film" --seeds 1 --set stop.collisions_per_disk=8 \
+  --set output.frames_every_time=0.002 --set output.event_log=.true. "$@"
+"$python" post/animate.py "$data/film/seed_1.h5" --colour speed -o "$figures/gas_film"
+"$python" post/player.py "$data/film/seed_1.h5" -o "$figures/gas_film.html"

@@ -36,6 +36,7 @@ runs/ensemble.sh input/gravity.nml -d "$data/long" --seeds 1 --set stop.time=520
 # first 20 time units, in time with the clock.
 "$python" post/snapshot.py "$data/events/seed_1.h5" --quiver \
   --frames 0,10,20,30,50,75,125,250,500,1000,1750,2500 -o "$figures/gravity_frames.png"
-runs/ensemble.sh input/gravity.nml -d "$data/film" --seeds 1 --set stop.time=20 "$@"
+runs/ensemble.sh input/gravity.nml -d "$data/film" --seeds 1 --set stop.time=20 \
+  --set output.event_log=.true. "$@"
 "$python" post/animate.py "$data/film/seed_1.h5" --count 501 -o "$figures/gravity_film"
 "$python" post/player.py "$data/film/seed_1.h5" -o "$figures/gravity_film.html"

@@ -10,8 +10,8 @@ function begin() {
   state.traced = film.traced;
   state.sofar = disks < 200;
   state.total = spread(kinds.map(kind => kind.count)) < spread(kinds.map(() => 1));
-  // The whole film takes a quarter of a minute, but no disk crosses more than half of the box in a second.
-  pace = roundUp(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1);
+  // The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
+  pace = near(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1, [5, 2, 1]);
   choose('colour', [['species', 'species'], ...Object.keys(film.scales).map(name => [name, name])], state.colour);
   prepareFilm();
 }
@@ -74,7 +74,7 @@ function refresh() {
     follow: camera.follow >= 0,
   });
   const speed = 10 ** +$('pace').value;
-  $('times').textContent = `×${+speed.toPrecision(2)} (${short(+(pace * speed).toPrecision(2))}/s)`;
+  $('times').textContent = `×${+speed.toPrecision(2)} (${short(+(pace * speed).toPrecision(2))} t/s)`;
   $('times').title = `${short(pace * speed)} time units of the run per second`;
   layout();
 }

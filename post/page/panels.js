@@ -92,13 +92,14 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short) {
   return { x, y };
 }
 
-const roundUp = value => {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return power * [1, 2, 5, 10].find(k => k * power >= value * (1 - 1e-9));
-};
+// The number of one digit, 1, 2 or 5, that is not smaller; or, with [5, 2, 1], not larger.
+function near(value, digits = [1, 2, 5, 10]) {
+  const power = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  return power * digits.find(k => digits[0] === 5 ? k * power <= value * (1 + 1e-9) : k * power >= value * (1 - 1e-9));
+}
 
 function round(low, high) {
-  const step = roundUp((high - low) / 4);
+  const step = near((high - low) / 4);
   const values = [];
   for (let k = Math.ceil(low / step); k * step <= high; k++) values.push(k * step);
   return values;

@@ -327,7 +327,7 @@ def test_five_thousand_disks_move_sixty_times_a_second_on_a_telephone(shown, bro
 
 LONG = """&species count = 2000 packing_fraction = 0.2 temperature = 1 /
 &stop wall_clock = 300 /
-&output frames_every_collisions = 300000 /
+&output frames_every_collisions = 50000 /
 """
 
 
