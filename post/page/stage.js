@@ -153,7 +153,7 @@ function drawDisk(x, y, radius, colour, stamp, clip) {
   const cx = x - 0.5, cy = y - 0.5, reach = radius + 1, out = pixels;
   if (cx + reach < clip[0] || cx - reach > clip[2] || cy + reach < clip[1] || cy - reach > clip[3]) return;
   if (!stamp || cx - reach < clip[0] || cx + reach > clip[2] || cy - reach < clip[1] || cy + reach > clip[3]) {
-    eachPixel(cx, cy, radius, clip, (at, covered) => { out[at] = painted(out[at], colour, covered); });
+    drawPart(cx, cy, radius, colour, clip);
     return;
   }
   const i = Math.floor(cx), j = Math.floor(cy), base = j * page.width + i, { list, rims, ends } = stamp;
@@ -163,6 +163,11 @@ function drawDisk(x, y, radius, colour, stamp, clip) {
     const edge = list[k], at = base + (edge >> 8), old = out[at];
     if (old === 0) out[at] = colour & 0xffffff | edge << 24; else out[at] = painted(old, colour, edge & 255);
   }
+}
+
+// A function of its own: what it hands on would make the one above slow.
+function drawPart(cx, cy, radius, colour, clip) {
+  eachPixel(cx, cy, radius, clip, (at, covered) => { pixels[at] = painted(pixels[at], colour, covered); });
 }
 
 // Of each phase the pixels inside, from where the centre is, and those on the rim: 256 times that, and how much of 255 is covered.

@@ -39,12 +39,12 @@ def runs(request, ricochet, tmp_path):
     return found
 
 
-def places(run, frame, turns, disk, times):
-    """Where the path leads, from one frame to the next."""
+def places(run, frame, ends, turns, disk, times):
+    """Where the path leads, from one frame to the next; `ends` are its places in them."""
     own = turns.disk == disk
     t = [run.time[frame], *turns.time[own], run.time[frame + 1]]
-    start, end = run.unwrapped([frame, frame + 1])[:, disk]
-    x = [start, *(turns.place[own] + start - run.position[frame][disk]), end]
+    cell = ends[0] - run.position[frame][disk] if own.any() else 0
+    x = [ends[0], *(turns.place[own] + cell), ends[1]]
     result = np.column_stack([np.interp(times, t, [place[axis] for place in x]) for axis in (0, 1)])
     for a, b in pairwise(t):
         during = (times > a) & (times <= b)
@@ -55,14 +55,14 @@ def places(run, frame, turns, disk, times):
 
 def farthest(run, dense) -> tuple[float, int]:
     """How far paths miss the places of the denser run, and how many paths are guessed."""
-    gap, guessed = 0.0, 0
+    gap, guessed, known, truth = 0.0, 0, run.unwrapped(slice(None)), dense.unwrapped(slice(None))
     for frame, turns in enumerate(Paths(run).along(list(range(run.frames)))):
         inside = (dense.time > run.time[frame]) & (dense.time < run.time[frame + 1])
-        truth = dense.unwrapped(np.flatnonzero(inside).tolist())
         guessed += turns.guessed.sum()
         for disk in np.flatnonzero(~turns.guessed):
-            path = places(run, frame, turns, disk, dense.time[inside])
-            gap = max(gap, np.abs(path - truth[:, disk]).max())
+            ends = known[frame : frame + 2, disk]
+            path = places(run, frame, ends, turns, disk, dense.time[inside])
+            gap = max(gap, np.abs(path - truth[inside, disk]).max())
     return gap, guessed
 
 

@@ -308,15 +308,15 @@ def test_five_thousand_disks_move_sixty_times_a_second_on_a_telephone(shown, bro
             browser.run(
                 """state.playing = true; told = performance.now() + 1e6;
                 const taken = [];
-                for (let k = 0; k < 200; k++) {
+                for (let k = 0; k < 100; k++) {
                   const start = performance.now();
-                  show(first() + k / 200 * (last() - first()));
+                  show(first() + k / 100 * (last() - first()));
                   taken.push(performance.now() - start);
                 }
                 state.playing = false; told = 0;
-                return taken.sort((a, b) => a - b)[100];"""
+                return taken.sort((a, b) => a - b)[50];"""
             )
-            for _ in range(5)
+            for _ in range(8)
         ]
     finally:
         browser.call("POST", "/goog/cdp/execute", slow | {"params": {"rate": 1}})
@@ -355,7 +355,7 @@ def test_a_run_is_watched_while_it_goes_on(live, browser, tmp_path):
     wait_for(lambda: browser.run("return last()") > first, 20)
     assert "Live: the run is at t =" in browser.run("return $('live').textContent")
     assert run.poll() is None
-    assert [line for line in browser.complaints() if "favicon" not in line["message"]] == []
+    assert browser.complaints() == []
 
 
 def ask(address, path="/", host=None, method="GET"):
