@@ -93,21 +93,16 @@ def coded_turns(run: Run, frames: list[int], room: float) -> tuple[dict[str, byt
     """
     kind = "<f8" if run.count <= FEW_DISKS else "<f4"
     blocks = {name: bytearray() for name in ("gaps", "turning", "turns", "guessed")}
-    guesses, taken = [], 0
-    for k, turns in enumerate(Paths(run).along(frames)):
-        disk, guessed = turns.disk, turns.guessed
-        taken += TURN * len(disk)
-        if taken > room:
-            guessed[disk] = True
-            disk = disk[:0]
+    guesses = []
+    for k, turns in enumerate(Paths(run, room // TURN).along(frames)):
         start, end = run.time[[frames[k], frames[k + 1]]]
         when = (turns.time - start) / (end - start if end > start else 1)
         where = (turns.place - run.lower) / run.edges
-        blocks["gaps"] += np.uint32(len(disk)).astype("<u4").tobytes()
-        blocks["turning"] += disk.astype("<u4").tobytes()
-        blocks["turns"] += np.column_stack([when, where])[: len(disk)].astype(kind).tobytes()
-        blocks["guessed"] += np.packbits(guessed, bitorder="little").tobytes()
-        guesses.append(int(guessed.sum()))
+        blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
+        blocks["turning"] += turns.disk.astype("<u4").tobytes()
+        blocks["turns"] += np.column_stack([when, where]).astype(kind).tobytes()
+        blocks["guessed"] += np.packbits(turns.guessed, bitorder="little").tobytes()
+        guesses.append(int(turns.guessed.sum()))
     return blocks, guesses
 
 

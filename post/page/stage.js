@@ -269,12 +269,15 @@ function drawArrows() {
   for (let i = 0; i < disks; i++) {
     const vx = VX[i] * length, vy = -VY[i] * length, size = Math.hypot(vx, vy);
     if (size < 1) continue;
-    const head = Math.min(6 * page.dots, 0.5 * size) / size, x = across(X[i]) + vx, y = up(Y[i]) + vy;
-    marks.moveTo(x - vx, y - vy);
-    marks.lineTo(x, y);
-    marks.lineTo(x - head * (vx + 0.5 * vy), y - head * (vy - 0.5 * vx));
-    marks.moveTo(x, y);
-    marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
+    const head = Math.min(6 * page.dots, 0.5 * size) / size, reach = size / view.unit;
+    copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
+      const x = across(X[i] + dx) + vx, y = up(Y[i] + dy) + vy;
+      marks.moveTo(x - vx, y - vy);
+      marks.lineTo(x, y);
+      marks.lineTo(x - head * (vx + 0.5 * vy), y - head * (vy - 0.5 * vx));
+      marks.moveTo(x, y);
+      marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
+    });
   }
   marks.stroke();
 }

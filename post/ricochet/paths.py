@@ -68,8 +68,9 @@ class Flight:
 class Paths:
     """The paths between frames of a run."""
 
-    def __init__(self, run: Run) -> None:
-        """Take what the wall rule needs from the run."""
+    def __init__(self, run: Run, most: float = np.inf) -> None:
+        """Take what the wall rule needs from the run; give at most so many turns in all."""
+        self.most = most
         self.run = run
         contact = run.parameters.get("contact", {})
         self.wall_restitution = float(contact.get("wall_restitution", 1.0))
@@ -119,6 +120,8 @@ class Paths:
             hits = np.where(free, 0, 2)
         else:
             hits = b.hits - a.hits
+        if hits.sum() > self.most:
+            return Turns(np.zeros(0, int), np.zeros(0), np.zeros((0, 2)), hits > 0)
         # The flights before and after a single collision: they meet where turning * after = way.
         turning = a.velocity - b.velocity + h * g
         way = end - a.position - h * (b.velocity - 0.5 * h * g)
@@ -140,6 +143,7 @@ class Paths:
                     guessed[k] = False
         disk, time, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
         order = np.lexsort((time, disk))
+        self.most -= len(disk)
         return Turns(disk[order], time[order], place[order], guessed)
 
     def arrives(self, flight: Flight, b: State, disk: int, end: np.ndarray) -> bool:

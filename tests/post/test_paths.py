@@ -87,6 +87,20 @@ def test_a_log_that_leads_elsewhere_is_not_believed(ricochet, tmp_path):
     assert turns.guessed.any()
 
 
+def test_turns_beyond_the_room_for_them_are_guessed(ricochet, tmp_path):
+    """And not looked for: a log may hold 1e9 events."""
+    write_input(tmp_path, DISKS + "&stop time = 2 /\n&output event_log = .true. /\n")
+    done = ricochet("gas.nml", "-o", "a.h5", "--set", "output.frames_every_time=0.5")
+    assert done.returncode == FINISHED
+    run = read_run(tmp_path / "a.h5")
+    frames = list(range(run.frames))
+    all_turns = [len(turns.disk) for turns in Paths(run).along(frames)]
+    some = list(Paths(run, all_turns[0] + 1).along(frames))
+    assert [len(turns.disk) for turns in some] == [all_turns[0], 0, 0, 0]
+    hits = np.diff(run.collisions[:], axis=0) > 0
+    assert np.array_equal([turns.guessed for turns in some[1:]], hits[1:])
+
+
 def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_path):
     velocity = np.array([[[0.1, 0.0], [0.1, 0.0]]] * 2)
     position = np.array([[[0.2, 0.2], [0.2, 0.5]], [[0.3, 0.2], [0.2, 0.6]]])
