@@ -249,11 +249,14 @@ function drawPath(list, colour, width) {
   marks.lineWidth = width * page.dots;
   marks.lineCap = marks.lineJoin = 'round';
   marks.beginPath();
+  let pen = [NaN, NaN];
   for (const { from: [x0, y0], to: [x1, y1], bend: [bx, by] } of list) {
     const x = (x0 + x1) / 2 - bx, y = (y0 + y1) / 2 - by;  // a parabola is a Bézier curve
     copies([Math.min(x0, x1, x), Math.max(x0, x1, x)], [Math.min(y0, y1, y), Math.max(y0, y1, y)], (dx, dy) => {
-      marks.moveTo(across(x0 + dx), up(y0 + dy));
-      marks.quadraticCurveTo(across(x + dx), up(y + dy), across(x1 + dx), up(y1 + dy));
+      const start = [across(x0 + dx), up(y0 + dy)];
+      if (!(Math.hypot(start[0] - pen[0], start[1] - pen[1]) <= 0.1)) marks.moveTo(...start);
+      pen = [across(x1 + dx), up(y1 + dy)];
+      marks.quadraticCurveTo(across(x + dx), up(y + dy), ...pen);
     });
   }
   marks.stroke();
