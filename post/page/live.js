@@ -8,7 +8,6 @@ async function ask() {
   const news = answer?.ok ? await answer.text() : null;
   if (news) receive(JSON.parse(news));
   if (news === null) $('live').textContent = 'No answer: player.py has ended. The film stays as it is.';
-  else if (live.on) $('live').textContent = `Live: the run is at t = ${short(last())}.`;
   if (!live.on) return;
   setTimeout(ask, news === null ? 5000 : 1500);
 }
@@ -18,11 +17,11 @@ function receive(news) {
   load(news);
   kinds.forEach((kind, s) => { kind.own = own[s]; });
   live.stamp = news.stamp;
-  live.on = !news.over;
-  $('warning').textContent = news.over ? news.warning : '';
+  live.on = !news.end;
+  $('warning').textContent = news.end ? news.warning : '';
+  $('live').textContent = news.end ? `The run ${news.end}, at t = ${short(last())}.` : `Live: the run is at t = ${short(last())}.`;
   if (!started) begin();
   else prepareFilm();
-  $('live').textContent = news.over ? `The run has ended, at t = ${short(last())}.` : '';
   move(started ? time : last());
   refresh();
   if (!started) play(true);

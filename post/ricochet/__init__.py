@@ -6,8 +6,9 @@
 
 `program` starts simulations, `reader` opens files, `bridges` hands them to other programs;
 `statistics`, `theory`, `hard_disks`, `thermodynamics` and `crater` measure and compare; `drawing`
-draws disks and walls, `film` moves them; `script` is what the command-line scripts share; `files`
-trusts neither what it reads nor where it writes.
+draws disks and walls, `film` moves them; `paths` knows where disks are between frames, `live` shows
+a run that goes on; `script` is what the command-line scripts share; `files` trusts neither what it
+reads nor where it writes.
 """
 
 from . import packages as packages  # first

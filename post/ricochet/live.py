@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from .files import RunError
@@ -29,28 +30,31 @@ class Live:
         """Take the unfinished run, and what makes a film of a run."""
         self.part, self.filmed = run.path, filmed
         self.final = run.path.with_suffix("")
+        self.claim = Path(f"{self.final}.lock")  # there while the program writes; never opened here
+        self.claimed = self.claim.exists()
         self.lock = threading.Lock()
         self.stamp, self.news = "", b""
         self.delivered = False  # a page has the end
 
     @property
-    def ended(self) -> bool:
-        """The final name means that the run has finished."""
-        return not self.part.exists() and self.final.exists()
+    def end(self) -> str:
+        """Empty while the run goes on.  The final name means that it has finished."""
+        if not self.part.exists():
+            return "has ended" if self.final.exists() else ""
+        return "has stopped" if self.claimed and not self.claim.exists() else ""
 
     def answer(self, known: str) -> bytes:
         """What a page does not know yet; nothing if there is nothing new."""
         with self.lock:
-            ended = self.ended
+            end = self.end
             with suppress(RunError):  # caught at an unlucky moment: the next look will do
-                run = read_run(self.final if ended else self.part)
-                over = ended or "broke off" in run.shortcoming
-                stamp = f"{run.frames}{'.' if over else ''}"
+                run = read_run(self.part if self.part.exists() else self.final)
+                stamp = f"{run.frames} {end}"
                 if stamp != self.stamp:
-                    news = {"stamp": stamp, "over": over, "warning": run.shortcoming}
+                    news = {"stamp": stamp, "end": end, "warning": run.shortcoming}
                     self.news = json.dumps(news | self.filmed(run), allow_nan=False).encode()
                     self.stamp = stamp
-            self.delivered = ended and self.stamp.endswith(".")
+            self.delivered = bool(end) and self.stamp.endswith(end)
             return b"" if known == self.stamp else self.news
 
 
@@ -104,12 +108,12 @@ def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         try:
             print(f"http://{ADDRESS}:{server.server_address[1]}/  (Ctrl-C ends)", flush=True)
-            while not live.ended:
+            while not live.end:
                 time.sleep(LOOK)
             asked = time.monotonic()
             while not live.delivered and time.monotonic() < asked + PATIENCE:
                 time.sleep(LOOK)
-            return f"the run has ended: {live.final}"
+            return f"the run {live.end}: {live.part if live.part.exists() else live.final}"
         except KeyboardInterrupt:
             return "stopped; the run goes on"
         finally:

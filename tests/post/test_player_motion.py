@@ -404,6 +404,18 @@ def test_the_show_ends_with_the_run_and_says_so(live, browser, tmp_path):
     assert browser.run("return live.on") is False
 
 
+def test_a_run_that_stops_ends_the_show_too(live, browser, tmp_path):
+    run, show, address = live
+    browser.open(address)
+    wait_for(lambda: browser.run("return live.stamp !== ''"))
+    run.send_signal(signal.SIGTERM)
+    out, err = show.communicate(timeout=60)
+    assert (show.returncode, err) == (0, "")
+    assert out.strip() == f"the run has stopped: {tmp_path / 'gas.h5.part'}"
+    wait_for(lambda: "has stopped, at t" in browser.run("return $('live').textContent"))
+    assert "is unfinished" in browser.run("return $('warning').textContent")
+
+
 def test_a_finished_run_is_not_live(tmp_path, capsys):
     path = write_run(tmp_path / "a.h5", np.full((1, 1, 2), 0.5), np.zeros((1, 1, 2)))
     assert run_script("player", path, "--live") == 2
