@@ -21,7 +21,7 @@ from ricochet.drawing import COLOURS, caption, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import equilibrium_frames
+from ricochet.thermodynamics import equilibrium_frames, kinds_of_disks
 
 import numpy as np
 import scipy
@@ -208,7 +208,7 @@ def main() -> None:
     frames = equilibrium_frames(run, args.skip)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
-    species = [samples(run, kind, frames) for kind in run.by_species]
+    species = [samples(run, kind, frames) for kind in kinds_of_disks(run)]
     energy = [0.5 * s.mass * s.square for s in species]
     temperature = float(np.sum([e.sum() for e in energy]) / np.sum([e.size for e in energy]))
     result = table(run, species, temperature)

@@ -28,7 +28,7 @@ from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import start_of_equilibrium
+from ricochet.thermodynamics import kinds_of_disks, start_of_equilibrium
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
     """P averaged over all kinds of pairs of a dilute gas in equilibrium, by their rates."""
     shares, rates = [], []
     pull = float(np.linalg.norm(run.gravity))
-    for a, b in combinations_with_replacement(run.by_species, 2):
+    for a, b in combinations_with_replacement(kinds_of_disks(run), 2):
         reduced, diameter = a.mass * b.mass / (a.mass + b.mass), a.radius + b.radius
         pairs = comb(a.disks.sum(), 2) if a is b else a.disks.sum() * b.disks.sum()
         height = temperature / pull * (1 / a.mass + 1 / b.mass) if pull else 1.0

@@ -13,6 +13,7 @@ from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, hold_against, series_mean
 from ricochet.theory import maxwell_cdf, maxwell_pdf
+from ricochet.thermodynamics import kinds_of_disks
 
 import numpy as np
 
@@ -37,7 +38,8 @@ def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
     """Per species: mean speed and energy at the start and in equilibrium, and the theory."""
     temperature = float(np.mean([run.kinetic_energy(0).mean() for run in runs]))
     rows = []
-    for name, mass, *_ in runs[0].by_species:
+    for kind in kinds_of_disks(runs[0]):
+        name, mass = kind.name, kind.mass
         start = np.mean([means(run, [0], name)[0] for run in runs], axis=0)
         late = over_members([means(r, f, name) for r, f in zip(runs, frames, strict=True)])
         u = pooled_speeds(runs, frames, name) * np.sqrt(mass / (2 * temperature))

@@ -27,6 +27,7 @@ from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, value
 from ricochet.files import destination
 from ricochet.live import serve
 from ricochet.paths import MOST_AT_ONCE, Paths
+from ricochet.reader import span
 from ricochet.script import chosen_disks, command_line, film_frames, launch, report
 
 import numpy as np
@@ -39,6 +40,7 @@ ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
 TURN = 16 * 4 / 3  # bytes of a collision of a disk between two frames
 MOST_FRAMES = 20000
+MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, which predicts collisions
 BINS = 40  # of the speed histogram
 FEWEST = 10  # disks of a species that has a histogram
@@ -54,7 +56,7 @@ def frames_that_fit(run: Run, room: float) -> int:
     """
     one = run.count * (4 + len(quantities(run)) + (run.image is not None) + 1 / 8) * 4 / 3
     words = 50 + 200 * len(run.names)
-    fixed = run.count * 2 * 4 / 3  # the species
+    fixed = run.count * (2 + 1) * 4 / 3  # species and size
     turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
     return int(np.clip((room - fixed - min(turns, room / 2)) / (one + words), 2, MOST_FRAMES))
 
@@ -122,11 +124,19 @@ def species(run: Run) -> list[dict]:
             "name": kind.name,
             "count": int(kind.disks.sum()),
             "mass": kind.mass,
-            "radius": kind.radius,
+            "sizes": f"m = {span(kind.masses)}, r = {span(kind.radii)}",
             "colour": colours[k % len(colours)],
         }
         for k, kind in enumerate(run.by_species)
     ]
+
+
+def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """The radii that there are, as few as a byte can number, and which of them each disk has."""
+    radii = np.unique(run.radius)
+    if len(radii) > MOST_RADII:
+        radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
+    return radii, np.searchsorted((radii[1:] + radii[:-1]) / 2, run.radius)
 
 
 def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[list[float]]]:
@@ -156,8 +166,8 @@ def speed_bins(run: Run, frames: list[int], top: float) -> dict:
 def speed_counts(run: Run, frames: list[int], bins: dict) -> list[list[list[int]]]:
     """Histograms of the speeds of each species, frame by frame.
 
-    Empty for a species of few disks if the histogram is to be compared with a Maxwell curve; else
-    the first number is that of the disks at rest.
+    Empty for a species of few or unequal disks if the histogram is to be compared with a Maxwell
+    curve; else the first number is that of the disks at rest.
     """
     speeds, size = run.speed(frames), BINS + 2
     places = np.searchsorted(bins["edges"], speeds, "right")
@@ -166,12 +176,12 @@ def speed_counts(run: Run, frames: list[int], bins: dict) -> list[list[list[int]
     places += size * np.arange(len(frames))[:, None]
     first = 0 if bins["rest"] else 1
     counts = [
-        np.bincount(places[:, own].ravel(), minlength=size * len(frames))
+        np.bincount(places[:, kind.disks].ravel(), minlength=size * len(frames))
         .reshape(-1, size)[:, first : BINS + 1]
         .tolist()
-        if bins["rest"] or own.sum() >= FEWEST
+        if bins["rest"] or (len(kind.masses) >= FEWEST and np.ptp(kind.masses) == 0)
         else [[]] * len(frames)
-        for own in (kind.disks for kind in run.by_species)
+        for kind in run.by_species
     ]
     return list(map(list, zip(*counts, strict=True)))
 
@@ -210,6 +220,8 @@ def film(
     turns, guesses = coded_turns(run, frames, room / 2)
     blocks |= turns
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
+    radii, own = radii_of(run)
+    blocks["sizes"] = own.astype("u1").tobytes()
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {
         "time": run.time[frames].tolist(),
@@ -223,6 +235,7 @@ def film(
         "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
         "walls": run.walls.tolist(),
         "species": species(run),
+        "radii": radii.tolist(),
         "kinetic": kinetic,
         "potential": potential if run.gravity.any() else None,
         "speeds": {

@@ -19,7 +19,7 @@ module run
   use stop_rules, only: stop_rule_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
-  use texts, only: counted, size_text, written
+  use texts, only: counted, legible, size_text, written
   implicit none
   private
   public :: perform_run
@@ -89,7 +89,7 @@ contains
     associate (command => run%command)
       if (.not. command%quiet) call warn(run)
       if (command%check) then
-        call print_text(command%input//": valid; "//counted(int(run%sim%n_disks(), int64), "disk")// &
+        call print_text(legible(command%input)//": valid; "//counted(int(run%sim%n_disks(), int64), "disk")// &
           "; the output needs at least "//size_text(planned_bytes(run%input, run%sim)), error)
         return
       end if
@@ -99,7 +99,7 @@ contains
       if (planned_bytes(run%input, run%sim) > much) write (error_unit, "(a)") &
         "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
       if (folder_is_new) write (error_unit, "(a)") &
-        "note: folder "//folder_of(command%output)//" has been created for the output"
+        "note: folder "//legible(folder_of(command%output))//" has been created for the output"
     end associate
   end subroutine begin
 
@@ -123,7 +123,7 @@ contains
       else if (finished .and. rule%too_cold(sim)) then
         call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
       else if (command%check) then
-        call print_text(command%input//": valid; the run goes on from time "//written(sim%time()), error)
+        call print_text(legible(command%input)//": valid; the run goes on from time "//written(sim%time()), error)
       else
         call run%output%resume(command%output, run%input, sim, progress, finished, error)
       end if
@@ -250,7 +250,7 @@ contains
     character(len=:), allocatable :: text
 
     associate (sim => run%sim)
-      text = "output = "//run%command%output// &
+      text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
         eol//"collisions = "//written(sim%collisions)// &
         eol//"wall_collisions = "//written(sum(sim%wall_collisions))// &

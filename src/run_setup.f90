@@ -3,7 +3,7 @@
 module run_setup
   use all_pairs, only: all_pairs_t
   use cell_grid, only: cell_grid_t
-  use errors, only: error_t, exit_usage, fail
+  use errors, only: error_t, exit_files, exit_usage
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t, log_capacity
   use evolution, only: evolution_t
@@ -53,7 +53,10 @@ contains
 
     call read_settings(text, overrides, settings, groups, problems)
     call check_fit(settings, groups, problems)
-    if (problems%count > 0) call fail(error, exit_usage, problems%report(path, overrides))
+    if (problems%count == 0) return
+    allocate (error)
+    error%message = problems%report(path, overrides)
+    error%code = merge(exit_files, exit_usage, problems%unreadable == problems%count)
   end subroutine settings_from_text
 
   !> The state at the start of a run, the disks in an order that suits the memory.

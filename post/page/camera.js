@@ -7,7 +7,7 @@ const view = { unit: 1, x: 0, y: 0 };  // pixels per length; what is at the lowe
 
 const across = x => (x - view.x) * view.unit, up = y => page.height - (y - view.y) * view.unit;
 const backAcross = px => view.x + px / view.unit, backUp = py => view.y + (page.height - py) / view.unit;
-const mostZoom = () => Math.max(8, 0.3 * Math.min(...film.edges) / Math.min(...kinds.map(kind => kind.radius)));
+const mostZoom = () => Math.max(8, 0.3 * Math.min(...film.edges) / Math.min(...film.radii));
 
 function aim() {
   if (camera.follow >= 0 && camera.zoom > 1) [camera.x, camera.y] = [X[camera.follow], Y[camera.follow]];

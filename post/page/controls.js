@@ -168,9 +168,9 @@ function pointerLifted(event) {
 function pick(px, py) {
   let nearest = [], least = 12 * page.dots;
   for (let i = 0; i < disks; i++) {
-    const reach = (radii[speciesOf[i]] + least) / view.unit;
+    const reach = (radii[sizeOf[i]] + least) / view.unit;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
-      const gap = Math.hypot(across(X[i] + dx) - px, up(Y[i] + dy) - py) - radii[speciesOf[i]];
+      const gap = Math.hypot(across(X[i] + dx) - px, up(Y[i] + dy) - py) - radii[sizeOf[i]];
       if (gap < least) [nearest, least] = [[i], gap];
     });
   }

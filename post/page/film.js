@@ -5,7 +5,8 @@
 const $ = id => document.getElementById(id);
 let film, frames, disks, kinds;  // facts; the number of frames, of disks; species
 let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the box
-let speciesOf, codes, viridis;   // by disk; places on the colour scales, frame by frame; the colours of the scale
+let speciesOf, sizeOf;           // by disk
+let codes, viridis;              // places on the colour scales, frame by frame; the colours of the scale
 let shifts;                      // periods crossed since the frame before, x + 8 and y + 8 in four bits each
 let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, x, y in the box
 let guessed, guessedRow;         // bits, gap by gap: disks whose paths there are not known; bytes of a gap
@@ -20,6 +21,7 @@ function load({ facts, blocks }) {
   frames = film.time.length;
   kinds = film.species;
   speciesOf = new Uint16Array(bytes('species').buffer);
+  sizeOf = bytes('sizes');
   disks = speciesOf.length;
   positions = new (film.exact ? Float64Array : Uint16Array)(bytes('positions').buffer);
   grain = film.exact ? 1 : 65535;

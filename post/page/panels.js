@@ -31,7 +31,7 @@ function chooser(kind) {
   input.addEventListener('input', () => { kind.own = input.value; layOutStage(); show(moment.time, true); });
   input.addEventListener('change', refresh);
   label.className = 'chip';
-  label.append(input, `${kind.name}, m = ${short(kind.mass)}, r = ${short(kind.radius)}`);
+  label.append(input, `${kind.name}, ${kind.sizes}`);
   return label;
 }
 

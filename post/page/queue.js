@@ -17,7 +17,7 @@ function predict() {
 }
 
 const earlier = (a, b) => !a || b.after < a.after ? b : a;
-const radiusOf = i => kinds[speciesOf[i]].radius;
+const radiusOf = i => film.radii[sizeOf[i]];
 
 // Two disks fly past each other in a straight line, under gravity too: it moves both alike.
 function pairsOf(i) {
@@ -126,8 +126,8 @@ function drawNextEvent({ i, j, dx, dy, after }) {
   marks.strokeStyle = ink.accent;
   marks.lineWidth = 2 * page.dots;
   marks.setLineDash([5 * page.dots, 4 * page.dots]);
-  ring(x, y, radii[speciesOf[i]]);
-  if (j >= 0) ring(...ahead(j), radii[speciesOf[j]]);
+  ring(x, y, radii[sizeOf[i]]);
+  if (j >= 0) ring(...ahead(j), radii[sizeOf[j]]);
   marks.setLineDash([]);
   const [x1, y1] = j >= 0 ? [X[i] + dx, Y[i] + dy] : [x, y];
   copies([Math.min(X[i], x1), Math.max(X[i], x1)], [Math.min(Y[i], y1), Math.max(Y[i], y1)], (sx, sy) => {

@@ -4,7 +4,7 @@ const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
 let ink;                       // colours of the theme
 let picture, pixels, palette;  // the layer of the disks; its pixels as integers; the colours of disks
-let radii;                     // by species, in pixels
+let radii;                     // in pixels
 let groundShown, marked;       // what the ground shows; whether there are marks
 
 const dark = () => document.documentElement.dataset.theme === 'dark';
@@ -52,7 +52,7 @@ function roomOfStage() {
 
 function drawStage() {
   aim();
-  radii = kinds.map(kind => Math.max(0.6, kind.radius * view.unit));
+  radii = film.radii.map(radius => Math.max(0.6, radius * view.unit));
   if (stamps.size > 2 * kinds.length) stamps = new Map();  // the zoom has changed
   const seen = [view.unit, view.x, view.y].join();
   if (groundShown !== seen) drawGround();
@@ -137,14 +137,14 @@ function drawDisks() {
   const clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
   pixels.fill(0);
   for (let i = 0; i < disks; i++) {
-    const kind = speciesOf[i], r = radii[kind], colour = palette[code ? code[base + i] : kind], x = X[i], y = Y[i];
+    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], colour = palette[code ? code[base + i] : kind], x = X[i], y = Y[i];
     if (!wraps) {
-      drawDisk((x - x0) * unit, high - (y - y0) * unit, r, colour, stampOf[kind], clip);
+      drawDisk((x - x0) * unit, high - (y - y0) * unit, r, colour, stampOf[size], clip);
       continue;
     }
     const reach = r / unit, a1 = lastCopy(0, x - reach), b0 = firstCopy(1, y + reach), b1 = lastCopy(1, y - reach);
     for (let a = firstCopy(0, x + reach); a <= a1; a++)
-      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, stampOf[kind], clip);
+      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, stampOf[size], clip);
   }
   disksBrush.putImageData(picture, 0, 0);
 }
@@ -231,7 +231,7 @@ function drawTrace(i) {
   drawPath(flights(i, film.time[Math.max(0, moment.frame - 300)], recent), ink.soft, 0.9);
   drawPath(flights(i, recent, moment.time), ink.ink, 1.6);
   marks.lineWidth = 2 * page.dots;
-  ring(X[i], Y[i], Math.max(radii[speciesOf[i]], 3 * page.dots) + 2 * page.dots);
+  ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
 
 function ring(x, y, radius) {

@@ -4,17 +4,18 @@
     run = ricochet.run("input/gas.nml")
     run = ricochet.read_run("runs/gas.h5")
 
-`program` starts simulations, `reader` opens files, `bridges` hands them to other programs;
-`statistics`, `theory`, `hard_disks`, `thermodynamics` and `crater` measure and compare; `drawing`
-draws disks and walls, `film` moves them; `paths` knows where disks are between frames, `live` shows
-a run that goes on; `script` is what the command-line scripts share; `files` trusts neither what it
-reads nor where it writes.
+`program` starts simulations, `starting` writes what they start from, `reader` opens files,
+`bridges` hands them to other programs; `statistics`, `theory`, `hard_disks`, `thermodynamics` and
+`crater` measure and compare; `drawing` draws disks and walls, `film` moves them; `paths` knows
+where disks are between frames, `live` shows a run that goes on; `script` is what the command-line
+scripts share; `files` trusts neither what it reads nor where it writes.
 """
 
 from . import packages as packages  # first
 from .bridges import mdanalysis_universe
 from .program import ProgramError, run
 from .reader import Events, Obstacle, Run, RunError, Series, read_run
+from .starting import write_start
 
 __all__ = [
     "Events",
@@ -26,4 +27,5 @@ __all__ = [
     "mdanalysis_universe",
     "read_run",
     "run",
+    "write_start",
 ]

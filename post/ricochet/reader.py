@@ -56,17 +56,32 @@ class Obstacle(NamedTuple):
 
 
 class Species(NamedTuple):
-    """What the disks of one species have in common."""
+    """The disks of one species; those of a starting file may have masses and radii of their own."""
 
     name: str
-    mass: float
-    radius: float
+    masses: np.ndarray  # (n,)
+    radii: np.ndarray  # (n,)
     disks: np.ndarray  # (N,) mask
+
+    @property
+    def alike(self) -> bool:
+        """Whether all have one mass and one radius."""
+        return bool(np.ptp(self.masses) == 0 and np.ptp(self.radii) == 0)
+
+    @property
+    def mass(self) -> float:
+        """The mass of each, or their mean."""
+        return float(self.masses[0] if self.alike else self.masses.mean())
+
+    @property
+    def radius(self) -> float:
+        """The radius of each, or their mean."""
+        return float(self.radii[0] if self.alike else self.radii.mean())
 
     @property
     def label(self) -> str:
         """Name and mass, for a legend."""
-        return f"{self.name}, m = {self.mass:g}"
+        return f"{self.name}, m = {span(self.masses)}"
 
 
 @dataclass(frozen=True)
@@ -146,7 +161,7 @@ class Run:
         """The species in the order of the input file."""
         masks = [self.of_species(name) for name in self.names]
         return tuple(
-            Species(name, float(self.mass[mask][0]), float(self.radius[mask][0]), mask)
+            Species(name, self.mass[mask], self.radius[mask], mask)
             for name, mask in zip(self.names, masks, strict=True)
         )
 
@@ -323,6 +338,12 @@ def run_of(path: Path, file: h5py.File) -> Run:
     )
 
 
+def span(values: np.ndarray) -> str:
+    """The values in short: the only one, or the smallest and the largest."""
+    ends = (f"{values.min():g}", f"{values.max():g}")
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+
+
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
     """The names of the series in a group, and in the groups of the species in it."""
     for name in group:
@@ -337,7 +358,10 @@ def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
 def committed(file: h5py.File, group: str, extent: int) -> int:
     """How many of the `extent` samples of a group are valid (a `.part` is allocated ahead)."""
     counter = find(file, f"{group}/committed")
-    return extent if counter is None else max(0, min(extent, int(whole(counter))))
+    count = extent if counter is None else int(whole(counter))
+    if not 0 <= count <= extent:
+        raise Unsound(f"{group}/committed is {count}, but there are {extent} samples")
+    return count
 
 
 def rows(

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
-from .reader import Run, RunError
+from .reader import Run, RunError, Species
 from .statistics import FEWEST, SeriesMean, equilibration, series_mean
 
 SPEEDS_FORGET = 15.0  # collisions per disk after which any distribution of speeds is Maxwell's
@@ -97,6 +97,14 @@ def packing(run: Run) -> float:
 def equal_disks(run: Run) -> bool:
     """Whether the run is of one component, as most laws are."""
     return bool(np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0)
+
+
+def kinds_of_disks(run: Run) -> tuple[Species, ...]:
+    """The species, each of one mass and one radius, as laws by species are."""
+    for kind in run.by_species:
+        if not kind.alike:
+            raise RunError(f"{run.path}: the disks of '{kind.name}' are not of one mass and radius")
+    return run.by_species
 
 
 def lightest_and_heaviest(run: Run) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 !> Errors as values. An allocated `error_t` means failure; callers pass it up, and `main` reports it once.
 module errors
+  use texts, only: legible
   implicit none
   private
   public :: error_t, fail
@@ -19,7 +20,7 @@ module errors
 
 contains
 
-  !> Allocates `error` with a message and the exit status that goes with it.
+  !> Allocates `error` with a message, made one legible line whatever names it has, and the exit status that goes with it.
   pure subroutine fail(error, code, message)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in) :: code                !! one of the `exit_` constants
@@ -27,7 +28,7 @@ contains
 
     allocate (error)
     error%code = code
-    error%message = message
+    error%message = legible(message)
   end subroutine fail
 
 end module errors

@@ -1,6 +1,6 @@
 !> Everything that is wrong with an input, collected to be reported at once.
 module input_problems
-  use texts, only: text_t, written
+  use texts, only: legible, text_t, written
   implicit none
   private
   public :: problem_list_t
@@ -16,6 +16,7 @@ module input_problems
   !> The problems in the order of the report: by line, then those of the whole file, then the overrides.
   type :: problem_list_t
     integer :: count = 0
+    integer :: unreadable = 0                   !! those that are of a file that cannot be read
     logical :: cut_short = .false.              !! there were more than the list holds
     type(problem_t) :: items(capacity)
   contains
@@ -81,15 +82,15 @@ contains
       associate (problem => self%items(k))
         if (k > 1) text = text//new_line("a")
         if (problem%line > 0) then
-          text = text//path//":"//written(problem%line)//": "//problem%text
+          text = text//legible(path//":"//written(problem%line)//": "//problem%text)
         else if (problem%line == 0) then
-          text = text//path//": "//problem%text
+          text = text//legible(path//": "//problem%text)
         else
-          text = text//"--set "//overrides(-problem%line)%text//": "//problem%text
+          text = text//legible("--set "//overrides(-problem%line)%text//": "//problem%text)
         end if
       end associate
     end do
-    if (self%cut_short) text = text//new_line("a")//path//": more problems than these "//written(capacity)
+    if (self%cut_short) text = text//new_line("a")//legible(path)//": more problems than these "//written(capacity)
   end function report
 
 end module input_problems

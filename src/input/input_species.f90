@@ -44,9 +44,10 @@ contains
     do k = 1, size(groups)
       associate (group => groups(k), s => species(k))
         call group%put_text("count", written(s%count))
-        call group%put_reals("mass", [s%mass])
-        call group%put_reals("radius", [s%radius])
-        if (s%radius < sqrt(area(s%region))) call group%put_reals("packing_fraction", &
+        if (.not. s%mass_in_file) call group%put_reals("mass", [s%mass])
+        if (s%mass_in_file) call group%values(row_of("species", "mass"))%clear()
+        if (.not. s%radius_in_file) call group%put_reals("radius", [s%radius])
+        if (s%radius > 0 .and. s%radius < sqrt(area(s%region))) call group%put_reals("packing_fraction", &
           [s%count*pi*s%radius**2/area(s%region)])
         call group%put_reals("region", s%region)
       end associate
@@ -129,6 +130,9 @@ contains
     s%name = trim(group%instance)
     s%placement = group%text_of("placement")
     s%file = group%text_of("file")
+    s%radius_in_file = s%file /= "" .and. .not. (group%given("radius") .or. group%given("packing_fraction") &
+      .or. group%given("relative_to"))
+    s%mass_in_file = s%file /= "" .and. .not. (group%given("mass") .or. group%given("relative_to"))
     s%scale_positions = group%text_of("scale_positions") == ".true."
     s%region = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
     allocate (region, source=group%reals_of("region"))
@@ -212,6 +216,10 @@ contains
       mass(k) = groups(k)%real_of("mass", 1.0_real64)
       call own_radius(groups(k), species(k), radius(k), problems)
       if (groups(k)%given("relative_to") .and. base(k) == 0) radius(k) = 0
+      if (base(k) == 0) cycle
+      species(base(k))%is_base = .true.
+      if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the radii of """//species(base(k))%name &
+        //""" are those of its file; give mass and radius instead", problems)
     end do
     do k = 1, size(species)
       species(k)%mass = 1
@@ -266,7 +274,7 @@ contains
       end if
     else if (group%given("relative_to") .and. .not. group%given("radius")) then
       radius = 1
-    else if (.not. group%given("radius")) then
+    else if (.not. (group%given("radius") .or. s%radius_in_file)) then
       call group%complain("radius", "is missing; give radius, packing_fraction or relative_to", problems)
     end if
   end subroutine own_radius

@@ -95,9 +95,9 @@ module parameters
     parameter_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
     parameter_t("species", "count", "integer", 1, "example", "100", &
       "number of disks; may be left out with grid, position or file", count_of_disks), &
-    parameter_t("species", "mass", "real", 1, "default", "1", "mass of a disk", positive, "mass"), &
+    parameter_t("species", "mass", "real", 1, "default", "1", "mass of a disk; may be left to file", positive, "mass"), &
     parameter_t("species", "radius", "real", 1, "example", "0.01", &
-      "radius of a disk; give it or packing_fraction", positive, "length"), &
+      "radius of a disk; give it or packing_fraction, or leave it to file", positive, "length"), &
     parameter_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
       "area of the disks divided by the area of their region; fixes the radius", fraction), &
     parameter_t("species", "relative_to", "text", 1, "optional", "'bed'", &
@@ -110,7 +110,7 @@ module parameters
     parameter_t("species", "grid", "integer", 2, "optional", "10, 10", &
       "columns and rows of placement = 'grid'", count_of_disks, goes_with="placement grid"), &
     parameter_t("species", "file", "text", 1, "optional", "'runs/gas.h5'", &
-      "text file with lines x y [vx vy], or a run whose last frame is used", goes_with="placement file grown"), &
+      "text with lines x y [vx vy] or named columns, or a run whose last frame is used", goes_with="placement file grown"), &
     parameter_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
       "stretch the positions in the file of a run from its box to this one", goes_with="placement file grown"), &
     parameter_t("species", "position", "real", 0, "optional", "0.2, 0.5, 0.8, 0.5", &

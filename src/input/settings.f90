@@ -22,6 +22,10 @@ module settings
 
   !> A species, and how its disks start.
   type, extends(species_t) :: species_settings_t
+    real(real64) :: radius = 0.0_real64               !! of each disk, or the largest in the file [length]
+    logical :: mass_in_file = .false.                 !! the input leaves the masses to the file, which may have none
+    logical :: radius_in_file = .false.               !! the input leaves the radii to the file
+    logical :: is_base = .false.                      !! sizes of other species are multiples of its own
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
     character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
     integer :: grid(2)                                !! nx, ny; 0, 0 when not given

@@ -24,7 +24,7 @@ module checkpoint
   public :: write_checkpoint, read_checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
-  character(len=*), parameter :: title = "ricochet checkpoint 3"
+  character(len=*), parameter :: title = "ricochet checkpoint 4"
 
 contains
 
@@ -131,7 +131,7 @@ contains
     if (allocated(file%flaw)) flaw = file%flaw
     if (allocated(file%hdf5%failure)) flaw = "it cannot "//file%hdf5%failure
     if (flaw /= "") return
-    sim%disk%radius = sim%species(sim%tag%species)%radius
+    if (.not. sim%own_sizes) sim%disk%radius = settings%species(sim%tag%species)%radius
     call sim%choose_units()
     flaw = flaw_of_state(sim, settings)
     if (flaw == "") flaw = flaw_of_progress(progress, sim, settings%output%event_log)

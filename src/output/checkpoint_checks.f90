@@ -23,16 +23,17 @@ contains
     character(len=:), allocatable :: flaw
     real(real64) :: dt                            ! [time]
 
-    flaw = flaw_of_tags(sim)
+    flaw = flaw_of_tags(sim, settings)
     if (flaw == "") flaw = flaw_of_counts(sim)
     dt = merge(settings%run%dt, 0.0_real64, settings%run%dynamics == "steps")
     if (flaw == "" .and. dt > 0 .and. sim%time() > countable*dt) flaw = "now is more than 2**53 steps of time"
     if (flaw == "") flaw = flaw_of_motion(sim, dt)
   end function flaw_of_state
 
-  !> Each disk of the input must be there once, and be of its species.
-  pure function flaw_of_tags(sim) result(flaw)
+  !> Each disk of the input must be there once, be of its species, and not be larger than the largest of it.
+  pure function flaw_of_tags(sim, settings) result(flaw)
     type(simulation_t), intent(in) :: sim
+    type(settings_t), intent(in) :: settings
     character(len=:), allocatable :: flaw
     integer(int32), allocatable :: species(:)
     integer(int32) :: s, i, first
@@ -51,6 +52,9 @@ contains
         else if (species(tag%id) /= tag%species) then
           flaw = in_row("species", i)//" is "//written(tag%species)//", but disk "//written(tag%id) &
             //" is of species "//written(species(tag%id))
+        else if (sim%disk(i)%radius > settings%species(tag%species)%radius) then
+          flaw = in_row("radius", i)//" is "//written(sim%disk(i)%radius)//"; possible: up to " &
+            //written(settings%species(tag%species)%radius)
         end if
         if (flaw /= "") return
         species(tag%id) = 0
@@ -94,10 +98,10 @@ contains
     integer(int32) :: i
 
     sunk = 0.5_real64*abs(sim%box%gravity)*dt*sim%now
-    fall = sum(sim%species%count*sim%species%mass)*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
+    fall = sum([(sim%mass_of(i), i=1, sim%n_disks())])*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
     flaw = ""
     do i = 1, sim%n_disks()
-      associate (speed => sqrt(2*(sim%start_energy + fall)/sim%species(sim%tag(i)%species)%mass))
+      associate (speed => sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)))
         call check_place(sim, i, speed, dt*speed + sunk, flaw)
       end associate
       if (flaw /= "") return

@@ -2,7 +2,7 @@
 !> come. It is written to a file of its own, and into the output of a finished run.
 module checkpoint_contents
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
@@ -11,6 +11,7 @@ module checkpoint_contents
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, values_text
+  use parameters, only: largest, smallest
   use partners, only: n_sides, obstacle_code, side_name
   use progress, only: progress_t
   use sample_track, only: samples_t
@@ -34,6 +35,7 @@ module checkpoint_contents
   real(real64), parameter :: most = 1.0e300_real64          !! of sums: two of them do not overflow
   real(real64), parameter :: times(2) = [0.0_real64, longest], clocks(2) = [-longest, longest]
   real(real64), parameter :: sums(2) = [-most, most], not_negative(2) = [0.0_real64, most]
+  real(real64), parameter :: sizes(2) = [smallest, largest]
   real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
   real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
   integer(int64), parameter :: counts(2) = [0_int64, 2_int64**53]   !! exact also as reals
@@ -120,7 +122,8 @@ contains
       variable = legible(there(:index(there//eol, eol) - 1))
       if (here(:index(here//eol, eol) - 1) /= variable) then
         call fail(error, exit_usage, file%hdf5%path//": belongs to another input: there " &
-          //variable//", here "//here(:index(here//eol, eol) - 1))
+          //variable//", here "//here(:index(here//eol, eol) - 1)//"; --resume needs the input as it was there, --force " &
+          //"instead starts over")
         return
       end if
       there = there(min(index(there//eol, eol), len(there)) + 1:)
@@ -186,7 +189,9 @@ contains
   subroutine exchange_state(file, sim)
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
+    real(real64), allocatable :: masses(:)
     integer(int64) :: n
+    integer(int32) :: i
     integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
@@ -217,6 +222,13 @@ contains
     call file%exchange("disks/v1", sim%disk%v(1), speeds)
     call file%exchange("disks/v2", sim%disk%v(2), speeds)
     call file%exchange("disks/clock", sim%disk%clock, clocks)
+    if (sim%own_sizes) then
+      call file%exchange("disks/radius", sim%disk%radius, sizes)
+      allocate (masses(n), source=1.0_real64)
+      if (file%writing) masses(sim%tag%id) = [(sim%mass_of(i), i=1, sim%n_disks())]
+      call file%exchange("masses", masses, sizes)
+      if (.not. file%writing) call sim%take_masses(masses)
+    end if
     call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
     call file%exchange("disks/id", sim%tag%id, [1_int64, n])
     call file%exchange("disks/collisions", sim%tag%collisions, counts)

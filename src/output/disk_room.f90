@@ -71,7 +71,7 @@ contains
   pure function checkpoint_room(n) result(bytes)
     integer, intent(in) :: n
     integer(int64) :: bytes
-    integer(int64), parameter :: per_disk = 80, besides = 32768
+    integer(int64), parameter :: per_disk = 96, besides = 32768
 
     bytes = per_disk*n + besides
   end function checkpoint_room

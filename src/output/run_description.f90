@@ -89,15 +89,18 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
     integer(int32), allocatable :: numbers(:)
+    real(real64), allocatable :: sizes(:)
     integer(int32) :: i
 
-    allocate (numbers(sim%n_disks()))
+    allocate (numbers(sim%n_disks()), sizes(sim%n_disks()))
     numbers = [(i, i=1, sim%n_disks())]
     call file%put(disk_id, [size(numbers)], numbers)
     numbers(sim%tag%id) = sim%tag%species
     call file%put(disk_species, [size(numbers)], numbers)
-    call file%put(disk_mass, [size(numbers)], sim%species(numbers)%mass)
-    call file%put(disk_radius, [size(numbers)], sim%species(numbers)%radius)
+    sizes(sim%tag%id) = [(sim%mass_of(i), i=1, sim%n_disks())]
+    call file%put(disk_mass, [size(sizes)], sizes)
+    sizes(sim%tag%id) = sim%disk%radius
+    call file%put(disk_radius, [size(sizes)], sizes)
   end subroutine describe_disks
 
   !> The input as it was given, and every variable as it was used.

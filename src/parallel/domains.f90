@@ -64,6 +64,7 @@ contains
       self%sim%box = sim%box
       self%sim%law = sim%law
       self%sim%species = sim%species
+      if (allocated(sim%mass)) self%sim%mass = sim%mass
       self%sim%epoch_end = forever
       self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
       allocate (domain_grid_t :: self%engine%search)

@@ -32,12 +32,11 @@ module disks
     integer(int32) :: partner_stamp = 0         !! the partner's stamp when the event was predicted
   end type tag_t
 
-  !> Disks of one species share mass and radius.
+  !> Disks of one species share what the contact law says of them and, unless a file says otherwise, their mass.
   type :: species_t
     character(len=:), allocatable :: name
     integer :: count = 0
-    real(real64) :: mass = 1.0_real64           !! [mass]
-    real(real64) :: radius = 0.0_real64         !! [length]
+    real(real64) :: mass = 1.0_real64           !! of each disk, or the largest [mass]
   end type species_t
 
 end module disks

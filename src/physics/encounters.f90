@@ -43,7 +43,7 @@ contains
       call collide_wall(sim, i, code, t)
     end if
     if (.not. log%is_on()) return
-    associate (impulse => sim%species(sim%tag(first)%species)%mass*magnitude(sim%disk(first)%v - v))
+    associate (impulse => sim%mass_of(first)*magnitude(sim%disk(first)%v - v))
       if (code > 0) then
         call log%append(sim%epoch + t, min(sim%tag(i)%id, sim%tag(code)%id), &
           max(sim%tag(i)%id, sim%tag(code)%id), impulse)
@@ -82,11 +82,8 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
-    integer(int32) :: si, sj
 
-    si = sim%tag(i)%species
-    sj = sim%tag(j)%species
-    restitution = sim%law%restitution(si, sj)
+    restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
     if (sim%law%contact_time > 0) then
       if (in_contact(sim, i, t) .or. in_contact(sim, j, t)) restitution = 1
     end if
@@ -97,8 +94,8 @@ contains
     dv = sim%disk(j)%v - sim%disk(i)%v
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
-    mass_i = sim%species(si)%mass
-    mass_j = sim%species(sj)%mass
+    mass_i = sim%mass_of(i)
+    mass_j = sim%mass_of(j)
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
@@ -144,8 +141,8 @@ contains
       call land(q, sim%box%gravity, t)
       dx = q%x - p%x
       dx = dx - nearest_image(dx, sim%box%periods())
-      mass_i = sim%species(sim%tag(i)%species)%mass
-      mass_j = sim%species(sim%tag(j)%species)%mass
+      mass_i = sim%mass_of(i)
+      mass_j = sim%mass_of(j)
       step = epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j))
       do
         dv = q%v - p%v
@@ -198,7 +195,7 @@ contains
     normal = wall_normal(sim%box, code, sim%disk(i)%x)
     v = sim%disk(i)%v
     sim%disk(i)%v = wall_rebound(v, normal, restitution, sim%law%wall_rule)
-    mass = sim%species(sim%tag(i)%species)%mass
+    mass = sim%mass_of(i)
     call sim%dissipated%add(0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v)))
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))

@@ -154,7 +154,7 @@ contains
     do i = 1, sim%n_disks()
       x = sim%position(i)
       v = sim%velocity(i)
-      mass = sim%species(sim%tag(i)%species)%mass
+      mass = sim%mass_of(i)
       speed2 = dot_product(v, v)
       associate (own => sums(sim%tag(i)%species))
         own%n = own%n + 1

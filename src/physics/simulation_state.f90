@@ -17,6 +17,8 @@ module simulation_state
     type(box_t) :: box
     type(contact_law_t) :: law
     type(species_t), allocatable :: species(:)
+    real(real64), allocatable :: mass(:)          !! (n) by `tag%id`, if they are not those of the species [mass]
+    logical :: own_sizes = .false.                !! masses and radii are not those of the species: checkpoints have them
     ! Stored in a checkpoint
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
@@ -42,6 +44,8 @@ module simulation_state
   contains
     procedure :: time
     procedure :: n_disks
+    procedure :: mass_of
+    procedure :: take_masses
     procedure :: position
     procedure :: velocity
     procedure :: kinetic_energy
@@ -66,6 +70,34 @@ contains
 
     n = size(self%disk, kind=int32)
   end function n_disks
+
+  !> Mass of disk i.
+  pure function mass_of(self, i) result(mass)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    real(real64) :: mass                          !! [mass]
+
+    if (allocated(self%mass)) then
+      mass = self%mass(self%tag(i)%id)
+    else
+      mass = self%species(self%tag(i)%species)%mass
+    end if
+  end function mass_of
+
+  !> Keeps masses of all disks, as few as possible.
+  pure subroutine take_masses(self, mass)
+    class(simulation_t), intent(inout) :: self
+    real(real64), intent(in) :: mass(:)           !! (n) in the order of the input [mass]
+    integer :: s, first, last
+
+    last = 0
+    do s = 1, size(self%species)
+      first = last + 1
+      last = last + self%species(s)%count
+      if (maxval(mass(first:last)) > minval(mass(first:last))) self%mass = mass
+      self%species(s)%mass = maxval(mass(first:last))
+    end do
+  end subroutine take_masses
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
@@ -98,7 +130,7 @@ contains
     energy = 0
     do i = 1, self%n_disks()
       v = self%velocity(i)
-      energy = energy + 0.5_real64*self%species(self%tag(i)%species)%mass*dot_product(v, v)
+      energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
   end function kinetic_energy
 
@@ -122,7 +154,7 @@ contains
     impulse = sqrt(8*maxval(self%species%mass))*sqrt(energy)
     call self%dissipated%choose_unit(energy)
     call self%wall_impulse%choose_unit(impulse)
-    call self%virial%choose_unit(impulse*2*maxval(self%species%radius))
+    call self%virial%choose_unit(impulse*2*maxval(self%disk%radius))
   end subroutine choose_units
 
 end module simulation_state

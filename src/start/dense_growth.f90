@@ -19,12 +19,12 @@ module dense_growth
   use texts, only: written
   implicit none
   private
-  public :: grow_disks
+  public :: grow_disks, smallest_scale
 
   real(real64), parameter :: loose = 0.4_real64         !! packing at which the disks are scattered
   real(real64), parameter :: lead = 1.02_real64         !! of any disk over the smallest, at most
   real(real64), parameter :: caution = 0.9_real64       !! part of the gap to take
-  real(real64), parameter :: smallest = 1.0e-3_real64   !! scale to begin with
+  real(real64), parameter :: smallest_scale = 1.0e-3_real64       !! to begin with
   integer, parameter :: approaches = 6                  !! to this scale: each leaves a tenth of the gap
   integer, parameter :: run_length = 2                  !! collisions per disk between jumps
   integer, parameter :: mixing_length = 10              !! collisions per disk at full size
@@ -33,9 +33,10 @@ module dense_growth
 contains
 
   !> Places disks of several species, side by side, in a box.
-  subroutine grow_disks(box, species, stream, line, x, error)
+  subroutine grow_disks(box, species, full, stream, line, x, error)
     type(box_t), intent(in) :: box                      !! with its obstacles; gravity is not felt
-    type(species_t), intent(in) :: species(:)           !! counts and radii to reach
+    type(species_t), intent(in) :: species(:)
+    real(real64), intent(in) :: full(:)                 !! (n) radii to reach, one for a species if x is empty [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! shows how far it is
     real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) species by species; in: where to start, or none [length]
@@ -47,8 +48,8 @@ contains
     integer :: jump
 
     call describe(box, species, sim)
-    if (size(x, 2) == 0) call scatter(stream, line, sim, error)
-    if (size(x, 2) > 0) call begin_at(x, stream, sim, error)
+    if (size(x, 2) == 0) call scatter(full, stream, line, sim, error)
+    if (size(x, 2) > 0) call begin_at(x, full, stream, sim, error)
     if (allocated(error)) return
     allocate (evolution)
     allocate (cell_grid_t :: evolution%search)
@@ -57,18 +58,18 @@ contains
     do
       call move(evolution, sim, run_length, error)
       if (allocated(error)) return
-      lack = 1 - minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
+      lack = 1 - minval(sim%disk%radius/full(sim%tag%id))
       if (lack <= 0) exit
       call line%show_share("growing disks to their full size", 1 - lack)
       jump = jump + 1
       if (modulo(jump, jumps_per_check) == 0) then
         if (lack > 0.9_real64*lack_before) then
-          call fail_to_grow(sim, error)
+          call fail_to_grow(sim, full, error)
           return
         end if
         lack_before = lack
       end if
-      call grow(sim, min(1.0_real64, lead*(1 - lack)))
+      call grow(sim, full, min(1.0_real64, lead*(1 - lack)))
     end do
     call move(evolution, sim, mixing_length, error)
     if (size(x, 2) == 0) x = reshape(x, [2, size(sim%disk)], pad=[0.0_real64])
@@ -78,16 +79,17 @@ contains
   end subroutine grow_disks
 
   !> Reports the packing that was reached.
-  subroutine fail_to_grow(sim, error)
+  subroutine fail_to_grow(sim, full, error)
     type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: reached, wanted
     character(len=:), allocatable :: advice
 
     reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
-    wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
+    wanted = pi*sum(full**2)/product(sim%box%edges())
     advice = "use fewer or smaller disks"
-    if (size(sim%species) == 1) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
+    if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
     call fail(error, exit_usage, "species."//sim%species(1)%name//".placement: dense placement "// &
       "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; "//advice)
   end subroutine fail_to_grow
@@ -103,7 +105,6 @@ contains
     sim%box = box
     sim%box%gravity = 0
     sim%species = species
-    sim%species%mass = 1
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     allocate (sim%disk(n), sim%tag(n))
     allocate (sim%image(2, n), source=0_int64)
@@ -112,8 +113,9 @@ contains
   end subroutine describe
 
   !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
-  subroutine begin_at(x, stream, sim, error)
+  subroutine begin_at(x, full, stream, sim, error)
     real(real64), intent(in) :: x(:, :)                 !! (2,n) [length]
+    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
     type(random_stream_t), intent(inout) :: stream
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -124,17 +126,18 @@ contains
       sim%disk(k)%x = x(:, k)
       call stream%draw_direction(sim%disk(k)%v)
     end do
-    sim%disk%radius = smallest*sim%species(sim%tag%species)%radius
+    sim%disk%radius = smallest_scale*full
     do k = 1, approaches
-      call grow(sim, 1.0_real64)
+      call grow(sim, full, 1.0_real64)
     end do
-    scale = minval(sim%disk%radius/sim%species(sim%tag%species)%radius)
-    sim%disk%radius = scale*sim%species(sim%tag%species)%radius
-    if (scale <= smallest) call fail_to_grow(sim, error)
+    scale = minval(sim%disk%radius/full)
+    sim%disk%radius = scale*full
+    if (scale <= smallest_scale) call fail_to_grow(sim, full, error)
   end subroutine begin_at
 
   !> Small disks at random places, with random velocities.
-  subroutine scatter(stream, line, sim, error)
+  subroutine scatter(full, stream, line, sim, error)
+    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(inout) :: sim
@@ -144,47 +147,48 @@ contains
     integer :: k
     logical :: complete
 
-    wanted = pi*sum(sim%species%count*sim%species%radius**2)/product(sim%box%edges())
+    wanted = pi*sum(sim%species%count*full([(1 + sum(sim%species(:k - 1)%count), k=1, size(sim%species))])**2) &
+      /product(sim%box%edges())
     scale = sqrt(min(1.0_real64, loose/wanted))
     do
       packing = packing_t(sim%box, size(sim%disk), size(sim%species))
-      call fill(packing, sim%species, scale, stream, line, complete)
+      call fill(packing, sim%species, scale*full, stream, line, complete)
       if (complete) exit
       scale = caution*scale
-      if (scale < smallest) then
-        call fail_to_grow(sim, error)
+      if (scale < smallest_scale) then
+        call fail_to_grow(sim, full, error)
         return
       end if
     end do
     do k = 1, size(sim%disk)
       sim%disk(k)%x = packing%disk(k)%x
       call stream%draw_direction(sim%disk(k)%v)
-      sim%disk(k)%radius = scale*sim%species(sim%tag(k)%species)%radius
+      sim%disk(k)%radius = scale*full(k)
     end do
   end subroutine scatter
 
   !> Inserts all disks at random places, the largest first.
-  subroutine fill(packing, species, scale, stream, line, complete)
+  subroutine fill(packing, species, radius, stream, line, complete)
     type(packing_t), intent(inout) :: packing
     type(species_t), intent(in) :: species(:)
-    real(real64), intent(in) :: scale
+    real(real64), intent(in) :: radius(:)               !! (n) of each disk [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line
     logical, intent(out) :: complete
     logical :: waiting(size(species))
-    real(real64) :: radius, inset(2)
-    integer(int32) :: s, placed, first
+    real(real64) :: inset(2)
+    integer(int32) :: first(size(species)), s, placed
     integer :: k
 
     waiting = .true.
+    first = [(1 + sum(species(:k - 1)%count), k=1, size(species))]
     do k = 1, size(species)
-      s = maxloc(species%radius, dim=1, mask=waiting)
+      s = maxloc(radius(first), dim=1, mask=waiting)
       waiting(s) = .false.
-      radius = scale*species(s)%radius
-      inset = merge(0.0_real64, radius, packing%box%periodic)
-      first = 1 + sum(species(:s - 1)%count)
-      call packing%open_species(s, radius, species(s)%count, packing%box%lower + inset, packing%box%upper - inset)
-      call insert_at_random(packing, s, first, stream, line, placed)
+      inset = merge(0.0_real64, radius(first(s)), packing%box%periodic)
+      call packing%open_species(s, radius(first(s)), species(s)%count, packing%box%lower + inset, &
+        packing%box%upper - inset)
+      call insert_at_random(packing, s, first(s), stream, line, placed)
       complete = placed == species(s)%count
       if (.not. complete) return
     end do
@@ -215,52 +219,56 @@ contains
 
   !> Grows every disk into the gap around it, up to the scale `cap`. Neighbours share a gap so that both reach the same
   !> scale, unless one is larger already.
-  subroutine grow(sim, cap)
+  subroutine grow(sim, full, cap)
     type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
     real(real64), intent(in) :: cap                     !! part of the full size
     type(packing_t) :: packing
     real(real64), allocatable :: scale(:)
-    real(real64) :: room, full
+    real(real64) :: room
     integer(int32), allocatable :: list(:)
     integer(int32) :: i, n, s
 
     packing = packing_t(sim%box, size(sim%disk), size(sim%species))
     do s = 1, size(sim%species, kind=int32)
-      call packing%open_species(s, sim%species(s)%radius, sim%species(s)%count, sim%box%lower, sim%box%upper)
+      call packing%open_species(s, maxval(full(sim%tag%id), mask=sim%tag%species == s), sim%species(s)%count, &
+        sim%box%lower, sim%box%upper)
     end do
     do i = 1, sim%n_disks()
       call packing%add(i, sim%tag(i)%species, sim%disk(i)%x)
     end do
     allocate (list(64))
-    scale = sim%disk%radius/sim%species(sim%tag%species)%radius
+    scale = sim%disk%radius/full(sim%tag%id)
     do i = 1, sim%n_disks()
       if (scale(i) >= cap) cycle
-      full = sim%species(sim%tag(i)%species)%radius
-      call packing%list_neighbours(sim%disk(i)%x, full, list, n)
-      room = min(wall_distance(sim%box, sim%disk(i)%x)/full, room_between(packing, sim, scale, i, list(:n)))
-      if (room >= 1) then
-        sim%disk(i)%radius = cap*full
-      else if (room > scale(i)) then
-        sim%disk(i)%radius = full*min(cap, scale(i) + caution*(room - scale(i)))
-      end if
+      associate (own => full(sim%tag(i)%id))
+        call packing%list_neighbours(sim%disk(i)%x, own, list, n)
+        room = min(wall_distance(sim%box, sim%disk(i)%x)/own, room_between(packing, sim, full, scale, i, list(:n)))
+        if (room >= 1) then
+          sim%disk(i)%radius = cap*own
+        else if (room > scale(i)) then
+          sim%disk(i)%radius = own*min(cap, scale(i) + caution*(room - scale(i)))
+        end if
+      end associate
     end do
   end subroutine grow
 
   !> The scale that disk i can reach beside the disks listed.
-  pure function room_between(packing, sim, scale, i, list) result(room)
+  pure function room_between(packing, sim, full, scale, i, list) result(room)
     type(packing_t), intent(in) :: packing
     type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
     real(real64), intent(in) :: scale(:)
     integer(int32), intent(in) :: i, list(:)
     real(real64) :: room, distance, shared, full_i, full_j
     integer :: k
 
     room = 1
-    full_i = sim%species(sim%tag(i)%species)%radius
+    full_i = full(sim%tag(i)%id)
     do k = 1, size(list)
       associate (j => list(k))
         if (j == i) cycle
-        full_j = sim%species(sim%tag(j)%species)%radius
+        full_j = full(sim%tag(j)%id)
         distance = magnitude(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
         shared = distance/(full_i + full_j)
         if (scale(j) > shared) shared = (distance - scale(j)*full_j)/full_i

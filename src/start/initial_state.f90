@@ -28,7 +28,7 @@ contains
 
     call describe_system(settings, sim)
     call list_disks(sim)
-    call place_disks(settings%species, sim%box, settings%run%seed, line, sim%disk, error)
+    call place_disks(settings%species, settings%run%seed, line, sim, error)
     if (allocated(error)) return
     call set_in_motion(settings, sim, error)
     call sim%start_sums()
@@ -42,13 +42,14 @@ contains
 
     sim%box = settings%box
     sim%law = settings%law
+    sim%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file)
     allocate (sim%species(size(settings%species)))
     do s = 1, size(sim%species)
       sim%species(s) = settings%species(s)%species_t
     end do
   end subroutine describe_system
 
-  !> The disks with all that follows from their species, in the order of the input.
+  !> The disks by their species, in the order of the input; sizes of their own come with their places.
   subroutine list_disks(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: s, i, k
@@ -60,7 +61,6 @@ contains
     do s = 1, size(sim%species, kind=int32)
       do i = 1, sim%species(s)%count
         k = k + 1
-        sim%disk(k)%radius = sim%species(s)%radius
         sim%tag(k)%species = s
         sim%tag(k)%id = k
       end do
@@ -79,21 +79,31 @@ contains
     balanced = all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. .not. sim%box%falling()
     first = 1
     do s = 1, size(settings%species)
-      associate (species => settings%species(s))
+      associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
         call stream%seed(settings%run%seed, [s, purpose])
-        call draw_velocities(species, stream, balanced, sim%disk(first:first + species%count - 1))
-        first = first + species%count
+        call draw_velocities(species, masses(first, last), stream, balanced, sim%disk(first:last))
+        first = last + 1
       end associate
     end do
     if (balanced) call remove_drift(settings%species, sim)
     first = 1
     do s = 1, size(settings%species)
-      associate (species => settings%species(s))
+      associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
         if (species%exact_temperature >= 0 .and. .not. allocated(error)) &
-          call scale_to_temperature(species, sim%disk(first:first + species%count - 1), error)
-        first = first + species%count
+          call scale_to_temperature(species, masses(first, last), sim%disk(first:last), error)
+        first = last + 1
       end associate
     end do
+  contains
+
+    !> Masses of some disks.
+    pure function masses(first, last)
+      integer, intent(in) :: first, last
+      real(real64) :: masses(last - first + 1)
+      integer(int32) :: i
+
+      masses = [(sim%mass_of(i), i=int(first, int32), int(last, int32))]
+    end function masses
   end subroutine set_in_motion
 
   !> Warns of a disk that starts so low above the floor that it would hardly do anything but bounce; empty if there is none.

@@ -3,23 +3,21 @@
 module input_fit
   use kinds, only: pi, real64
   use box_geometry, only: box_t, obstacle_t
-  use errors, only: error_t
+  use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text
-  use last_frame, only: count_in_run, is_run
   use packing, only: packing_t
   use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
-  use position_file, only: count_positions
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
+  use starting_disks, only: read_disks, resolution
   use texts, only: written
   implicit none
   private
   public :: check_fit
 
   real(real64), parameter :: rounding = 1.0e-12_real64        !! relative, of touching disks
-  real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 
@@ -42,7 +40,7 @@ contains
       do k = 1, size(box%obstacle)
         call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
       end do
-      call count_disks(groups(s(1):s(2)), settings%species, problems)
+      call survey_files(groups(s(1):s(2)), settings%species, box, problems)
       species = settings%species
       alone = sum(species%count) == 1
       do k = 1, size(species)
@@ -56,30 +54,39 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Counts the disks of species that leave that to their file.
-  subroutine count_disks(groups, species, problems)
+  !> Takes from their files how many disks species have, and how large they are, where the input leaves that to the file.
+  subroutine survey_files(groups, species, box, problems)
     type(parameter_group_t), intent(inout) :: groups(:)       !! the species
     type(species_settings_t), intent(inout) :: species(:)
+    type(box_t), intent(in) :: box
     type(problem_list_t), intent(inout) :: problems
     type(error_t), allocatable :: error
+    real(real64), allocatable :: table(:, :)
+    integer, allocatable :: rows(:)
     integer :: k
 
     do k = 1, size(species)
-      associate (s => species(k))
-        if (s%count > 0 .or. s%file == "" .or. groups(k)%given("count") .or. groups(k)%given("packing_fraction")) cycle
-        if (is_run(s%file)) call count_in_run(s%file, s%name, s%count, error)
-        if (.not. is_run(s%file)) call count_positions(s%file, s%count, error)
+      associate (s => species(k), group => groups(k))
+        if (s%file == "" .or. group%faulty("file")) cycle
+        if (.not. (s%radius_in_file .or. (s%count == 0 .and. .not. (group%given("count") .or. &
+          group%given("packing_fraction"))))) cycle
+        call read_disks(species, k, box, table, rows, error)
         if (allocated(error)) then
-          call groups(k)%complain("file", error%message, problems)
-        else if (s%count == 0) then
-          call groups(k)%complain("file", s%file//" holds no disks", problems)
+          call group%complain("file", error%message, problems)
+          if (error%code == exit_files) problems%unreadable = problems%unreadable + 1
+          cycle
+        else if (size(rows) == 0) then
+          call group%complain("file", s%file//" holds no disks of species """//s%name//'"', problems)
+          cycle
         end if
-        call groups(k)%put_text("count", written(s%count))
-        if (all(s%region([1, 3]) < s%region([2, 4]))) call groups(k)%put_reals("packing_fraction", &
-          [s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))])
+        s%count = size(rows)
+        call group%put_text("count", written(s%count))
+        if (s%radius_in_file) s%radius = maxval(table(5, :))
+        if (all(s%region([1, 3]) < s%region([2, 4]))) call group%put_reals("packing_fraction", &
+          [pi*sum(table(5, :)**2)/product(s%region([2, 4]) - s%region([1, 3]))])
       end associate
     end do
-  end subroutine count_disks
+  end subroutine survey_files
 
   !> What an obstacle itself finds wrong with its place in the box.
   subroutine check_obstacle(group, obstacle, box, problems)
@@ -111,7 +118,7 @@ contains
       call check_axis(group, s, box, axis, merge(1, 2, alone), problems, sound)
       if (.not. sound) return
     end do
-    call check_fraction(group, s, problems)
+    if (.not. s%radius_in_file) call check_fraction(group, s, problems)
     do k = 1, size(box%obstacle)
       associate (shape => box%obstacle(k)%shape)
         if (shape%encloses .and. any(shape%extent() <= s%radius)) call group%complain("radius", "a disk of radius "// &
@@ -162,7 +169,7 @@ contains
     end subroutine complain
   end subroutine check_axis
 
-  !> No placement can exceed its densest packing.
+  !> No placement of equal disks can exceed its densest packing.
   subroutine check_fraction(group, s, problems)
     type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
@@ -195,7 +202,7 @@ contains
     packing = packing_t(box, sum(species%count), size(species))
     do s = 1, size(species)
       if (species(s)%count == 0) cycle
-      call add_known(packing, species, s, species(s)%position, misfits)
+      call add_known(packing, species, s, species(s)%position, spread(species(s)%radius, 1, species(s)%count), misfits)
       do k = 1, size(misfits)
         call groups(s)%complain("position", misfit_text(packing, species, species(s)%position, misfits(k)), problems)
       end do

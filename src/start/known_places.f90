@@ -31,37 +31,35 @@ contains
 
   !> Adds a species at known places. Disks that overlap others are added all the same and listed, as are
   !> those, not added, that are not wholly in their region.
-  pure subroutine add_known(packing, species, s, x, misfits)
+  pure subroutine add_known(packing, species, s, x, radius, misfits)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
-    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    real(real64), intent(in) :: x(:, :)                     !! (2,count) [length]
+    real(real64), intent(in) :: radius(:)                   !! (count) [length]
     type(misfit_t), allocatable, intent(out) :: misfits(:)
     real(real64) :: lower(2), upper(2), slack
     integer(int32) :: k, blocker
     logical :: outside
 
     allocate (misfits(0))
-    associate (radius => species(s)%radius)
-      slack = rounding*(radius + maxval(species%radius))
-      call centre_range(species(s)%region, packing%box, radius, lower, upper)
-      lower = lower - slack
-      upper = upper + slack
-      call packing%open_species(int(s, int32), radius, species(s)%count, &
-        min(max(minval(x(1:2, :), dim=2), lower), upper), max(min(maxval(x(1:2, :), dim=2), upper), lower))
-      do k = 1, species(s)%count
-        blocker = 0
-        outside = any(x(1:2, k) < lower .or. x(1:2, k) > upper)
-        if (.not. outside) then
-          call packing%find_blocker(x(1:2, k), [0.0_real64, 0.0_real64], radius - slack, blocker)
-          call packing%add(offset(species, s) + k, int(s, int32), x(1:2, k))
-        end if
-        if (.not. outside .and. blocker == 0) cycle
-        if (count((misfits%blocker > 0) .eqv. (blocker > 0)) == most_reports) cycle
-        misfits = [misfits, misfit_t(k, blocker)]
-        if (size(misfits) == 2*most_reports) return
-      end do
-    end associate
+    call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
+    call packing%open_species(int(s, int32), maxval(radius), size(radius), &
+      min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
+    do k = 1, species(s)%count
+      slack = rounding*(radius(k) + maxval(species%radius))
+      call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
+      blocker = 0
+      outside = any(x(:, k) < lower - slack .or. x(:, k) > upper + slack)
+      if (.not. outside) then
+        call packing%find_blocker(x(:, k), [0.0_real64, 0.0_real64], radius(k) - slack, blocker)
+        call packing%add(offset(species, s) + k, int(s, int32), x(:, k), radius(k))
+      end if
+      if (.not. outside .and. blocker == 0) cycle
+      if (count((misfits%blocker > 0) .eqv. (blocker > 0)) == most_reports) cycle
+      misfits = [misfits, misfit_t(k, blocker)]
+      if (size(misfits) == 2*most_reports) return
+    end do
   end subroutine add_known
 
   !> What is wrong with a disk.

@@ -3,14 +3,15 @@ module last_frame
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
-  use h5md_layout, only: box_group, disk_species, frame_counter, position, species_names, value_of, velocity
+  use h5md_layout, only: box_group, disk_mass, disk_radius, disk_species, frame_counter, position, species_names, &
+    value_of, velocity
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use parameters, only: largest, smallest
   use texts, only: counted, joined, written
   implicit none
   private
-  public :: count_in_run, is_run, read_last_frame
+  public :: is_run, read_last_frame
 
   integer, parameter :: name_length = 64
   integer(int64), parameter :: most_disks = 100000000       !! that a run can have written
@@ -24,23 +25,6 @@ contains
 
     yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
   end function is_run
-
-  !> Counts the disks of the species with this name.
-  subroutine count_in_run(path, name, count, error)
-    character(len=*), intent(in) :: path
-    character(len=*), intent(in) :: name                    !! of the species
-    integer, intent(out) :: count
-    type(error_t), allocatable, intent(out) :: error
-    type(hdf5_file_t) :: file
-    integer, allocatable :: chosen(:)
-    integer :: n
-
-    call file%open(path, .false.)
-    call choose(file, name, n, chosen, error)
-    call file%close()
-    if (.not. allocated(error)) call file%report(error)
-    count = size(chosen)
-  end subroutine count_in_run
 
   !> Finds the disks of a species in the open file of a run.
   subroutine choose(file, name, n, chosen, error)
@@ -60,6 +44,8 @@ contains
       n_disks = 0
     end if
     n = int(n_disks)
+    if (n == 0) call expect(file, disk_species, 1_int64)
+    if (file%length(species_names) < 1) call expect(file, species_names, 1_int64)
     call file%fetch_texts(species_names, name_length, names)
     allocate (species(n))
     call file%fetch(disk_species, n, species)
@@ -68,25 +54,29 @@ contains
     call fail(error, exit_usage, file%path//": has no species """//name//"""; its species: "//joined(names, ", "))
   end subroutine choose
 
-  !> Reads the `count` disks of the species with this name.
-  subroutine read_last_frame(path, name, count, table, chosen, error, box)
+  !> Reads the disks of the species with this name.
+  subroutine read_last_frame(path, name, table, there, chosen, error, box)
     character(len=*), intent(in) :: path
     character(len=*), intent(in) :: name                    !! of the species
-    integer, intent(in) :: count
-    real(real64), intent(out) :: table(:, :)                !! (columns,count) x, y, or x, y, vx, vy
-    integer, allocatable, intent(out) :: chosen(:)          !! (count) their rows in the frame
+    real(real64), allocatable, intent(out) :: table(:, :)   !! (x, y, vx, vy, radius, mass; n)
+    logical, intent(out) :: there(:)                        !! whether these are known
+    integer, allocatable, intent(out) :: chosen(:)          !! (n) rows of the disks in the frame
     type(error_t), allocatable, intent(out) :: error
     type(box_t), intent(in), optional :: box                !! to which the positions are stretched
     type(hdf5_file_t) :: file
     real(real64) :: lower(2), edges(2)
     integer :: n, k
 
-    table = 0
+    there = .true.
     call file%open(path, .false.)
     call choose(file, name, n, chosen, error)
-    if (size(chosen) == count .and. .not. allocated(error)) then
+    allocate (table(size(there), size(chosen)), source=0.0_real64)
+    if (size(chosen) > 0 .and. .not. allocated(error)) then
       call read_vectors(file, position//value_of, n, chosen, table(1:2, :))
-      if (size(table, 1) == 4) call read_vectors(file, velocity//value_of, n, chosen, table(3:4, :))
+      call read_vectors(file, velocity//value_of, n, chosen, table(3:4, :))
+      there(5:6) = [file%length(disk_radius), file%length(disk_mass)] >= 0
+      if (there(5)) call read_numbers(file, disk_radius, n, chosen, table(5, :))
+      if (there(6)) call read_numbers(file, disk_mass, n, chosen, table(6, :))
       if (present(box)) then
         lower = 0
         edges = 1
@@ -94,16 +84,44 @@ contains
         call file%fetch(box_group//"/edges", 2, edges)
         if (.not. all(abs(lower) <= largest .and. edges >= smallest .and. edges <= largest)) &
           call file%check(-1, "be read: "//box_group)
-        do k = 1, count
+        do k = 1, size(chosen)
           table(1:2, k) = box%lower + (table(1:2, k) - lower)*(box%edges()/edges)
         end do
       end if
     end if
     call file%close()
     if (.not. allocated(error)) call file%report(error)
-    if (size(chosen) /= count .and. .not. allocated(error)) call fail(error, exit_usage, path//": " &
-      //counted(size(chosen, kind=int64), "disk")//" of species """//name//""", but species.count is "//written(count))
   end subroutine read_last_frame
+
+  !> Reads a number of each chosen disk.
+  subroutine read_numbers(file, name, n, chosen, numbers)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: n                                !! disks in the file
+    integer, intent(in) :: chosen(:)
+    real(real64), intent(inout) :: numbers(:)               !! (chosen)
+    real(real64), allocatable :: all(:)
+
+    allocate (all(n), source=0.0_real64)
+    call expect(file, name, int(n, int64))
+    call file%fetch(name, n, all)
+    numbers = all(chosen)
+  end subroutine read_numbers
+
+  !> Says what is wrong with a dataset that has not n values.
+  subroutine expect(file, name, n)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    integer(int64), intent(in) :: n
+    integer(int64) :: there
+
+    there = file%length(name)
+    if (there < 0) then
+      call file%check(-1, "be read: "//name//" is missing")
+    else if (there /= n) then
+      call file%check(-1, "be read: "//name//" has "//counted(there, "value")//" instead of "//written(n))
+    end if
+  end subroutine expect
 
   !> Reads a vector of each chosen disk from the last frame.
   subroutine read_vectors(file, name, n, chosen, vectors)
@@ -113,12 +131,17 @@ contains
     integer, intent(in) :: chosen(:)
     real(real64), intent(inout) :: vectors(:, :)            !! (2,chosen)
     type(series_t) :: series
-    integer(int64) :: frames(1)
+    integer(int64) :: frames(1), there
     real(real64), allocatable :: frame(:, :)
 
     frames = 0
     allocate (frame(2, n))
+    call expect(file, frame_counter, 1_int64)
     call file%fetch(frame_counter, 1, frames)
+    if (file%length(name) < 0) call file%check(-1, "be read: "//name//" is missing")
+    there = file%length(name)/(2_int64*n)
+    if (frames(1) < 1 .or. frames(1) > there) call file%check(-1, "be read: "//frame_counter//" is "//written(frames(1)) &
+      //", but "//name//" has room for "//counted(there, "frame")//" of "//counted(int(n, int64), "disk"))
     series = series_t(name, rank=2, shape=[2, n])
     call series%open(file)
     call series%read(file, frames(1), frame)

@@ -1,5 +1,5 @@
-!> Disks being placed, and whether another one fits. Each species has its own grid of cells: its disks share one radius,
-!> so a search costs the same whatever the sizes of the others.
+!> Disks being placed, and whether another one fits. Each species has its own grid of cells: its disks have much the
+!> same radius, so a search costs the same whatever the sizes of the others.
 module packing
   use kinds, only: int32, real64
   use shapes, only: nearest_image
@@ -10,7 +10,7 @@ module packing
 
   !> The cells of one species.
   type :: layer_t
-    real(real64) :: radius = 0.0_real64             !! [length]
+    real(real64) :: radius = 0.0_real64             !! of the largest of its disks [length]
     integer(int32) :: count = 0                     !! number of disks to come
     real(real64) :: lower(2) = 0.0_real64           !! all its centres lie between these [length]
     real(real64) :: upper(2) = 0.0_real64
@@ -21,6 +21,7 @@ module packing
   !> A placed disk; one record, because disks close in space are far apart in memory.
   type :: placed_t
     real(real64) :: x(2) = 0.0_real64               !! centre [length]
+    real(real64) :: radius = 0.0_real64             !! [length]
     integer(int32) :: species = 0                   !! 0: not placed yet
     integer(int32) :: next = 0                      !! another disk in the same cell, 0: no more
   end type placed_t
@@ -58,7 +59,7 @@ contains
   pure subroutine open_species(self, s, radius, count, lower, upper)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: s
-    real(real64), intent(in) :: radius              !! [length]
+    real(real64), intent(in) :: radius              !! of the largest of its disks [length]
     integer, intent(in) :: count                    !! number of disks to come
     real(real64), intent(in) :: lower(2), upper(2)  !! corners that hold all their centres [length]
     real(real64) :: side, extent(2), few
@@ -81,14 +82,17 @@ contains
   end subroutine open_species
 
   !> Adds disk k of species s at the point p, without checking whether it fits.
-  pure subroutine add(self, k, s, p)
+  pure subroutine add(self, k, s, p, radius)
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k, s
     real(real64), intent(in) :: p(2)                !! [length]
+    real(real64), intent(in), optional :: radius    !! default: that of the largest [length]
     integer :: c(2)
 
     c = cell(self%layer(s), p)
     self%disk(k)%x = p
+    self%disk(k)%radius = self%layer(s)%radius
+    if (present(radius)) self%disk(k)%radius = radius
     self%disk(k)%species = s
     self%disk(k)%next = self%layer(s)%head(c(1), c(2))
     self%layer(s)%head(c(1), c(2)) = k
@@ -114,33 +118,35 @@ contains
       call range_images(self%box, centre, rho, first, last)
       do ky = first(2), last(2)
         do kx = first(1), last(1)
-          call search_layer(self, s, centre + [kx, ky]*self%box%edges(), half, rho, blocker)
+          call search_layer(self, s, centre + [kx, ky]*self%box%edges(), half, radius, blocker)
           if (blocker > 0) return
         end do
       end do
     end do
   end subroutine find_blocker
 
-  !> A disk of species s closer than rho to every point of the rectangle p +- half; 0: none. The
+  !> A disk of species s that keeps disks of this radius from every point of the rectangle p +- half; 0: none. The
   !> cell in the middle comes first: there it is most likely.
-  pure subroutine search_layer(packing, s, p, half, rho, blocker)
+  pure subroutine search_layer(packing, s, p, half, radius, blocker)
     type(packing_t), intent(in) :: packing
     integer, intent(in) :: s
-    real(real64), intent(in) :: p(2), half(2), rho
+    real(real64), intent(in) :: p(2), half(2), radius
     integer(int32), intent(out) :: blocker
+    real(real64) :: rho
     integer :: middle(2), low(2), high(2), i, j
 
     blocker = 0
+    rho = radius + packing%layer(s)%radius
     associate (layer => packing%layer(s))
       if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
       middle = cell(layer, p)
-      blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, rho)
+      blocker = blocker_in(packing, layer%head(middle(1), middle(2)), p, half, radius)
       if (blocker > 0) return
       low = cell(layer, p - rho)
       high = cell(layer, p + rho)
       do j = low(2), high(2)
         do i = low(1), high(1)
-          blocker = blocker_in(packing, layer%head(i, j), p, half, rho)
+          blocker = blocker_in(packing, layer%head(i, j), p, half, radius)
           if (blocker > 0) return
         end do
       end do
@@ -148,16 +154,16 @@ contains
   end subroutine search_layer
 
   !> The same among the disks of one cell.
-  pure function blocker_in(packing, head, p, half, rho) result(blocker)
+  pure function blocker_in(packing, head, p, half, radius) result(blocker)
     type(packing_t), intent(in) :: packing
     integer(int32), intent(in) :: head
-    real(real64), intent(in) :: p(2), half(2), rho
+    real(real64), intent(in) :: p(2), half(2), radius
     integer(int32) :: blocker
 
     blocker = head
     do while (blocker > 0)
       associate (d => packing%disk(blocker))
-        if ((abs(d%x(1) - p(1)) + half(1))**2 + (abs(d%x(2) - p(2)) + half(2))**2 < rho**2) return
+        if ((abs(d%x(1) - p(1)) + half(1))**2 + (abs(d%x(2) - p(2)) + half(2))**2 < (d%radius + radius)**2) return
         blocker = d%next
       end associate
     end do
@@ -229,7 +235,7 @@ contains
       end associate
     else
       corner = abs(self%separation(self%disk(by)%x, centre)) + half
-      yes = corner(1)**2 + corner(2)**2 < (self%layer(self%disk(by)%species)%radius + radius)**2
+      yes = corner(1)**2 + corner(2)**2 < (self%disk(by)%radius + radius)**2
     end if
   end function covers
 

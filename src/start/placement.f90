@@ -5,24 +5,21 @@
 !> with the same region grow together around the disks that are there already.
 module placement
   use kinds, only: int32, int64, pi, real64
-  use bounds, only: first_outside
   use box_geometry, only: box_t, obstacle_t
   use circles, only: new_circle
-  use dense_growth, only: grow_disks
-  use disks, only: disk_t, species_t
+  use dense_growth, only: grow_disks, smallest_scale
+  use disks, only: species_t
   use errors, only: error_t, exit_usage, fail
-  use h5md_layout, only: position, value_of, velocity
   use known_places, only: add_known, misfit_t, misfit_text, offset
-  use last_frame, only: is_run, read_last_frame
   use packing, only: packing_t
-  use parameters, only: largest
-  use position_file, only: read_positions
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
+  use simulation_state, only: simulation_t
+  use starting_disks, only: origin, read_disks
   use status_line, only: status_line_t
-  use texts, only: written
+  use texts, only: legible, written
   implicit none
   private
   public :: place_disks
@@ -35,23 +32,23 @@ module placement
 
 contains
 
-  !> Writes positions into the disks; with them come the velocities that a file holds.
-  subroutine place_disks(species, box, seed, line, disk, error)
+  !> Gives the disks their positions and sizes; with them come the velocities that a file holds.
+  subroutine place_disks(species, seed, line, sim, error)
     type(species_settings_t), intent(in) :: species(:)
-    type(box_t), intent(in) :: box
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line             !! shows how far it is
-    type(disk_t), intent(inout) :: disk(:)                  !! (n) in the order of the input
+    type(simulation_t), intent(inout) :: sim                !! with its box, and disks in the order of the input
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
+    real(real64), allocatable :: mass(:)
     logical, dimension(size(species)) :: random, dense, together
     integer :: s, k
 
-    packing = packing_t(box, size(disk), size(species))
+    packing = packing_t(sim%box, size(sim%disk), size(species))
     random = [(species(k)%placement == "random", k=1, size(species))]
     dense = [(species(k)%placement == "dense" .or. species(k)%placement == "grown", k=1, size(species))]
     do s = 1, size(species)
-      if (.not. (random(s) .or. dense(s))) call place_fixed(packing, species, s, disk, error)
+      if (.not. (random(s) .or. dense(s))) call place_fixed(packing, species, s, sim, error)
       if (allocated(error)) return
     end do
     do while (any(random))
@@ -64,26 +61,30 @@ contains
       if (.not. dense(s)) cycle
       together = dense .and. [(all(species(k)%region <= species(s)%region .and. &
         species(k)%region >= species(s)%region .and. species(k)%placement == species(s)%placement), k=1, size(species))]
-      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, line, disk, error)
+      call place_densely(packing, species, pack([(k, k=1, size(species))], together), seed, line, sim, error)
       if (allocated(error)) return
       dense = dense .and. .not. together
     end do
-    do k = 1, size(disk)
-      disk(k)%x = packing%disk(k)%x
+    do k = 1, size(sim%disk)
+      sim%disk(k)%x = packing%disk(k)%x
+      sim%disk(k)%radius = packing%disk(k)%radius
     end do
+    call move_alloc(sim%mass, mass)
+    if (allocated(mass)) call sim%take_masses(mass)
   end subroutine place_disks
 
   !> Places a species whose positions are given, directly or by a rule.
-  subroutine place_fixed(packing, species, s, disk, error)
+  subroutine place_fixed(packing, species, s, sim, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
-    type(disk_t), intent(inout) :: disk(:)
+    type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
-    real(real64), allocatable :: x(:, :)
+    real(real64), allocatable :: x(:, :), radius(:)
     integer, allocatable :: rows(:)
 
     allocate (rows(0))
+    allocate (radius(species(s)%count), source=species(s)%radius)
     select case (species(s)%placement)
     case ("explicit")
       x = species(s)%position
@@ -92,117 +93,57 @@ contains
     case ("lattice")
       call lattice_positions(species(s), packing%box, x, error)
     case default                                            ! 'file'
-      call read_disks(species(s), packing%box, x, rows, disk(offset(species, s) + 1:), error)
-      if (allocated(error)) return
+      call take_disks(species, s, sim, x, radius, rows, error)
     end select
-    if (.not. allocated(error)) call add_checked(packing, species, s, x, rows, error)
+    if (.not. allocated(error)) call add_checked(packing, species, s, x, radius, rows, error)
   end subroutine place_fixed
 
-  !> Reads the disks of a species from its file. Velocities go into the disks if they are wanted.
-  subroutine read_disks(species, box, x, rows, disk, error)
-    type(species_settings_t), intent(in) :: species
-    type(box_t), intent(in) :: box
-    real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count), or more rows [length]
+  !> Reads the disks of a species from its file. Masses, and velocities if they are wanted, go into the simulation.
+  subroutine take_disks(species, s, sim, x, radius, rows, error)
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    type(simulation_t), intent(inout) :: sim
+    real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
+    real(real64), allocatable, intent(out) :: radius(:)     !! (count) [length]
     integer, allocatable, intent(out) :: rows(:)            !! as in `origin`
-    type(disk_t), intent(inout) :: disk(:)                  !! (count), or more
     type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: table(:, :)
     integer :: k
 
-    associate (s => species)
-      allocate (x(merge(4, 2, s%velocities == "file"), s%count))
-      if (.not. is_run(s%file) .and. s%scale_positions) then
-        call fail(error, exit_usage, "species."//s%name//".scale_positions: "//s%file//" is not the file of a run " &
-          //"(.h5), which says how large its box was")
-      else if (.not. is_run(s%file)) then
-        call read_positions(s%file, s%count, x, rows, error)
-      else if (s%scale_positions) then
-        call read_last_frame(s%file, s%name, s%count, x, rows, error, box)
-      else
-        call read_last_frame(s%file, s%name, s%count, x, rows, error)
-      end if
-      if (.not. allocated(error)) call check_numbers(s, x, rows, error)
-      if (allocated(error)) return
-      do k = 1, merge(s%count, 0, size(x, 1) == 4)
-        disk(k)%v = x(3:4, k)
-      end do
-    end associate
-  end subroutine read_disks
-
-  !> Where the values of a disk come from, for messages: a line of a text file, a row of a dataset, or a rule.
-  pure function origin(species, rows, k, column) result(text)
-    type(species_settings_t), intent(in) :: species
-    integer, intent(in) :: rows(:)                          !! of the disks in the file; none: there is no file
-    integer, intent(in) :: k                                !! number of the disk in its species
-    integer, intent(in) :: column                           !! of x, y, vx, vy
-    character(len=:), allocatable :: text
-
-    if (size(rows) == 0) then
-      text = "species."//species%name//".placement"
-    else if (is_run(species%file)) then
-      text = position
-      if (column > 2) text = velocity
-      text = species%file//": "//text//value_of//": row "//written(rows(k))//" of the last frame"
-    else
-      text = species%file//":"//written(rows(k))
-    end if
-  end function origin
-
-  !> Refuses numbers that no text could have brought: NaN, infinite, or larger than the input may have.
-  subroutine check_numbers(species, x, rows, error)
-    type(species_settings_t), intent(in) :: species
-    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows
-    integer, intent(in) :: rows(:)                          !! as in `origin`
-    type(error_t), allocatable, intent(out) :: error
-    integer :: k, column
-
-    do k = 1, size(x, 2)
-      column = first_outside(x(:, k), [-largest, largest])
-      if (column == 0) cycle
-      call fail(error, exit_usage, origin(species, rows, k, column)//": "//written(x(column, k)) &
-        //" is out of range (sizes up to 1e100)")
-      return
+    call read_disks(species, s, sim%box, table, rows, error)
+    if (allocated(error)) return
+    x = table(1:2, :)
+    radius = table(5, :)
+    if (.not. allocated(sim%mass)) sim%mass = [(sim%mass_of(int(k, int32)), k=1, size(sim%disk))]
+    sim%mass(offset(species, s) + 1:offset(species, s) + size(rows)) = table(6, :)
+    do k = 1, size(rows)
+      if (species(s)%velocities == "file") sim%disk(offset(species, s) + k)%v = table(3:4, k)
     end do
-  end subroutine check_numbers
-
-  !> Refuses centres that are not in the region: disks that are to grow have no radius yet.
-  subroutine check_region(species, packing, x, rows, error)
-    type(species_settings_t), intent(in) :: species
-    type(packing_t), intent(in) :: packing
-    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
-    integer, intent(in) :: rows(:)                          !! as in `origin`
-    type(error_t), allocatable, intent(out) :: error
-    real(real64) :: lower(2), upper(2)
-    integer :: k
-
-    call centre_range(species%region, packing%box, 0.0_real64, lower, upper)
-    do k = 1, size(x, 2)
-      if (all(x(1:2, k) >= lower .and. x(1:2, k) <= upper)) cycle
-      call fail(error, exit_usage, origin(species, rows, k, 1)//": disk "//written(k)//" at "//written(x(1, k))//", " &
-        //written(x(2, k))//" is not in its region")
-      return
-    end do
-  end subroutine check_region
+  end subroutine take_disks
 
   !> Adds a species at known places, if they are free and in its region.
-  subroutine add_checked(packing, species, s, x, rows, error)
+  subroutine add_checked(packing, species, s, x, radius, rows, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
-    real(real64), intent(in) :: x(:, :)                     !! (2,count), or more rows [length]
+    real(real64), intent(in) :: x(:, :)                     !! (2,count) [length]
+    real(real64), intent(in) :: radius(:)                   !! (count) [length]
     integer, intent(in) :: rows(:)                          !! as in `origin`
     type(error_t), allocatable, intent(out) :: error
     type(misfit_t), allocatable :: misfits(:)
     character(len=:), allocatable :: text
     integer :: k
 
-    call add_known(packing, species, s, x, misfits)
+    call add_known(packing, species, s, x, radius, misfits)
     if (size(misfits) == 0) return
+    allocate (error)                                        ! not by `fail`: there is a line for each
     text = ""
     do k = 1, size(misfits)
       if (k > 1) text = text//new_line("a")
-      text = text//origin(species(s), rows, int(misfits(k)%disk), 1)//": "//misfit_text(packing, species, x, misfits(k))
+      text = text//legible(origin(species(s), rows, int(misfits(k)%disk), 1)//": "//misfit_text(packing, species, x, misfits(k)))
     end do
-    call fail(error, exit_usage, text)
+    error%message = text
+    error%code = exit_usage
   end subroutine add_checked
 
   !> Places a species by random sequential insertion.
@@ -238,39 +179,45 @@ contains
   end subroutine place_at_random
 
   !> Grows species that share a region, in a box of its shape; 'grown' ones from where a file has them.
-  subroutine place_densely(packing, species, group, seed, line, disk, error)
+  subroutine place_densely(packing, species, group, seed, line, sim, error)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: group(:)                         !! their numbers
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line
-    type(disk_t), intent(inout) :: disk(:)                  !! gets the velocities of a file
+    type(simulation_t), intent(inout) :: sim                !! gets masses and velocities of a file
     type(error_t), allocatable, intent(out) :: error
-    type(random_stream_t) :: stream
-    real(real64), allocatable :: x(:, :), from_file(:, :)
-    integer, allocatable :: rows(:)
+    type(packing_t) :: small                                ! the same with the disks as they begin to grow
     type(species_t) :: member(size(group))
+    type(random_stream_t) :: stream
+    real(real64), allocatable :: x(:, :), radius(:), its_x(:, :), its_radius(:)
+    integer, allocatable :: rows(:)
     integer :: k, first
 
-    allocate (x(2, 0))
+    allocate (x(2, 0), radius(0))
+    if (species(group(1))%placement == "grown") small = packing
     do k = 1, size(group)
-      member(k)%name = species(group(k))%name
-      member(k)%count = species(group(k))%count
-      member(k)%radius = species(group(k))%radius
-      if (species(group(k))%placement /= "grown") cycle
-      call read_disks(species(group(k)), packing%box, from_file, rows, disk(offset(species, group(k)) + 1:), error)
-      if (.not. allocated(error)) call check_region(species(group(k)), packing, from_file, rows, error)
-      if (allocated(error)) return
-      x = reshape([x, from_file(1:2, :)], [2, size(x, 2) + size(from_file, 2)])
+      associate (me => species(group(k)))
+        member(k) = me%species_t
+        if (me%placement == "grown") then
+          call take_disks(species, group(k), sim, its_x, its_radius, rows, error)
+          if (.not. allocated(error)) call add_checked(small, species, group(k), its_x, smallest_scale*its_radius, rows, error)
+          if (allocated(error)) return
+          x = reshape([x, its_x], [2, size(x, 2) + me%count])
+          radius = [radius, its_radius]
+        else
+          radius = [radius, spread(me%radius, 1, me%count)]
+        end if
+      end associate
     end do
     call stream%seed(seed, [group(1), purpose])
-    call grow_disks(growth_box(packing, species(group(1))%region), member, stream, line, x, error)
+    call grow_disks(growth_box(packing, species(group(1))%region), member, radius, stream, line, x, error)
     first = 1
     do k = 1, size(group)
       if (allocated(error)) return
-      associate (n => species(group(k))%count)
-        call add_checked(packing, species, group(k), x(:, first:first + n - 1), [integer ::], error)
-        first = first + n
+      associate (last => first + species(group(k))%count - 1)
+        call add_checked(packing, species, group(k), x(:, first:last), radius(first:last), [integer ::], error)
+        first = last + 1
       end associate
     end do
   end subroutine place_densely
@@ -292,7 +239,7 @@ contains
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
-        radius = packing%layer(packing%disk(k)%species)%radius
+        radius = packing%disk(k)%radius
         do j = -images(2), images(2)
           do i = -images(1), images(1)
             centre = packing%disk(k)%x + [i, j]*packing%box%edges()

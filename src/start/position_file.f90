@@ -1,59 +1,41 @@
-!> Disks from a text file: a line `x y` or `x y vx vy` for each. Empty lines, and text from a # to the end
-!> of its line, are comments.
+!> Disks from a text file: a line `x y` or `x y vx vy` for each. A first line of names says which columns there are if
+!> there are others. Empty lines, and text from a # to the end of its line, are comments.
 module position_file
   use kinds, only: int64, real64
   use errors, only: error_t, exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
   use input_values, only: read_real
   use system, only: opening_problem
-  use texts, only: counted, shown, written
+  use texts, only: counted, joined, place_of, shown, suggestion, written
   implicit none
   private
-  public :: count_positions, read_positions
+  public :: column_names, read_positions
 
+  !> What is known of a disk, in the order of the rows of a table.
+  character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "radius", "mass"]
+  character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
+  integer, parameter :: species_column = size(known_names)
   integer, parameter :: longest_line = 1024
+  character(len=*), parameter :: numpy_mark = char(147)//"NUMPY", zip_mark = "PK"//achar(3)//achar(4)
 
 contains
 
-  !> Counts the disks.
-  subroutine count_positions(path, count, error)
+  !> Reads the disks of one species: all if no column says of which species they are.
+  subroutine read_positions(path, names, s, table, there, lines, error)
     character(len=*), intent(in) :: path
-    integer, intent(out) :: count
-    type(error_t), allocatable, intent(out) :: error
-    real(real64) :: table(2, 0)
-    integer :: lines(0)
-
-    call read_lines(path, table, lines, count, error)
-  end subroutine count_positions
-
-  !> Reads exactly `count` disks.
-  subroutine read_positions(path, count, table, lines, error)
-    character(len=*), intent(in) :: path
-    integer, intent(in) :: count
-    real(real64), intent(out) :: table(:, :)                !! (columns,count) x, y, or x, y, vx, vy
-    integer, allocatable, intent(out) :: lines(:)           !! (count) in which the disks stand
-    type(error_t), allocatable, intent(out) :: error
-    integer :: n
-
-    table = 0
-    allocate (lines(count), source=0)
-    call read_lines(path, table, lines, n, error)
-    if (n /= count .and. .not. allocated(error)) &
-      call fail(error, exit_usage, path//": "//counted(int(n, int64), "disk")//", but species.count is "//written(count))
-  end subroutine read_positions
-
-  !> Reads the disks for which the table has room, and counts them all.
-  subroutine read_lines(path, table, lines, n, error)
-    character(len=*), intent(in) :: path
-    real(real64), intent(inout) :: table(:, :)
-    integer, intent(inout) :: lines(:)
-    integer, intent(out) :: n
+    character(len=*), intent(in) :: names(:)                !! of all species
+    integer, intent(in) :: s                                !! number of the species
+    real(real64), allocatable, intent(out) :: table(:, :)   !! (column_names,n)
+    logical, intent(out) :: there(:)                        !! (column_names) the columns of the file
+    integer, allocatable, intent(out) :: lines(:)           !! (n) in which the disks stand
     type(error_t), allocatable, intent(out) :: error
     character(len=longest_line) :: line
     character(len=256) :: reason
     character(len=:), allocatable :: problem
-    integer :: unit, status, number, before
+    integer, allocatable :: column(:)
+    integer :: unit, status, number, n
 
+    allocate (table(size(column_names), 64), lines(64), column(0))
     n = 0
     problem = opening_problem(path, writable=.false.)
     if (problem == "") then
@@ -69,59 +51,153 @@ contains
       read (unit, "(a)", iostat=status, iomsg=reason) line
       if (status /= 0) exit
       number = number + 1
-      before = n
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
-      if (len_trim(line) == longest_line) then
-        problem = "the line is too long"
-      else
-        call read_line(line, n, table, problem)
+      if (number == 1 .and. (index(line, numpy_mark) == 1 .or. index(line, zip_mark) == 1)) then
+        call fail(error, exit_usage, path//": arrays of NumPy; write_start of the Python package makes a starting file of them")
+        exit
       end if
-      if (n > before .and. n <= size(lines)) lines(n) = number
+      if (n == size(lines)) call enlarge(table, lines)
+      lines(n + 1) = number
+      call read_line(line, names, s, column, n, table, problem)
       if (problem == "") cycle
       call fail(error, exit_usage, path//":"//written(number)//": "//problem)
       exit
     end do
     close (unit)
+    there = [(any(column == number), number=1, size(there))]
+    table = table(:, :n)
+    lines = lines(:n)
     if (allocated(error)) return
     if (.not. is_iostat_end(status)) call fail(error, exit_files, path//": "//trim(reason))
-  end subroutine read_lines
+  end subroutine read_positions
 
-  !> Appends the disk of a line, if there is one, to the table. Columns that are not needed are also
-  !> checked.
-  subroutine read_line(line, n, table, problem)
+  !> Doubles the room for disks.
+  pure subroutine enlarge(table, lines)
+    real(real64), allocatable, intent(inout) :: table(:, :)
+    integer, allocatable, intent(inout) :: lines(:)
+    real(real64), allocatable :: more(:, :)
+    integer :: n
+
+    n = size(lines)
+    allocate (more(size(table, 1), 2*n))
+    more(:, :n) = table
+    call move_alloc(more, table)
+    lines = [lines, lines]
+  end subroutine enlarge
+
+  !> Takes in a line: the names of the columns, which the first numbers stand for if nobody has named them, or a disk,
+  !> which goes into the table if it is of the species.
+  subroutine read_line(line, names, s, column, n, table, problem)
     character(len=*), intent(in) :: line
-    integer, intent(inout) :: n                             !! disks so far, also those beyond the table
+    character(len=*), intent(in) :: names(:)
+    integer, intent(in) :: s
+    integer, allocatable, intent(inout) :: column(:)        !! of the file, as places in `known_names`; none: not known yet
+    integer, intent(inout) :: n                             !! disks so far
     real(real64), intent(inout) :: table(:, :)
     character(len=:), allocatable, intent(out) :: problem
-    character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
-    real(real64) :: value(4)
-    integer :: first, past, last, columns
+    real(real64) :: value(size(column_names))
+    integer :: first(size(known_names)), last(size(known_names)), n_words, k, its_species
 
-    last = index(line//"#", "#") - 1
-    columns = 0
-    first = 1
     problem = ""
-    value = 0
-    do
-      first = first - 1 + verify(line(first:last)//"x", blanks)
-      if (first > last) exit
-      past = first - 1 + scan(line(first:last)//" ", blanks)
-      columns = columns + 1
-      if (columns <= 4) call read_real(line(first:past - 1), value(columns), problem)
-      if (problem /= "") then
-        problem = shown(line(first:past - 1))//" "//problem
+    if (len_trim(line) == longest_line) problem = "the line is too long"
+    call find_words(line, first, last, n_words)
+    if (n_words == 0 .or. problem /= "") return
+    if (size(column) == 0) then
+      if (n_words <= size(known_names) .and. &
+        any([(place_of(line(first(k):last(k)), known_names), k=1, min(n_words, size(known_names)))] > 0)) then
+        call read_names(line, first(:n_words), last(:n_words), column, problem)
         return
       end if
-      first = past
-    end do
-    if (columns == 0) return
-    if (columns /= 2 .and. columns /= 4) then
-      problem = written(columns)//" numbers; allowed: x y, or x y vx vy"
-    else if (columns < size(table, 1)) then
-      problem = "there are no velocities; velocities = 'file' needs x y vx vy"
+      if (n_words == 2 .or. n_words == 4) column = [(k, k=1, n_words)]
     end if
+    if (n_words /= size(column)) then
+      problem = counted(int(n_words, int64), "number")//"; allowed: x y, or x y vx vy, or what a first line names: " &
+        //joined(known_names, " ")
+      if (size(column) > 0) problem = counted(int(n_words, int64), "value")//"; expected: " &
+        //joined(known_names(column), " ")
+      return
+    end if
+    value = 0
+    its_species = s
+    do k = 1, n_words
+      associate (word => line(first(k):last(k)))
+        if (column(k) == species_column) then
+          its_species = species_named(word, names)
+          if (its_species == 0) problem = "there is no species "//shown(word)//"; known: 1 to "//written(size(names)) &
+            //", "//joined(names, ", ")
+        else
+          call read_real(word, value(column(k)), problem)
+          if (problem /= "") problem = shown(word)//" "//problem
+        end if
+      end associate
+      if (problem /= "") return
+    end do
+    if (its_species /= s) return
     n = n + 1
-    if (n <= size(table, 2)) table(:, n) = value(:size(table, 1))
+    table(:, n) = value
   end subroutine read_line
+
+  !> Where the words of a line begin and end; of too many only the number is right.
+  pure subroutine find_words(line, first, last, n)
+    character(len=*), intent(in) :: line
+    integer, intent(out) :: first(:), last(:)
+    integer, intent(out) :: n
+    character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
+    integer :: begin, past, comment
+
+    comment = index(line//"#", "#")
+    n = 0
+    past = 1
+    do
+      begin = past - 1 + verify(line(past:comment - 1)//"x", blanks)
+      if (begin >= comment) exit
+      past = begin - 1 + scan(line(begin:comment - 1)//" ", blanks)
+      n = n + 1
+      if (n > size(first)) cycle
+      first(n) = begin
+      last(n) = past - 1
+    end do
+  end subroutine find_words
+
+  !> Reads the names of the columns.
+  subroutine read_names(line, first, last, column, problem)
+    character(len=*), intent(in) :: line
+    integer, intent(in) :: first(:), last(:)                !! of each name
+    integer, allocatable, intent(inout) :: column(:)
+    character(len=:), allocatable, intent(inout) :: problem
+    integer :: k, place
+
+    do k = 1, size(first)
+      place = place_of(line(first(k):last(k)), known_names)
+      if (place == 0) then
+        problem = "no column is called "//shown(line(first(k):last(k)))//"; "//suggestion(line(first(k):last(k)), known_names)
+      else if (any(column == place)) then
+        problem = "the column "//trim(known_names(place))//" is named twice"
+      end if
+      if (problem /= "") return
+      column = [column, place]
+    end do
+    if (.not. (any(column == 1) .and. any(column == 2))) then
+      problem = "columns x and y are needed"
+    else if (any(column == 3) .neqv. any(column == 4)) then
+      problem = "columns vx and vy go together"
+    end if
+  end subroutine read_names
+
+  !> The number of the species that a word says: its number or name; 0 if there is none.
+  pure function species_named(word, names) result(s)
+    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: names(:)
+    integer :: s
+    real(real64) :: number
+    character(len=:), allocatable :: problem
+
+    s = place_of(word, names)
+    if (s > 0) return
+    call read_real(word, number, problem)
+    if (problem == "" .and. number >= 1 .and. number <= size(names)) then
+      if (number <= aint(number)) s = int(number)
+    end if
+  end function species_named
 
 end module position_file

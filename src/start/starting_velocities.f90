@@ -1,6 +1,6 @@
 !> How disks start to move, by the rule of their species.
 module starting_velocities
-  use kinds, only: real64
+  use kinds, only: int32, real64
   use errors, only: error_t, exit_usage, fail
   use disks, only: disk_t
   use random_stream, only: random_stream_t
@@ -15,8 +15,9 @@ contains
   !> Gives the disks of one species their velocities. `balanced` asks for zero total momentum: equal
   !> speeds then come in opposite pairs (and one star of three if the number is odd), so that they
   !> stay equal; the other rules leave it to `remove_drift`.
-  pure subroutine draw_velocities(species, stream, balanced, disk)
+  pure subroutine draw_velocities(species, mass, stream, balanced, disk)
     type(species_settings_t), intent(in) :: species
+    real(real64), intent(in) :: mass(:)             !! (count) [mass]
     type(random_stream_t), intent(inout) :: stream
     logical, intent(in) :: balanced
     type(disk_t), intent(inout) :: disk(:)          !! (count)
@@ -37,7 +38,7 @@ contains
     case ("maxwell")
       do i = 1, size(disk)
         call stream%draw_normals(disk(i)%v)
-        disk(i)%v = sqrt(species%temperature/species%mass)*disk(i)%v
+        disk(i)%v = sqrt(species%temperature/mass(i))*disk(i)%v
       end do
     case ("explicit")
       do i = 1, size(disk)
@@ -80,7 +81,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     logical, dimension(size(species)) :: shifted, generated
     real(real64) :: momentum(2), mass
-    integer :: i
+    integer(int32) :: i
 
     shifted = [(species(i)%velocities == "uniform" .or. species(i)%velocities == "maxwell", i=1, size(species))]
     generated = [(shifted(i) .or. species(i)%velocities == "equal_speed", i=1, size(species))]
@@ -88,8 +89,8 @@ contains
     mass = 0
     do i = 1, size(sim%disk)
       associate (s => sim%tag(i)%species)
-        if (generated(s)) momentum = momentum + species(s)%mass*sim%disk(i)%v
-        if (shifted(s)) mass = mass + species(s)%mass
+        if (generated(s)) momentum = momentum + sim%mass_of(i)*sim%disk(i)%v
+        if (shifted(s)) mass = mass + sim%mass_of(i)
       end associate
     end do
     if (.not. mass > 0) return
@@ -99,17 +100,18 @@ contains
   end subroutine remove_drift
 
   !> Scales the velocities of the disks of one species, relative to their mean, to an exact temperature: the momentum stays.
-  subroutine scale_to_temperature(species, disk, error)
+  subroutine scale_to_temperature(species, mass, disk, error)
     type(species_settings_t), intent(in) :: species
+    real(real64), intent(in) :: mass(:)             !! (count) [mass]
     type(disk_t), intent(inout) :: disk(:)          !! (count)
     type(error_t), allocatable, intent(out) :: error
     real(real64) :: mean(2), temperature
     integer :: i, axis
 
-    mean = [(sum(disk%v(axis))/size(disk), axis=1, 2)]
+    mean = [(sum(mass*disk%v(axis))/sum(mass), axis=1, 2)]
     temperature = 0
     do i = 1, size(disk)
-      temperature = temperature + 0.5_real64*species%mass*sum((disk(i)%v - mean)**2)/size(disk)
+      temperature = temperature + 0.5_real64*mass(i)*sum((disk(i)%v - mean)**2)/size(disk)
     end do
     if (.not. temperature > 0) then
       call fail(error, exit_usage, "species."//species%name//".exact_temperature: the disks do not move relative to each " &

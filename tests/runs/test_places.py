@@ -139,6 +139,26 @@ def test_positions_come_from_files_only(ricochet, tmp_path, name, kind):
     assert one_line(run).startswith(f"{name}: cannot be read: ")
 
 
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["gas.nml", "-o", "a\nb.h5"], FINISHED),
+        (["gas.nml", "-o", "a\nb/"], FILES),
+        (["no\nfile"], FILES),
+        (["gas.nml", "--set", "run\n.seed=1"], USAGE),
+        (["gas.nml", "--set", "run.seed=\n1x"], USAGE),
+        (["gas.nml", "-o", "folder\n/b.h5"], FINISHED),
+    ],
+)
+def test_names_with_line_breaks_break_no_line(ricochet, tmp_path, options, code):
+    write_input(tmp_path, SHORT)
+    run = ricochet(*options)
+    assert run.returncode == code
+    lines = run.stderr.splitlines()
+    assert len(lines) <= 1 and all("?" in line for line in lines)
+    assert all(" = " in line for line in run.stdout.splitlines())
+
+
 def test_blanks_at_the_end_belong_to_a_name(ricochet, tmp_path):
     write_input(tmp_path, SHORT)
     (tmp_path / "doc ").write_text("chapter one")

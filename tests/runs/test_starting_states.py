@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from whole_runs import FINISHED, USAGE, one_line, write_input
+from whole_runs import FILES, FINISHED, USAGE, one_line, write_input
 
 PERIODIC = "&box boundary = 'periodic', 'periodic' upper = {size}, {size} /\n"
 GAS = (
@@ -69,13 +69,13 @@ def test_disks_in_a_text_need_no_count(ricochet, tmp_path, lines, count):
     write_input(tmp_path, text)
     run = ricochet("gas.nml", "-o", "gas.h5")
     assert run.returncode == FINISHED and f"disks = {count}\n" in run.stdout
-    for wrong, says in [
-        ("count=7", "but species.count is 7"),
-        ("file='nothing'", "nothing: cannot be read"),
-        ("scale_positions=.true.", "is not the file of a run"),
+    for wrong, says, code in [
+        ("count=7", "but species.count is 7", USAGE),
+        ("file='nothing'", "nothing: cannot be read", FILES),
+        ("scale_positions=.true.", "is not the file of a run", USAGE),
     ]:
         run = ricochet("gas.nml", "-o", "x.h5", "--set", f"species.species1.{wrong}")
-        assert run.returncode == USAGE and says in one_line(run)
+        assert run.returncode == code and says in one_line(run)
     (tmp_path / "disks").write_text("# none\n")
     run = ricochet("gas.nml", "-o", "x.h5")
     assert run.returncode == USAGE and "holds no disks" in one_line(run)
@@ -94,6 +94,7 @@ def test_disks_that_a_smaller_box_makes_overlap_are_named(onward):
     assert run.returncode == USAGE
     lines = run.stderr.splitlines()
     assert all("overlaps disk" in line and line.startswith("gas.h5: ") for line in lines)
+    assert all("of the last frame, stretched to this box: disk" in line for line in lines)
     run = onward(0.8, 0.01)  # not stretched
     assert run.returncode == USAGE and "is not wholly in its region" in run.stderr
 
@@ -128,6 +129,17 @@ def test_what_cannot_grow_is_told(onward):
     assert run.returncode == USAGE and "of the wanted packing 0.88" in one_line(run)
 
 
+def test_disks_at_one_place_that_are_to_grow_are_named(ricochet, tmp_path):
+    (tmp_path / "disks").write_text("0.2 0.2\n0.7 0.7\n0.3 0.5\n0.7 0.7")
+    text = (
+        "&species name = 'gas' radius = 0.05 file = 'disks' placement = 'grown' temperature = 1 /"
+    )
+    write_input(tmp_path, text + " &stop time = 1 /")
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == USAGE
+    assert one_line(run) == 'disks:4: disk 4 at 0.7, 0.7 overlaps disk 2 of "gas"'
+
+
 @pytest.mark.parametrize("place", [-0.1, 1.5, 1e9, 1e99])
 def test_a_disk_that_is_to_grow_outside_its_region_is_named(onward, tmp_path, place):
     assert onward(1, 0.02).returncode == FINISHED
@@ -136,7 +148,7 @@ def test_a_disk_that_is_to_grow_outside_its_region_is_named(onward, tmp_path, pl
     run = onward(1, 0.021, "placement = 'grown'")
     assert run.returncode == USAGE
     assert "gas.h5" in one_line(run) and "disk 4 at" in run.stderr
-    assert "is not in its region" in run.stderr
+    assert "is not wholly in its region" in run.stderr
 
 
 @pytest.mark.parametrize("box", ["wall", "periodic"])

@@ -52,7 +52,6 @@ contains
       sim%species(i)%name = "disk"
       sim%species(i)%count = 1
       sim%species(i)%mass = mass(i)
-      sim%species(i)%radius = radius(i)
     end do
   end function few_disks
 
@@ -66,7 +65,7 @@ contains
     integer, intent(in), optional :: scale     !! of the box; there are as many more disks as its square
     type(simulation_t) :: sim
     type(random_stream_t) :: stream
-    real(dp) :: spacing, radius
+    real(dp) :: spacing, radius(3)
     call stream%seed(seed, [1])
     sim%box%lower = [-1.0_dp, 0.5_dp]
     sim%box%upper = [2.0_dp, 2.5_dp]
@@ -75,14 +74,14 @@ contains
     if (has("gravity")) sim%box%gravity = merge([0.0_dp, -1.0_dp], [0.5_dp, -1.0_dp], has("channel"))
     call add_obstacles(sim, words)
     spacing = merge(1.0_dp, 0.2_dp, has("few"))
-    radius = 0.32_dp*spacing
-    if (has("dilute")) radius = 0.13_dp*spacing
-    if (has("dense")) radius = 0.46_dp*spacing
+    radius(1) = 0.32_dp*spacing
+    if (has("dilute")) radius(1) = 0.13_dp*spacing
+    if (has("dense")) radius(1) = 0.46_dp*spacing
     allocate (sim%species(3))
     sim%species(1)%name = "small"
     sim%species(2)%name = "other"
     sim%species(3)%name = "giant"
-    sim%species%radius = [radius, merge(0.5_dp, 1.0_dp, has("mixture"))*radius, 0.35_dp]
+    radius(2:) = [merge(0.5_dp, 1.0_dp, has("mixture"))*radius(1), 0.35_dp]
     sim%species%mass = [1.0_dp, merge(5.0_dp, 1.0_dp, has("mixture")), 30.0_dp]
     allocate (sim%law%restitution(3, 3))
     sim%law%restitution = 1
@@ -93,7 +92,7 @@ contains
     end if
     sim%law%wall_rule = merge(2, 1, has("smooth"))
     if (has("contact")) sim%law%contact_time = 0.01_dp
-    call fill_lattice(sim, spacing, count([has("giant"), has("giants")]), stream)
+    call fill_lattice(sim, spacing, radius, count([has("giant"), has("giants")]), stream)
     if (has("bed")) call lay_to_rest(sim%disk(2:))
     sim%start_energy = sim%kinetic_energy()
 
@@ -141,9 +140,10 @@ contains
 
   !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
   !> site, with velocity components uniform in (-1,1).
-  subroutine fill_lattice(sim, spacing, giants, stream)
+  subroutine fill_lattice(sim, spacing, radius, giants, stream)
     type(simulation_t), intent(inout) :: sim
     real(dp), intent(in) :: spacing
+    real(dp), intent(in) :: radius(:)              !! by species
     integer, intent(in) :: giants                  !! 0, 1 or 2
     type(random_stream_t), intent(inout) :: stream
     type(disk_t) :: disk
@@ -155,7 +155,7 @@ contains
     do k = 1, giants
       disk%x = merge([0.1_dp, 1.7_dp], [1.3_dp, 1.2_dp], k == 1)
       disk%v = [0.7_dp, -1.5_dp]
-      disk%radius = sim%species(3)%radius
+      disk%radius = radius(3)
       tag%id = k
       tag%species = 3
       sim%disk = [sim%disk, disk]
@@ -165,7 +165,7 @@ contains
     do iy = 1, n(2)
       do ix = 1, n(1)
         tag%species = 1 + modulo(ix + iy, 2)
-        disk%radius = sim%species(tag%species)%radius
+        disk%radius = radius(tag%species)
         room = 0.5_dp*spacing - disk%radius
         call draw_vector(stream, 0.7_dp*room, jitter)
         call draw_vector(stream, 1.0_dp, disk%v)
@@ -312,7 +312,7 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(dp) :: m
-    m = sim%species(sim%tag(i)%species)%mass
+    m = sim%mass_of(i)
   end function mass
 
   !> The smallest distance between rims now, of disks, sides and obstacles, in diameters of the disks

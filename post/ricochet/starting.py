@@ -1,0 +1,58 @@
+"""Starting files: disks from arrays, in the text that `species.file` reads."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .files import destination
+
+
+def write_start(
+    path: str | Path, position, velocity=None, radius=None, mass=None, species=None
+) -> Path:
+    """Write N disks for `file = 'PATH'` of a species; what is not given the input says.
+
+    `position` and `velocity` are (N, 2), the others (N,) or one value for all; `species` has names
+    or numbers, from 1, of the species of the input.  `write_start("bed.txt", **np.load("a.npz"))`
+    takes the arrays of these names in a file of NumPy.  Numbers keep all their digits.
+    """
+    position = table("position", position, width=2)
+    columns = {"x": position[:, 0], "y": position[:, 1]}
+    if velocity is not None:
+        velocity = table("velocity", velocity, len(position), 2)
+        columns |= {"vx": velocity[:, 0], "vy": velocity[:, 1]}
+    for name, values in {"radius": radius, "mass": mass}.items():
+        if values is not None:
+            columns[name] = table(name, values, len(position))
+            if not np.all(columns[name] > 0):
+                raise ValueError(f"{name}: not all numbers are above 0")
+    words = [[f"{value:.17g}" for value in values] for values in columns.values()]
+    if species is not None:
+        words.append([str(name) for name in sized("species", np.asarray(species), len(position))])
+    path = destination(Path(path))
+    with path.open("w", encoding="utf-8") as file:
+        file.write(" ".join([*columns, "species"][: len(words)]) + "\n")
+        file.writelines(" ".join(row) + "\n" for row in zip(*words, strict=True))
+    return path
+
+
+def table(name: str, values, count: int | None = None, width: int = 0) -> np.ndarray:
+    """Finite numbers: (count, width), or (count,)."""
+    values = np.asarray(values)
+    if values.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: not an array of numbers")
+    if width and (values.ndim != 2 or values.shape[1] != width):
+        raise ValueError(f"{name}: of shape {values.shape}, not (N, {width})")
+    values = sized(name, values, len(values) if count is None else count)
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name}: not all numbers are finite")
+    return values
+
+
+def sized(name: str, values: np.ndarray, count: int) -> np.ndarray:
+    """As many values as disks; one is repeated."""
+    if values.ndim == 0:
+        return np.full(count, values)
+    if len(values) != count or count == 0:
+        raise ValueError(f"{name}: of {len(values)} disks, not of {max(count, 1)}")
+    return values

@@ -1,0 +1,154 @@
+!> The disks of a species as its file has them, whatever its kind: checked number by number, and joined with what the input
+!> says.
+module starting_disks
+  use kinds, only: int64, real64
+  use bounds, only: first_outside
+  use box_geometry, only: box_t
+  use errors, only: error_t, exit_usage, fail
+  use h5md_layout, only: disk_mass, disk_radius, position, value_of, velocity
+  use last_frame, only: is_run, read_last_frame
+  use parameters, only: largest, smallest
+  use position_file, only: column_names, read_positions
+  use settings, only: species_settings_t
+  use texts, only: counted, written
+  implicit none
+  private
+  public :: origin, read_disks, resolution
+
+  real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
+  integer, parameter :: radius_row = 5, mass_row = 6          !! of `column_names`
+
+contains
+
+  !> Reads the disks of species s. Radii and masses are those of the input where it has them.
+  subroutine read_disks(species, s, box, table, rows, error)
+    type(species_settings_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    type(box_t), intent(in) :: box
+    real(real64), allocatable, intent(out) :: table(:, :)     !! (column_names,n)
+    integer, allocatable, intent(out) :: rows(:)              !! as in `origin`
+    type(error_t), allocatable, intent(out) :: error
+    character(len=40) :: names(size(species))
+    character(len=:), allocatable :: of_species
+    logical :: there(size(column_names))
+    integer :: k
+
+    associate (me => species(s))
+      do k = 1, size(species)
+        names(k) = species(k)%name
+      end do
+      if (.not. is_run(me%file) .and. me%scale_positions) then
+        call fail(error, exit_usage, me%file//": is not the file of a run (.h5), which scale_positions needs: it says " &
+          //"how large the box was")
+      else if (.not. is_run(me%file)) then
+        call read_positions(me%file, names, s, table, there, rows, error)
+      else if (me%scale_positions) then
+        call read_last_frame(me%file, me%name, table, there, rows, error, box)
+      else
+        call read_last_frame(me%file, me%name, table, there, rows, error)
+      end if
+      if (allocated(error)) return
+      of_species = ""
+      if (is_run(me%file)) of_species = " of species """//me%name//'"'
+      if (me%count > 0 .and. size(rows) /= me%count) call fail(error, exit_usage, me%file//": " &
+        //counted(size(rows, kind=int64), "disk")//of_species//", but species.count is "//written(me%count))
+      if (.not. allocated(error)) call join(me, there, rows, table, error)
+      if (.not. allocated(error)) call check_numbers(me, box, table, rows, error)
+    end associate
+  end subroutine read_disks
+
+  !> Takes from the input what it has, and refuses what both have, or none; of a run the input may say otherwise.
+  pure subroutine join(species, there, rows, table, error)
+    type(species_settings_t), intent(in) :: species
+    logical, intent(in) :: there(:)                           !! (column_names) in the file
+    integer, intent(in) :: rows(:)                            !! (n) as in `origin`
+    real(real64), intent(inout) :: table(:, :)                !! (column_names,n)
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: in_file(radius_row:mass_row)
+    character(len=:), allocatable :: name
+    integer :: row
+
+    if (size(rows) == 0) return
+    if (species%velocities == "file" .and. .not. there(3)) call fail(error, exit_usage, origin(species, rows, 1, 3) &
+      //": there are no velocities; velocities = 'file' needs x y vx vy")
+    in_file = [species%radius_in_file, species%mass_in_file]
+    do row = radius_row, mass_row
+      if (there(row) .and. .not. in_file(row) .and. .not. is_run(species%file)) then
+        name = trim(column_names(row))
+        call fail(error, exit_usage, species%file//": has a column "//name//", but species."//species%name//"."//name &
+          //" is given, too; give only one of them")
+      end if
+      if (there(row) .and. in_file(row)) cycle
+      if (in_file(row) .and. row == radius_row) call fail(error, exit_usage, species%file &
+        //": has no radius; give species."//species%name//".radius, or a column radius in the file")
+      table(row, :) = merge(species%radius, species%mass, row == radius_row)
+    end do
+    if (species%is_base .and. .not. species%radius_in_file .and. any(abs(table(mass_row, :) - species%mass) > 0)) &
+      call fail(error, exit_usage, species%file//": has masses other than 1; as other species are relative to """ &
+      //species%name//""", give its mass")
+  end subroutine join
+
+  !> Refuses numbers that the input could not have either.
+  subroutine check_numbers(species, box, table, rows, error)
+    type(species_settings_t), intent(in) :: species
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: table(:, :)                   !! (column_names,n)
+    integer, intent(in) :: rows(:)                            !! as in `origin`
+    type(error_t), allocatable, intent(inout) :: error
+    real(real64) :: farthest                                  !! coordinate [length]
+    integer :: k, row
+
+    farthest = maxval(abs([box%lower, box%upper]))
+    do k = 1, size(table, 2)
+      row = first_outside(table(:radius_row - 1, k), [-largest, largest])
+      if (row > 0) call object("is out of range (sizes up to 1e100)")
+      row = first_outside(table(radius_row:, k), [smallest, largest])
+      if (row > 0) row = row + radius_row - 1
+      if (row > 0) call object("is not a "//trim(column_names(max(row, 1)))//"; allowed: a number > 0")
+      if (.not. allocated(error)) then
+        row = radius_row
+        if (table(row, k) < resolution*farthest) call object("is too small a radius to be resolved at coordinates of " &
+          //written(farthest))
+      end if
+      if (allocated(error)) return
+    end do
+  contains
+
+    !> Reports a number.
+    subroutine object(what)
+      character(len=*), intent(in) :: what
+
+      if (.not. allocated(error)) call fail(error, exit_usage, origin(species, rows, k, row)//": "//written(table(row, k)) &
+        //" "//what)
+    end subroutine object
+  end subroutine check_numbers
+
+  !> Where the values of a disk come from, for messages: a line of a text file, a row of a dataset, or a rule.
+  pure function origin(species, rows, k, column) result(text)
+    type(species_settings_t), intent(in) :: species
+    integer, intent(in) :: rows(:)                            !! of the disks in the file; none: there is no file
+    integer, intent(in) :: k                                  !! number of the disk in its species
+    integer, intent(in) :: column                             !! of `column_names`
+    character(len=:), allocatable :: text
+
+    if (size(rows) == 0) then
+      text = "species."//species%name//".placement"
+    else if (is_run(species%file)) then
+      select case (column)
+      case (1:2)
+        text = position//value_of
+      case (3:4)
+        text = velocity//value_of
+      case default
+        text = disk_mass
+        if (column == radius_row) text = disk_radius
+      end select
+      text = species%file//": "//text//": row "//written(rows(k))
+      if (column < radius_row) text = text//" of the last frame"
+      if (column < 3 .and. species%scale_positions) text = text//", stretched to this box"
+    else
+      text = species%file//":"//written(rows(k))
+    end if
+  end function origin
+
+end module starting_disks

@@ -1,0 +1,302 @@
+"""Disks with radii and masses of their own, from the columns of a starting file."""
+
+import base64
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from ricochet import read_run, write_start
+from synthetic_run import run_script
+from whole_runs import FILES, FINISHED, STOPPED, USAGE, differences, one_line, write_input
+
+COUNT = 120
+INPUT = """&box boundary = 'periodic', 'wall' upper = 2, 1 /
+&species name = 'bed' file = 'bed.txt' /
+&species name = 'stone' file = 'bed.txt' /
+&stop collisions_per_disk = 40 /
+&output observables_every_collisions = 100 frames_every_collisions = 400 event_log = .true. /
+"""
+
+
+@pytest.fixture
+def bed(tmp_path):
+    """The arrays of a bed in the file bed.txt: no two disks are alike, one in ten is a stone."""
+    rng = np.random.default_rng(5)
+    site = np.stack(np.divmod(np.arange(COUNT), 8), axis=1)
+    arrays = {
+        "position": (site + 0.5) * [2 / 15, 1 / 8],
+        "velocity": rng.normal(size=(COUNT, 2)),
+        "radius": rng.uniform(0.01, 0.06, COUNT),
+        "mass": rng.uniform(0.1, 9, COUNT),
+        "species": np.where(np.arange(COUNT) % 10 == 3, "stone", "bed"),
+    }
+    write_start(tmp_path / "bed.txt", **arrays)
+    write_input(tmp_path, INPUT)
+    return arrays
+
+
+def by_species(arrays):
+    """The arrays in the order of the run: species by species."""
+    order = np.argsort(arrays["species"] != "bed", kind="stable")
+    return {name: values[order] for name, values in arrays.items()}
+
+
+def finished(ricochet, path, *options):
+    run = ricochet("gas.nml", "-o", path, "--quiet", *options)
+    assert run.returncode == FINISHED, run.stderr
+    return run
+
+
+def test_every_column_arrives_to_the_last_digit(ricochet, tmp_path, bed):
+    finished(ricochet, "gas.h5")
+    run, there = read_run(tmp_path / "gas.h5"), by_species(bed)
+    for name in ("radius", "mass"):
+        assert (getattr(run, name) == there[name]).all()
+    assert (run.position[0] == there["position"]).all()
+    assert (run.velocity[0] == there["velocity"]).all()
+    assert [kind.disks.sum() for kind in run.by_species] == [108, 12]
+    own = run.parameters["species"]["bed"]
+    assert own["count"] == 108 and "mass" not in own and "radius" not in own
+    area = np.pi * np.sum(there["radius"][:108] ** 2)
+    assert own["packing_fraction"] == pytest.approx(area / 2)
+
+
+def test_each_collision_has_the_masses_and_radii_of_its_disks(ricochet, tmp_path, bed):
+    """Energy and momentum are kept disk by disk, and nothing overlaps."""
+    finished(ricochet, "gas.h5", "--set", "box.boundary=periodic,periodic")
+    run = read_run(tmp_path / "gas.h5")
+    energy = run.kinetic_energy(slice(None)).sum(axis=1)
+    assert np.ptp(energy) < 1e-12 * energy[0]
+    assert np.allclose(run.observable("total_energy").value, energy[0], rtol=1e-12)
+    for frame in (0, -1):
+        momentum = run.mass @ run.velocity[frame]
+        assert np.allclose(momentum, run.observable("momentum").value[frame], atol=1e-11)
+    apart = run.position[-1][:, None] - run.position[-1]
+    apart -= np.round(apart / run.edges) * run.edges
+    gap = np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(COUNT)
+    assert -1e-13 < gap.min() < 1e-3
+    # v' = v - J/m n: the change of the velocity of either disk gives the same impulse
+    assert run.events.impulse.min() > 0
+
+
+@pytest.mark.parametrize(
+    "method", ["search=pairs", "queue=heap", "threads=2", "dynamics=steps run.dt=1e-6"]
+)
+def test_other_methods_see_the_same_disks(ricochet, tmp_path, bed, method):
+    stop = ["--set", "stop.time=0.02"]
+    options = [word for part in method.split() for word in ("--set", part)]
+    options[1] = "run." + options[1]
+    finished(ricochet, "one.h5", *stop)
+    finished(ricochet, "other.h5", *stop, *options)
+    one, other = (read_run(tmp_path / f"{name}.h5") for name in ("one", "other"))
+    exact = "steps" not in method
+    assert len(one.events.time) == len(other.events.time) > 10
+    close = {} if exact else {"atol": 1e-3}
+    same = np.allclose if close else np.array_equal
+    assert same(one.velocity[-1], other.velocity[-1], **close)
+
+
+def test_a_stopped_or_finished_run_goes_on_with_its_disks(ricochet, tmp_path, bed):
+    finished(ricochet, "whole.h5")
+    part = ricochet("gas.nml", "-o", "part.h5", "--quiet", "--set", "stop.wall_clock=1e-9")
+    assert part.returncode == STOPPED
+    finished(ricochet, "part.h5", "--resume")
+    assert not [name for name in differences(tmp_path / "whole.h5", tmp_path / "part.h5")
+                if "wall_clock" not in name and "overrides" not in name]  # fmt: skip
+    finished(ricochet, "short.h5", "--set", "stop.collisions_per_disk=20")
+    finished(ricochet, "short.h5", "--resume")
+    one, other = (read_run(tmp_path / f"{name}.h5") for name in ("whole", "short"))
+    assert (one.position[-1] == other.position[-1]).all()
+
+
+def test_a_run_from_the_last_frame_of_another_has_its_disks(ricochet, tmp_path, bed):
+    finished(ricochet, "gas.h5")
+    write_input(tmp_path, INPUT.replace("bed.txt", "gas.h5"), "gas.nml")
+    finished(ricochet, "next.h5")
+    one, other = read_run(tmp_path / "gas.h5"), read_run(tmp_path / "next.h5")
+    assert (one.position[-1] == other.position[0]).all()
+    assert (one.radius == other.radius).all() and (one.mass == other.mass).all()
+    finished(
+        ricochet, "equal.h5", "--set", "species.bed.radius=0.01", "--set", "species.bed.mass=2"
+    )
+    equal = read_run(tmp_path / "equal.h5")  # what the input says counts
+    assert set(equal.radius[:108]) == {0.01} and set(equal.mass[:108]) == {2}
+    assert (equal.radius[108:] == one.radius[108:]).all()
+
+
+def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):
+    bed["radius"] *= 1.25
+    write_start(tmp_path / "bed.txt", **bed)
+    run = ricochet("gas.nml", "-o", "x.h5")
+    assert run.returncode == USAGE and "overlaps disk" in run.stderr
+    grown = [f"species.{name}.placement=grown" for name in ("bed", "stone")]
+    finished(ricochet, "gas.h5", "--set", grown[0], "--set", grown[1])
+    run = read_run(tmp_path / "gas.h5")
+    assert (run.radius == by_species(bed)["radius"]).all()
+    apart = run.position[0][:, None] - run.position[0]
+    apart[..., 0] -= np.round(apart[..., 0] / 2) * 2
+    assert (np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(COUNT)).min() > -1e-13
+
+
+def test_maxwell_velocities_belong_to_the_mass_of_each_disk(ricochet, tmp_path):
+    """The light and the heavy half have one kT, and it is exact where it is wanted."""
+    x, y = np.divmod(np.arange(10000), 100)
+    mass = np.where(x < 50, 1, 100)
+    write_start(tmp_path / "bed.txt", np.stack([x, y], axis=1) + 0.5, radius=0.3, mass=mass)
+    text = "&box upper = 100, 100 / &species file = 'bed.txt' temperature = 2 {} / &stop time = 0 /"
+    for more, accuracy in [("", 0.1), ("exact_temperature = 2", 1e-12)]:
+        write_input(tmp_path, text.format(more))
+        finished(ricochet, "gas.h5", "--force")
+        run = read_run(tmp_path / "gas.h5")
+        energy = run.kinetic_energy(0)
+        assert abs(energy[mass == 1].mean() - 2) < 0.1 and abs(energy[mass == 100].mean() - 2) < 0.1
+        assert abs(run.observable("all/temperature").value[0] - 2) < accuracy
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ("x y radius\n.1 .1 0", "bed.txt:2: 0 is not a radius; allowed: a number > 0"),
+        ("x y radius\n.1 .1 -.2", "bed.txt:2: -0.2 is not a radius"),
+        ("x y radius mass\n.1 .1 .01 0", "bed.txt:2: 0 is not a mass"),
+        ("x y radius\n.1 .1 nan", 'bed.txt:2: "nan" is not a number'),
+        ("x y radius\n.1 .1 1e-12", "bed.txt:2: 1e-12 is too small a radius to be resolved"),
+        ("x y radius\n.1 .1", "bed.txt:2: 2 values; expected: x y radius"),
+        ("# bed\nx y radius\n.1 .1 .1 .1", "bed.txt:3: 4 values; expected: x y radius"),
+        (".1 .1 .1", "bed.txt:1: 3 numbers; allowed: x y, or x y vx vy, or what"),
+        ("x y radios\n.1 .1 .1", 'no column is called "radios"; did you mean "radius"?'),
+        ("x y radius radius\n", "bed.txt:1: the column radius is named twice"),
+        ("x radius\n.1 .1", "bed.txt:1: columns x and y are needed"),
+        ("x y vx radius\n", "bed.txt:1: columns vx and vy go together"),
+        (".1 .1\n", "bed.txt: has no radius; give species.gas.radius, or a column"),
+        ("x y radius species\n.1 .1 .1 2", 'bed.txt:2: there is no species "2"; known: 1 to'),
+        ("x y radius species\n.1 .1 .1 sand", 'bed.txt:2: there is no species "sand"'),
+        ("x y radius species\n.1 .1 .1 1.5", 'bed.txt:2: there is no species "1.5"'),
+        ("x y radius\n.2 .2 .1\n.4 .2 .11", "bed.txt:3: disk 2 at 0.4, 0.2 overlaps disk 1"),
+        ("x y radius\n.1 .1 .2", "bed.txt:2: disk 1 at 0.1, 0.1 is not wholly in its region"),
+        ("x y radius\n.5 .5 .6", "a disk of diameter 1.2 does not fit"),
+    ],
+)
+@pytest.mark.parametrize("options", [[], ["--check"]])
+def test_what_is_wrong_in_a_starting_file_is_told_with_its_line(
+    ricochet, tmp_path, lines, says, options
+):
+    (tmp_path / "bed.txt").write_text(lines)
+    text = "&species name = 'gas' file = 'bed.txt' velocities = 'rest' / &stop time = 1 /"
+    write_input(tmp_path, text)
+    run = ricochet("gas.nml", *options)
+    assert run.returncode == USAGE and says in run.stderr.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("species", "says"),
+    [
+        (
+            "velocities = 'rest' radius = 0.1",
+            "bed.txt: has a column radius, but species.gas.radius is given, too",
+        ),
+        (
+            "velocities = 'rest' mass = 2",
+            "bed.txt: has a column mass, but species.gas.mass is given, too",
+        ),
+        ("velocities = 'rest' count = 3", "bed.txt: 1 disk, but species.count is 3"),
+        ("velocities = 'file'", "bed.txt:2: there are no velocities; velocities = 'file' needs"),
+    ],
+)
+def test_input_and_file_do_not_contradict_each_other(ricochet, tmp_path, species, says):
+    (tmp_path / "bed.txt").write_text("x y radius mass\n.5 .5 .1 3\n")
+    text = f"&species name = 'gas' file = 'bed.txt' {species} / &stop time = 1 /"
+    write_input(tmp_path, text)
+    run = ricochet("gas.nml")
+    assert run.returncode == USAGE and says in one_line(run)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "says"),
+    [
+        ("", 'the radii of "bed" are those of its file'),
+        ("radius = 0.1", 'as other species are relative to "bed", give its mass'),
+    ],
+)
+def test_nothing_is_relative_to_disks_of_many_sizes(ricochet, tmp_path, sizes, says):
+    lines = "x y mass\n.5 .5 3\n" if sizes else "x y radius\n.5 .5 .1\n"
+    (tmp_path / "bed.txt").write_text(lines)
+    bed = f"&species name = 'bed' file = 'bed.txt' velocities = 'rest' {sizes} /"
+    write_input(
+        tmp_path, bed + "&species count = 1 relative_to = 'bed' mass = 2 / &stop time = 1 /"
+    )
+    run = ricochet("gas.nml")
+    assert run.returncode == USAGE and says in one_line(run)
+
+
+@pytest.mark.parametrize("name", ["bed.npy", "bed.npz"])
+def test_arrays_of_numpy_are_told_what_they_need(ricochet, tmp_path, name):
+    (np.save if name.endswith("y") else np.savez)(tmp_path / name, np.ones((3, 2)))
+    write_input(tmp_path, f"&species file = '{name}' radius = 0.1 / &stop time = 1 /")
+    run = ricochet("gas.nml")
+    assert run.returncode == USAGE and "write_start" in one_line(run)
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda file: file.__delitem__("particles/disks/radius"), "gas.h5: has no radius"),
+        (lambda file: file["particles/disks/mass"].write_direct(np.zeros(120)), "0 is not a mass"),
+    ],
+)
+def test_sizes_in_a_damaged_run_are_refused(ricochet, tmp_path, bed, damage, says):
+    finished(ricochet, "gas.h5")
+    with h5py.File(tmp_path / "gas.h5", "r+") as file:
+        damage(file)
+    write_input(tmp_path, INPUT.replace("bed.txt", "gas.h5"), "gas.nml")
+    run = ricochet("gas.nml", "-o", "x.h5")
+    assert run.returncode in (USAGE, FILES)
+    assert all(says in line and "gas.h5" in line for line in run.stderr.splitlines())
+
+
+def test_scripts_see_each_disk_and_refuse_laws_of_equal_ones(ricochet, tmp_path, bed, capsys):
+    finished(ricochet, "gas.h5")
+    path = tmp_path / "gas.h5"
+    assert run_script("player", path, "-o", tmp_path / "film.html") == 0
+    text = (tmp_path / "film.html").read_text()
+    radii = np.frombuffer(base64.b64decode(re.search(r'id="radii-data">([^<]*)', text)[1]), "<f4")
+    assert np.allclose(radii, by_species(bed)["radius"], rtol=1e-7)
+    assert run_script("snapshot", path, "-o", tmp_path / "frames.png") == 0
+    capsys.readouterr()
+    assert run_script("mixture", path, "-o", tmp_path / "mixture.png") == 2
+    message = capsys.readouterr().err
+    assert "the disks of 'bed' are not of one mass and radius" in message
+    run = read_run(path)
+    assert (
+        run.by_species[0].label == f"bed, m = {run.mass[:108].min():g} to {run.mass[:108].max():g}"
+    )
+
+
+def test_arrays_in_files_of_numpy_become_starting_files(tmp_path):
+    arrays = {"position": np.array([[0.1, 1 / 3]]), "mass": np.array([2]), "species": np.array([1])}
+    np.savez(tmp_path / "a.npz", **arrays)
+    path = write_start(tmp_path / "bed.txt", **np.load(tmp_path / "a.npz"))
+    assert path.read_text() == f"x y mass species\n{0.1:.17g} {1 / 3:.17g} 2 1\n"
+    np.save(tmp_path / "a.npy", arrays["position"])
+    write_start(path, np.load(tmp_path / "a.npy"), radius=0.5)
+    assert path.read_text() == f"x y radius\n{0.1:.17g} {1 / 3:.17g} 0.5\n"
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"position": np.ones((2, 3))}, "position: of shape (2, 3), not (N, 2)"),
+        ({"position": np.ones((0, 2))}, "position: of 0 disks, not of 1"),
+        ({"position": [[1, np.inf]]}, "position: not all numbers are finite"),
+        ({"position": [["a", "b"]]}, "position: not an array of numbers"),
+        ({"position": [[1, 2]], "velocity": np.ones((2, 2))}, "velocity: of 2 disks, not of 1"),
+        ({"position": [[1, 2]], "radius": [0]}, "radius: not all numbers are above 0"),
+        ({"position": [[1, 2]], "species": ["a", "b"]}, "species: of 2 disks, not of 1"),
+    ],
+)
+def test_arrays_that_are_no_disks_are_refused(tmp_path, arrays, says):
+    with pytest.raises(ValueError, match="^" + says.replace("(", r"\(").replace(")", r"\)")):
+        write_start(tmp_path / "bed.txt", **arrays)
+    assert not (tmp_path / "bed.txt").exists()
