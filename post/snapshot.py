@@ -27,6 +27,7 @@ from ricochet.drawing import (
     values_of,
 )
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
+from ricochet.thermodynamics import packing
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array
@@ -92,7 +93,8 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         species_legend(figure, run)
     elif not args.per_frame:
         figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
-    figure.suptitle(caption([run]), fontsize=10)
+    dense = f",  η = {packing(run):.4g}" if colour == "psi6" else ""
+    figure.suptitle(caption([run]) + dense, fontsize=10)
     return figure
 
 

@@ -94,6 +94,11 @@ def test_a_run_in_progress_is_read_up_to_its_last_committed_frame(tmp_path):
         writer["particles/disks/committed"][...] = 0
         writer.flush()
         assert "holds no frame yet" in frames_seen_by_another_program(path)
+        for count in (6, 10**12, -1):
+            writer["particles/disks/committed"][...] = count
+            writer.flush()
+            says = f"particles/disks/committed is {count}, but there are 5 samples"
+            assert says in frames_seen_by_another_program(path)
 
 
 def test_single_precision_is_computed_in_double(tmp_path):

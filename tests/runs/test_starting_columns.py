@@ -81,9 +81,7 @@ def test_each_collision_has_the_masses_and_radii_of_its_disks(ricochet, tmp_path
     assert run.events.impulse.min() > 0
 
 
-@pytest.mark.parametrize(
-    "method", ["search=pairs", "queue=heap", "threads=2", "dynamics=steps run.dt=1e-6"]
-)
+@pytest.mark.parametrize("method", ["search=pairs", "queue=heap", "dynamics=steps run.dt=1e-6"])
 def test_other_methods_see_the_same_disks(ricochet, tmp_path, bed, method):
     stop = ["--set", "stop.time=0.02"]
     options = [word for part in method.split() for word in ("--set", part)]
@@ -96,6 +94,21 @@ def test_other_methods_see_the_same_disks(ricochet, tmp_path, bed, method):
     close = {} if exact else {"atol": 1e-3}
     same = np.allclose if close else np.array_equal
     assert same(one.velocity[-1], other.velocity[-1], **close)
+
+
+def test_several_cores_see_the_same_disks(ricochet, tmp_path):
+    side, rng = 100, np.random.default_rng(6)
+    site = np.stack(np.divmod(np.arange(side**2), side), axis=1)
+    arrays = {
+        "radius": rng.uniform(0.2, 0.49, side**2) / side,
+        "mass": rng.uniform(0.1, 9, side**2),
+    }
+    write_start(tmp_path / "bed.txt", (site + 0.5) / side, rng.normal(size=(side**2, 2)), **arrays)
+    periodic = INPUT.replace("'wall' upper = 2, 1", "'periodic'").replace("40", "2")
+    write_input(tmp_path, periodic.replace("&species name = 'stone' file = 'bed.txt' /", ""))
+    finished(ricochet, "one.h5")
+    finished(ricochet, "two.h5", "--set", "run.threads=2")
+    assert not differences(tmp_path / "one.h5", tmp_path / "two.h5")
 
 
 def test_a_stopped_or_finished_run_goes_on_with_its_disks(ricochet, tmp_path, bed):
