@@ -82,8 +82,11 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
+    integer(int32) :: si, sj
 
-    restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
+    si = sim%tag(i)%species
+    sj = sim%tag(j)%species
+    restitution = sim%law%restitution(si, sj)
     if (sim%law%contact_time > 0) then
       if (in_contact(sim, i, t) .or. in_contact(sim, j, t)) restitution = 1
     end if
@@ -94,8 +97,12 @@ contains
     dv = sim%disk(j)%v - sim%disk(i)%v
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
-    mass_i = sim%mass_of(i)
-    mass_j = sim%mass_of(j)
+    mass_i = sim%species(si)%mass
+    mass_j = sim%species(sj)%mass
+    if (allocated(sim%mass)) then                          ! as in `mass_of`, with one test for both
+      mass_i = sim%mass(sim%tag(i)%id)
+      mass_j = sim%mass(sim%tag(j)%id)
+    end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx

@@ -192,33 +192,36 @@ contains
     type(random_stream_t) :: stream
     real(real64), allocatable :: x(:, :), radius(:), its_x(:, :), its_radius(:)
     integer, allocatable :: rows(:)
-    integer :: k, first
+    integer :: k, first, last
+    logical :: grown
 
-    allocate (x(2, 0), radius(0))
-    if (species(group(1))%placement == "grown") small = packing
+    grown = species(group(1))%placement == "grown"
+    if (grown) small = packing
+    allocate (radius(sum(species(group)%count)))
+    allocate (x(2, merge(size(radius), 0, grown)))
+    last = 0
     do k = 1, size(group)
       associate (me => species(group(k)))
+        first = last + 1
+        last = last + me%count
         member(k) = me%species_t
-        if (me%placement == "grown") then
-          call take_disks(species, group(k), sim, its_x, its_radius, rows, error)
-          if (.not. allocated(error)) call add_checked(small, species, group(k), its_x, smallest_scale*its_radius, rows, error)
-          if (allocated(error)) return
-          x = reshape([x, its_x], [2, size(x, 2) + me%count])
-          radius = [radius, its_radius]
-        else
-          radius = [radius, spread(me%radius, 1, me%count)]
-        end if
+        radius(first:last) = me%radius
+        if (.not. grown) cycle
+        call take_disks(species, group(k), sim, its_x, its_radius, rows, error)
+        if (.not. allocated(error)) call add_checked(small, species, group(k), its_x, smallest_scale*its_radius, rows, error)
+        if (allocated(error)) return
+        x(:, first:last) = its_x
+        radius(first:last) = its_radius
       end associate
     end do
     call stream%seed(seed, [group(1), purpose])
     call grow_disks(growth_box(packing, species(group(1))%region), member, radius, stream, line, x, error)
-    first = 1
+    last = 0
     do k = 1, size(group)
       if (allocated(error)) return
-      associate (last => first + species(group(k))%count - 1)
-        call add_checked(packing, species, group(k), x(:, first:last), radius(first:last), [integer ::], error)
-        first = last + 1
-      end associate
+      first = last + 1
+      last = last + species(group(k))%count
+      call add_checked(packing, species, group(k), x(:, first:last), radius(first:last), [integer ::], error)
     end do
   end subroutine place_densely
 

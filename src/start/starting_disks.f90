@@ -65,7 +65,7 @@ contains
     real(real64), intent(inout) :: table(:, :)                !! (column_names,n)
     type(error_t), allocatable, intent(inout) :: error
     logical :: in_file(radius_row:mass_row)
-    character(len=:), allocatable :: name
+    character(len=len(column_names)) :: name
     integer :: row
 
     if (size(rows) == 0) return
@@ -74,8 +74,8 @@ contains
     in_file = [species%radius_in_file, species%mass_in_file]
     do row = radius_row, mass_row
       if (there(row) .and. .not. in_file(row) .and. .not. is_run(species%file)) then
-        name = trim(column_names(row))
-        call fail(error, exit_usage, species%file//": has a column "//name//", but species."//species%name//"."//name &
+        name = column_names(row)
+        call fail(error, exit_usage, species%file//": has a column "//trim(name)//", but species."//species%name//"."//trim(name) &
           //" is given, too; give only one of them")
       end if
       if (there(row) .and. in_file(row)) cycle
