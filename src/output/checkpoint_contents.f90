@@ -247,7 +247,7 @@ contains
 
     halves = transfer(sum%units, halves)
     call file%exchange(name//"/low", halves(1), [lowest, huge(lowest)])
-    call file%exchange(name//"/high", halves(2), [-2_int64**62, 2_int64**62])
+    call file%exchange(name//"/high", halves(2), [-2_int64**62, 2_int64**62 - 1])
     sum%units = transfer(halves, sum%units)
   end subroutine exchange_sum
 
