@@ -39,27 +39,28 @@ contains
     type(domain_t), intent(in) :: other
     integer(int32), intent(inout) :: found         !! copies whose owners have been found
     integer(int32) :: r, s, t, cell(2), shift(2)
-    logical :: met, same
+    logical :: met, near, same
 
     shift = other%patch%first - self%patch%first
     select type (theirs => other%engine%search)
     type is (domain_grid_t)
       do r = 1, theirs%n_tracks
         if (.not. theirs%track(r)%own) cycle
-        if (.not. came_near(self, grid, theirs%track(r), shift, met)) cycle
         t = theirs%track(r)%slot
         s = copy_of(self, other%sim%tag(t)%id)
-        same = .false.
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
           associate (track => grid%track(self%sim%tag(s)%track))
             same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t)
+            if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
+            near = came_near(self, grid, theirs%track(r), shift, met)
             if (.not. met) met = grid%could_have_met(int(track%low, int32), int(track%high, int32))
           end associate
-          if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
-        else if (any(cell > self%patch%n) .and. .not. met) then
-          cycle
+        else
+          same = .false.
+          near = came_near(self, grid, theirs%track(r), shift, met)
+          if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
         end if
         if (met .and. .not. same) self%good = .false.
         if (.not. self%good) return

@@ -21,8 +21,8 @@ module parallel_events
   private
   public :: parallel_events_t
 
-  real(real64), parameter :: longest_visit = 0.5_real64        !! until the caller can look at signals and clocks [s]
-  integer, parameter :: most_windows = 16                      !! of a visit
+  real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
+  integer, parameter :: most_windows = 24                      !! of a visit
   real(real64), parameter :: turns_per_event = 20.0_real64
   real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken one by one
   real(real64), parameter :: shortest = 0.01_real64            !! window to be tried, in usual ones
