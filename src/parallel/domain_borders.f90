@@ -3,7 +3,7 @@
 !> in docs/theory.md.
 module domain_borders
   use kinds, only: int16, int32
-  use disks, only: disk_t, tag_t
+  use disks, only: tag_t
   use domain_grid, only: domain_grid_t, forever, track_t
   use domains, only: copy_of, domain_t, list_copies, news_t
   use partners, only: nothing
