@@ -2,7 +2,7 @@
 # What a collision costs, and what everything around it costs. docs/performance.md says more.
 #
 #   runs/bench.sh            1e3 to 1e5 disks at four packings; gravity, restitution, sizes, samples
-#   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; two runs on two cores
+#   runs/bench.sh --full     1e6 disks as well: rates, random start, memory; runs and threads on two cores
 #   runs/bench.sh --check    instructions per collision against what is promised (needs valgrind)
 #
 # Rates are million collisions per second of processor time of one run with observables on; medians
@@ -166,6 +166,35 @@ processes() {
   printf '%-52s%8.2f times as fast, at least 1.9\n' 'four runs on two cores' "$(awk -v one="$one" -v two="$two" 'BEGIN { print one/two }')"
 }
 
+# faster WHAT LEAST NAME COLLISIONS [OPTION...]: how many times as fast two threads are, by the wall clock, start included.
+faster() {
+  local what=$1 least=$2 k threads
+  shift 2
+  run_by=()
+  for ((k = 0; k < repeats; k++)); do
+    for threads in 1 2; do seconds run "$@" --set "run.threads=$threads" >>"$work/threads$threads"; done
+  done
+  awk -v what="$what" -v least="$least" -v one="$(median <"$work/threads1")" -v two="$(median <"$work/threads2")" \
+    'BEGIN { printf "%-52s%8.2f%10.2f%10.2f%10s\n", what, one, two, one/two, least }'
+  rm "$work/threads1" "$work/threads2"
+}
+
+threads() {
+  local packing disks least=1.5 length=6000000
+  [ "$full" ] && [ "$(nproc)" -ge 2 ] || return 0
+  printf '\n%-52s%8s%10s%10s%10s\n' 'one run on two cores, seconds' 'one' two ratio 'at least'
+  for disks in 10000 100000 1000000; do
+    for packing in 0.1 0.5 0.7; do
+      gas "$disks" "$packing"
+      faster "$disks disks, packing $packing" "$least" "gas_${disks}_$packing" $length
+    done
+    least=$([ "$disks" = 10000 ] && echo 1.85 || echo 1.9)
+    [ "$disks" = 10000 ] || length=24000000
+  done
+  faster 'restitution 0.9, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set contact.restitution=0.9
+  faster 'gravity, 100000 disks, packing 0.5' 1.6 gas_100000_0.5 6000000 --set box.gravity=0,-1
+}
+
 # ensemble JOBS: four runs of some seconds, so many at a time.
 ensemble() {
   RICOCHET=$program runs/ensemble.sh "$work/gas_10000_0.5.nml" -d "$work/ensemble$1" --seeds 1-4 -j "$1" \
@@ -219,6 +248,7 @@ case ${1:-} in
     table
     costs
     processes
+    threads
     ;;
   *) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac

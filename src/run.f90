@@ -155,6 +155,7 @@ contains
     call main_loop(run, error)
     call cpu_time(cpu(2))
     run%rate = (run%sim%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    deallocate (run%evolution)                             ! the end of the output needs room
   end subroutine follow
 
   !> Advances the simulation from one thing that is due to the next, until its end.

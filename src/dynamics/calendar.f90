@@ -125,12 +125,17 @@ contains
     self%span(s)%n = n
   end subroutine put_far
 
-  !> Doubles the room of a span.
+  !> Doubles the room of a span. What is not used of it takes no memory.
   subroutine lengthen(self, s)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: s
+    type(filed_t), allocatable :: longer(:)
 
-    self%span(s)%filed = [self%span(s)%filed, self%span(s)%filed]
+    associate (filed => self%span(s)%filed)
+      allocate (longer(2*size(filed)))
+      longer(:size(filed)) = filed
+    end associate
+    call move_alloc(longer, self%span(s)%filed)
   end subroutine lengthen
 
   !> Whether a window is the first of a span.

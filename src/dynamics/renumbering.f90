@@ -1,6 +1,7 @@
 !> Disks that are neighbours in space become neighbours in memory.
 module renumbering
   use kinds, only: int32, real64
+  use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
   implicit none
@@ -17,7 +18,7 @@ contains
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable :: first(:), place(:), cell(:)
-    integer(int32) :: n(2), c(2), i
+    integer(int32) :: n(2), c(2), i, k
 
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
     n = tile*((n + tile - 1)/tile)
@@ -27,9 +28,31 @@ contains
       cell(i) = 1 + tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
     end do
     call sort_by_count(cell, product(n), first, place)
-    sim%disk(place) = sim%disk
-    sim%tag(place) = sim%tag
-    if (any(sim%box%periodic)) sim%image(:, place) = sim%image
+    deallocate (cell, first)
+    do i = 1, sim%n_disks()
+      do while (place(i) /= i)
+        call swap(sim, i, place(i))
+        k = place(i)
+        place(i) = place(k)
+        place(k) = k
+      end do
+    end do
   end subroutine renumber
+
+  !> Lets the disks i and k trade places: no second copy of all disks is needed, and most are near already.
+  pure subroutine swap(sim, i, k)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, k
+    type(disk_t) :: disk
+    type(tag_t) :: tag
+
+    disk = sim%disk(i)
+    sim%disk(i) = sim%disk(k)
+    sim%disk(k) = disk
+    tag = sim%tag(i)
+    sim%tag(i) = sim%tag(k)
+    sim%tag(k) = tag
+    if (any(sim%box%periodic)) sim%image(:, [i, k]) = sim%image(:, [k, i])
+  end subroutine swap
 
 end module renumbering

@@ -1,97 +1,80 @@
-!> What domains tell each other. After a window of time all publish what their own disks near the border did, and compare
-!> it with what their copies did; if no own disk can have met a wrong copy, the copies are put right. The rule, and why it
-!> is right, is in docs/theory.md.
+!> What domains tell each other. After a window of time each compares what its copies did with what the disks did that
+!> they stand for; if no own disk can have met a wrong copy, the copies are put right. The rule, and why it is right, is
+!> in docs/theory.md.
 module domain_borders
   use kinds, only: int16, int32
-  use disks, only: disk_t, tag_t
-  use domain_grid, only: copy, domain_grid_t, forever, rim, track_t, vacant
-  use domains, only: copy_of, domain_t, list_copies, report_t
+  use disks, only: tag_t
+  use domain_grid, only: domain_grid_t, forever, track_t
+  use domains, only: copy_of, domain_t, list_copies, news_t
   use partners, only: nothing
   implicit none
   private
-  public :: publish, refresh, verify
+  public :: refresh, verify
 
 contains
 
-  !> Reports on the own disks that others could have copies of.
-  subroutine publish(self)
-    type(domain_t), intent(inout) :: self
-    type(report_t), allocatable :: more(:)
-    integer(int32) :: k, n
-
-    if (.not. allocated(self%reported)) allocate (self%reported(256))
-    n = 0
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      do k = 1, size(grid%role, kind=int32)
-        if (grid%role(k) /= rim) cycle
-        if (n == size(self%reported)) then
-          allocate (more(2*n))
-          more(:n) = self%reported
-          call move_alloc(more, self%reported)
-        end if
-        n = n + 1
-        associate (report => self%reported(n), first => self%patch%first)
-          report%disk = self%sim%disk(k)
-          report%tag = self%sim%tag(k)
-          report%track = grid%track(k)
-          report%home = self%home(k)
-          if (size(self%sim%image) > 0) report%image = self%sim%image(:, k)
-          report%low = grid%track(k)%low + first - 1
-          report%high = grid%track(k)%high + first - 1
-          report%cell = modulo(self%sim%tag(k)%cell + first - 2, self%patch%whole) + 1
-        end associate
-      end do
-    end select
-    self%n_reports = n
-  end subroutine publish
-
-  !> Finds out whether the k-th domain's own disks can have met anybody whose history was not the true one.
+  !> Finds out whether the k-th domain's own disks can have met anybody whose history was not the true one, and notes what
+  !> is to be put right. Reads what the neighbours hold.
   subroutine verify(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
-    integer(int32) :: m, n, r, s, found
-    logical :: met, moved
+    integer(int32) :: m, found
 
     found = 0
-    moved = .false.
-    n = sum(domain(domain(k)%neighbour)%n_reports)
-    if (allocated(domain(k)%same)) then
-      if (size(domain(k)%same) < n) deallocate (domain(k)%same)
-    end if
-    if (.not. allocated(domain(k)%same)) allocate (domain(k)%same(2*n))
-    n = 0
     select type (grid => domain(k)%engine%search)
     type is (domain_grid_t)
+      domain(k)%n_news = 0
       domain(k)%good = domain(k)%done .and. .not. grid%too_far
       do m = 1, size(domain(k)%neighbour)
-        associate (other => domain(domain(k)%neighbour(m)))
-          do r = 1, other%n_reports
-            n = n + 1
-            domain(k)%same(n) = .false.
-            if (.not. came_near(domain(k), grid, other%reported(r), met)) cycle
-            s = copy_of(domain(k), other%reported(r)%tag%id)
-            if (s > 0) then
-              found = found + 1
-              if (size(domain(k)%sim%image) > 0) moved = any(domain(k)%sim%image(:, s) /= other%reported(r)%image)
-              domain(k)%same(n) = same_history(domain(k)%sim%disk(s), domain(k)%sim%tag(s), grid%track(s), &
-                other%reported(r)) .and. .not. moved
-              met = met .or. grid%could_have_met(int(grid%track(s)%low, int32), int(grid%track(s)%high, int32))
-            end if
-            if (met .and. .not. domain(k)%same(n)) domain(k)%good = .false.
-          end do
-        end associate
+        if (domain(k)%good) call compare(domain(k), grid, domain(domain(k)%neighbour(m)), found)
       end do
-      if (found < count(grid%role == copy)) domain(k)%good = .false.     ! a copy that nobody owns
+      if (found < count(.not. grid%track(:grid%n_tracks)%own)) domain(k)%good = .false.     ! a copy that nobody owns
     end select
   end subroutine verify
 
-  !> Whether a disk that a neighbour reports on came into the patch, in any image; `met`: to where it could have met an
-  !> own disk.
-  function came_near(self, grid, report, met) result(near)
+  !> Compares with the histories of a neighbour's own disks.
+  subroutine compare(self, grid, other, found)
+    type(domain_t), intent(inout) :: self
+    type(domain_grid_t), intent(in) :: grid
+    type(domain_t), intent(in) :: other
+    integer(int32), intent(inout) :: found         !! copies whose owners have been found
+    integer(int32) :: r, s, t, cell(2), shift(2)
+    logical :: met, near, same
+
+    shift = other%patch%first - self%patch%first
+    select type (theirs => other%engine%search)
+    type is (domain_grid_t)
+      do r = 1, theirs%n_tracks
+        if (.not. theirs%track(r)%own) cycle
+        t = theirs%track(r)%slot
+        s = copy_of(self, other%sim%tag(t)%id)
+        cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
+        if (s > 0) then
+          found = found + 1
+          associate (track => grid%track(self%sim%tag(s)%track))
+            same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t)
+            if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
+            near = came_near(self, grid, theirs%track(r), shift, met)
+            if (.not. met) met = grid%could_have_met(int(track%low, int32), int(track%high, int32))
+          end associate
+        else
+          same = .false.
+          near = came_near(self, grid, theirs%track(r), shift, met)
+          if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
+        end if
+        if (met .and. .not. same) self%good = .false.
+        if (.not. self%good) return
+        call note_news(self, other, t, cell, s)
+      end do
+    end select
+  end subroutine compare
+
+  !> Whether a disk that a neighbour owns came into the patch, in any image; `met`: to where it could have met an own disk.
+  function came_near(self, grid, track, shift, met) result(near)
     type(domain_t), intent(in) :: self
     type(domain_grid_t), intent(in) :: grid
-    type(report_t), intent(in) :: report
+    type(track_t), intent(in) :: track
+    integer(int32), intent(in) :: shift(2)         !! from the neighbour's columns and rows to the own ones
     logical, intent(out) :: met
     logical :: near
     integer(int32) :: low(2), high(2), reach(2), ix, iy
@@ -101,8 +84,8 @@ contains
     reach = merge(1, 0, self%sim%box%periodic .and. self%patch%n < self%patch%whole)
     do iy = -reach(2), reach(2)
       do ix = -reach(1), reach(1)
-        low = report%low - self%patch%first + 1 + [ix, iy]*self%patch%whole
-        high = report%high - self%patch%first + 1 + [ix, iy]*self%patch%whole
+        low = track%low + shift + [ix, iy]*self%patch%whole
+        high = track%high + shift + [ix, iy]*self%patch%whole
         if (any(low > self%patch%n .or. high < 1)) cycle
         near = .true.
         met = met .or. grid%could_have_met(low, high)
@@ -110,96 +93,106 @@ contains
     end do
   end function came_near
 
-  !> Whether a copy had the history that its owner reports.
-  pure function same_history(disk, tag, track, report) result(yes)
-    type(disk_t), intent(in) :: disk
-    type(tag_t), intent(in) :: tag
-    type(track_t), intent(in) :: track
-    type(report_t), intent(in) :: report
+  !> Whether the copy in slot s is where the neighbour's disk in slot t is, and met what it met.
+  pure function same_state(self, s, other, t) result(yes)
+    type(domain_t), intent(in) :: self, other
+    integer(int32), intent(in) :: s, t
     logical :: yes
 
-    yes = tag%collisions == report%tag%collisions .and. track%digest == report%track%digest &
-      .and. tag%met == report%tag%met .and. .not. (any(disk%x /= report%disk%x) &
-      .or. any(disk%v /= report%disk%v) .or. disk%clock /= report%disk%clock)
-  end function same_history
+    associate (mine => self%sim%disk(s), theirs => other%sim%disk(t))
+      yes = .not. (mine%clock /= theirs%clock .or. mine%x(1) /= theirs%x(1) .or. mine%x(2) /= theirs%x(2) &
+        .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
+        .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
+    end associate
+    if (size(self%sim%image) > 0) yes = yes .and. self%sim%image(1, s) == other%sim%image(1, t) &
+      .and. self%sim%image(2, s) == other%sim%image(2, t)
+  end function same_state
 
-  !> Puts the copies of the k-th domain right, takes over who came, gives up who left. All reports must be good.
-  subroutine refresh(domain, k)
-    type(domain_t), intent(inout) :: domain(:)
-    integer(int32), intent(in) :: k
+  !> Notes what is to be taken over from a neighbour's slot t.
+  subroutine note_news(self, other, t, cell, s)
+    type(domain_t), intent(inout) :: self
+    type(domain_t), intent(in) :: other
+    integer(int32), intent(in) :: t, cell(2), s
+    type(news_t), allocatable :: more(:)
+
+    if (.not. allocated(self%news)) allocate (self%news(256))
+    if (self%n_news == size(self%news)) then
+      allocate (more(2*self%n_news))
+      more(:self%n_news) = self%news
+      call move_alloc(more, self%news)
+    end if
+    self%n_news = self%n_news + 1
+    associate (news => self%news(self%n_news))
+      news%disk = other%sim%disk(t)
+      news%tag = other%sim%tag(t)
+      news%home = other%home(t)
+      news%cell = cell
+      news%slot = s
+      if (size(self%sim%image) > 0) news%image = other%sim%image(:, t)
+    end associate
+  end subroutine note_news
+
+  !> Puts the copies right by the news, takes over who came, gives up who left.
+  subroutine refresh(self)
+    type(domain_t), intent(inout) :: self
     integer(int32), allocatable :: waiting(:)
-    integer(int32) :: m, n, r, n_waiting
-    logical :: met
+    integer(int32) :: k, n_waiting
 
-    allocate (waiting(sum(domain(domain(k)%neighbour)%n_reports)))
+    allocate (waiting(self%n_news))
     n_waiting = 0
-    n = 0
-    select type (grid => domain(k)%engine%search)
+    select type (grid => self%engine%search)
     type is (domain_grid_t)
-      do r = 1, size(grid%role, kind=int32)
-        if (grid%role(r) /= rim) cycle
-        if (.not. grid%owns(domain(k)%sim%tag(r)%cell)) grid%role(r) = copy
-        call grid%begin_track(domain(k)%sim%tag(r), r)
-      end do
-      do m = 1, size(domain(k)%neighbour)
-        associate (other => domain(domain(k)%neighbour(m)))
-          do r = 1, other%n_reports
-            n = n + 1
-            if (came_near(domain(k), grid, other%reported(r), met)) &
-              call take_over(domain(k), grid, other%reported(r), domain(k)%same(n), n_waiting, waiting)
-          end do
-        end associate
-      end do
       call grid%begin_window()
-      do m = 1, n_waiting
-        call grid%predict(domain(k)%sim, waiting(m))
-        call domain(k)%engine%queue%schedule(domain(k)%sim%disk, domain(k)%sim%tag, waiting(m))
+      do k = grid%n_tracks, 1, -1
+        call grid%begin_track(self%sim%tag, grid%track(k)%slot)
       end do
-      call list_copies(domain(k), grid)
+      do k = 1, self%n_news
+        call take_over(self, grid, self%news(k), n_waiting, waiting)
+      end do
+      do k = 1, n_waiting
+        call grid%predict(self%sim, waiting(k))
+        call self%engine%queue%schedule(self%sim%disk, self%sim%tag, waiting(k))
+      end do
+      call list_copies(self, grid)
     end select
+    self%n_news = 0
   end subroutine refresh
 
-  !> Takes over what the owner reports of a disk that is, or was, in the patch.
-  subroutine take_over(self, grid, report, same, n_waiting, waiting)
+  !> Takes over one piece of news.
+  subroutine take_over(self, grid, news, n_waiting, waiting)
     type(domain_t), intent(inout) :: self
     type(domain_grid_t), intent(inout) :: grid
-    type(report_t), intent(in) :: report
-    logical, intent(in) :: same                    !! the copy had the same history
+    type(news_t), intent(in) :: news
     integer(int32), intent(inout) :: n_waiting, waiting(:)   !! (n_waiting) slots whose events are to be predicted
-    integer(int32) :: s, cell(2), stamp, window
+    integer(int32) :: s
+    type(tag_t) :: tag
 
-    cell = modulo(report%cell - self%patch%first, self%patch%whole) + 1
-    s = copy_of(self, report%tag%id)
-    if (any(cell > self%patch%n)) then
+    s = news%slot
+    if (any(news%cell > self%patch%n)) then
       if (s > 0) call leave(self, grid, s)
       return
     end if
     if (s == 0) then
-      if (self%n_vacant == 0) then
-        self%good = .false.                        ! no room: to be loaded anew
-        return
-      end if
-      s = self%vacancy(self%n_vacant)
-      self%n_vacant = self%n_vacant - 1
-    else if (.not. same .or. any(self%sim%tag(s)%cell /= cell)) then
-      if (self%patch%holds(self%sim%tag(s)%cell)) call grid%take_out(self%sim%tag(s), s)
-    else
-      if (grid%owns(self%sim%tag(s)%cell)) grid%role(s) = rim
-      call grid%begin_track(self%sim%tag(s), s)
-      return
+      s = self%vacant
+      self%good = s > 0 .and. self%good            ! else no room: to be loaded anew
+      if (s == 0) return
+      self%vacant = self%home(s)
+    else if (self%patch%holds(self%sim%tag(s)%cell)) then
+      call grid%take_out(self%sim%tag(s), s)
     end if
-    stamp = self%sim%disk(s)%stamp + 1
-    window = self%sim%tag(s)%window
-    self%sim%disk(s) = report%disk
-    self%sim%tag(s) = report%tag
-    self%sim%disk(s)%stamp = stamp
-    self%sim%disk(s)%event_time = forever
-    self%sim%tag(s)%window = window
-    self%home(s) = report%home
-    if (size(self%sim%image) > 0) self%sim%image(:, s) = report%image
-    call grid%insert(self%sim%tag(s), s, int(cell, int16))
-    grid%role(s) = merge(rim, copy, grid%owns(self%sim%tag(s)%cell))
-    call grid%begin_track(self%sim%tag(s), s)
+    tag = self%sim%tag(s)
+    self%sim%tag(s) = news%tag
+    self%sim%tag(s)%window = tag%window
+    self%sim%tag(s)%track = tag%track
+    associate (disk => self%sim%disk(s), stamp => self%sim%disk(s)%stamp + 1)
+      disk = news%disk
+      disk%stamp = stamp
+      disk%event_time = forever
+    end associate
+    self%home(s) = news%home
+    if (size(self%sim%image) > 0) self%sim%image(:, s) = news%image
+    call grid%insert(self%sim%tag(s), s, int(news%cell, int16))
+    call grid%begin_track(self%sim%tag, s)
     n_waiting = n_waiting + 1
     waiting(n_waiting) = s
   end subroutine take_over
@@ -211,13 +204,13 @@ contains
     integer(int32), intent(in) :: s
 
     if (self%patch%holds(self%sim%tag(s)%cell)) call grid%take_out(self%sim%tag(s), s)
+    call grid%drop_track(self%sim%tag, self%sim%tag(s)%track)
     self%sim%disk(s)%event_time = forever
     self%sim%disk(s)%partner = nothing
     self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1
     self%sim%tag(s)%id = 0
-    grid%role(s) = vacant
-    self%n_vacant = self%n_vacant + 1
-    self%vacancy(self%n_vacant) = s
+    self%home(s) = self%vacant
+    self%vacant = s
   end subroutine leave
 
 end module domain_borders

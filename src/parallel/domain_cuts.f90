@@ -1,10 +1,8 @@
 !> Where a simulation is cut into domains: slabs of columns of cells, each cut into rectangles, so that all hold about as
 !> many disks. Each domain's patch is its rectangle and the cells around it, as many as the halo is wide.
 module domain_cuts
-  use kinds, only: int32, real64
+  use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
-  use cell_grid, only: whole_box
-  use simulation_state, only: simulation_t
   implicit none
   private
   public :: domain_cuts_t
@@ -25,55 +23,46 @@ module domain_cuts
     procedure :: cut
     procedure :: patch_of
     procedure :: neighbours_of
-    procedure :: list_members
   end type domain_cuts_t
 
 contains
 
-  !> Cuts the box into at most `wanted` domains, none narrower than two halos. The disks must lie in it somewhere.
-  subroutine cut(self, sim, wanted, halo)
+  !> Cuts the box into at most `wanted` domains, none narrower than two halos.
+  subroutine cut(self, whole, periodic, cell, wanted, halo)
     class(domain_cuts_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+    type(patch_t), intent(in) :: whole
+    logical, intent(in) :: periodic(2)
+    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) where they are
     integer(int32), intent(in) :: wanted, halo
-    type(cuts_t) :: slabs
-    type(cuts_t), allocatable :: pieces(:)
-    integer(int32), allocatable :: cell(:, :), weight(:)
+    type(cuts_t) :: slabs, pieces
+    integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
-    self%whole = whole_box(sim)
+    self%whole = whole
     self%halo = halo
-    n = numbers(self, sim%box%periodic, wanted)
-    allocate (cell(2, sim%n_disks()))
-    do i = 1, sim%n_disks()
-      cell(:, i) = self%whole%cell_at(sim%position(i))
-    end do
-    allocate (weight(self%whole%n(1)))
-    weight = 0
-    do i = 1, sim%n_disks()
+    n = numbers(self, periodic, wanted)
+    self%n = product(n)
+    if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
+    allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
+    allocate (weight(whole%n(1)), weights(whole%n(2), n(1)), source=0_int32)
+    do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
     call divide(weight, n(1), 2*halo + 1, slabs)
-    if (allocated(self%slab_of)) deallocate (self%slab_of, self%domain_of)
-    allocate (self%slab_of(self%whole%n(1)), self%domain_of(self%whole%n(2), n(1)), pieces(n(1)))
     do s = 1, n(1)
       self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
     end do
-    self%n = product(n)
-    if (allocated(self%low)) deallocate (self%low, self%high)
-    allocate (self%low(2, self%n), self%high(2, self%n))
-    deallocate (weight)
-    allocate (weight(self%whole%n(2)))
-    k = 0
+    do i = 1, size(cell, 2, kind=int32)
+      associate (w => weights(cell(2, i), self%slab_of(cell(1, i))))
+        w = w + 1
+      end associate
+    end do
     do s = 1, n(1)
-      weight = 0
-      do i = 1, sim%n_disks()
-        if (self%slab_of(cell(1, i)) == s) weight(cell(2, i)) = weight(cell(2, i)) + 1
-      end do
-      call divide(weight, n(2), 2*halo + 1, pieces(s))
+      call divide(weights(:, s), n(2), 2*halo + 1, pieces)
       do r = 1, n(2)
-        k = k + 1
-        self%low(:, k) = [slabs%first(s), pieces(s)%first(r)]
-        self%high(:, k) = [slabs%first(s + 1), pieces(s)%first(r + 1)] - 1
+        k = r + n(2)*(s - 1)
+        self%low(:, k) = [slabs%first(s), pieces%first(r)]
+        self%high(:, k) = [slabs%first(s + 1), pieces%first(r + 1)] - 1
         self%domain_of(self%low(2, k):self%high(2, k), s) = k
       end do
     end do
@@ -153,70 +142,22 @@ contains
     integer(int32), intent(in) :: k
     type(patch_t), intent(in) :: patch
     integer(int32), allocatable :: list(:)
-    logical :: near(self%n)
+    logical :: near(self%n), slab(size(self%domain_of, 2))
     integer(int32) :: ix, iy, m
 
-    near = .false.
+    slab = .false.
     do ix = 1, patch%n(1)
+      slab(self%slab_of(patch%place_of(ix, 1))) = .true.
+    end do
+    near = .false.
+    do m = 1, size(slab, kind=int32)
+      if (.not. slab(m)) cycle
       do iy = 1, patch%n(2)
-        near(self%domain_of(patch%place_of(iy, 2), self%slab_of(patch%place_of(ix, 1)))) = .true.
+        near(self%domain_of(patch%place_of(iy, 2), m)) = .true.
       end do
     end do
     near(k) = .false.
     list = pack([(m, m=1, self%n)], near)
   end function neighbours_of
-
-  !> Lists the disks in the patch of each domain.
-  subroutine list_members(self, sim, patch, first, member)
-    class(domain_cuts_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    type(patch_t), intent(in) :: patch(:)
-    integer(int32), allocatable, intent(out) :: first(:)     !! (n+1) of each domain in `member`
-    integer(int32), allocatable, intent(out) :: member(:)
-    integer(int32), allocatable :: next(:)
-    integer(int32) :: i, k, pass, cell(2), n_near, near(16)
-
-    allocate (first(self%n + 1), next(self%n))
-    next = 0
-    do pass = 1, 2
-      do i = 1, sim%n_disks()
-        cell = self%whole%cell_at(sim%position(i))
-        call find_near(self, cell, n_near, near)
-        do k = 1, n_near
-          if (any(modulo(cell - patch(near(k))%first, self%whole%n) >= patch(near(k))%n)) cycle
-          if (pass == 2) member(next(near(k))) = i
-          next(near(k)) = next(near(k)) + 1
-        end do
-      end do
-      if (pass == 2) exit
-      first(1) = 1
-      do k = 1, self%n
-        first(k + 1) = first(k) + next(k)
-      end do
-      next = first(:self%n)
-      allocate (member(first(self%n + 1) - 1))
-    end do
-  end subroutine list_members
-
-  !> The domains whose patches may contain a cell: those of the cells one halo away, each once.
-  pure subroutine find_near(self, cell, n, near)
-    class(domain_cuts_t), intent(in) :: self
-    integer(int32), intent(in) :: cell(2)
-    integer(int32), intent(out) :: n
-    integer(int32), intent(out) :: near(16)        !! (n)
-    integer(int32) :: column, row, dx, dy, candidate
-
-    n = 0
-    do dx = -1, 1
-      column = modulo(cell(1) + dx*self%halo - 1, self%whole%n(1)) + 1
-      do dy = -1, 1
-        row = modulo(cell(2) + dy*self%halo - 1, self%whole%n(2)) + 1
-        candidate = self%domain_of(row, self%slab_of(column))
-        if (any(near(:n) == candidate)) cycle
-        n = n + 1
-        near(n) = candidate
-      end do
-    end do
-  end subroutine find_near
 
 end module domain_cuts

@@ -11,22 +11,22 @@ module domain_grid
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: copy, deep, domain_grid_t, rim, track_t, vacant, forever
+  public :: domain_grid_t, forever, track_t
 
-  !> What a slot holds: nothing; an own disk that nobody else has a copy of; one that others may have; a copy.
-  integer(int8), parameter :: vacant = 0_int8, deep = 1_int8, rim = 2_int8, copy = 3_int8
   real(real64), parameter :: forever = 2.0e150_real64    !! later than any event
 
-  !> What a disk did in the present window of time.
+  !> What a disk did in the present window of time. An own disk that nobody else can have a copy of has no track.
   type :: track_t
+    integer(int64) :: digest = 0                   !! of the times of its collisions with disks
+    integer(int32) :: slot = 0
+    logical :: own = .false.                       !! an own disk; else a copy
     integer(int16) :: low(2) = 0_int16             !! first column, row that it was in
     integer(int16) :: high(2) = 0_int16            !! last
-    integer(int64) :: digest = 0                   !! of the times of its collisions with disks
   end type track_t
 
   type, extends(cell_grid_t) :: domain_grid_t
-    integer(int8), allocatable :: role(:)          !! (slots)
-    type(track_t), allocatable :: track(:)         !! (slots) of rims and copies
+    integer(int32) :: n_tracks = 0
+    type(track_t), allocatable :: track(:)         !! (n_tracks, and room for more)
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns, rows of the domain
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! those that are in no other domain's patch
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch has an open end
@@ -41,9 +41,12 @@ module domain_grid
     procedure :: cross
     procedure :: begin_window
     procedure :: begin_track
+    procedure :: drop_track
     procedure :: keep_sums
     procedure :: could_have_met
     procedure :: owns
+    procedure :: is_own
+    procedure, private :: add_track
     procedure, private :: note
   end type domain_grid_t
 
@@ -57,17 +60,50 @@ contains
     self%too_far = .false.
   end subroutine begin_window
 
-  !> Disk i begins a new track where it is. Of own disks also the role follows from that.
+  !> A new track of disk i begins where it is, if it needs one there. Whose disk it is follows from that as well.
   subroutine begin_track(self, tag, i)
     class(domain_grid_t), intent(inout) :: self
-    type(tag_t), intent(in) :: tag
+    type(tag_t), intent(inout) :: tag(:)
     integer(int32), intent(in) :: i
 
-    self%track(i) = track_t(tag%cell, tag%cell)
-    if (self%role(i) == copy) return
-    self%role(i) = deep
-    if (any(tag%cell < self%deep_low .or. tag%cell > self%deep_high)) self%role(i) = rim
+    if (within(tag(i)%cell, self%deep_low, self%deep_high)) then
+      call self%drop_track(tag, tag(i)%track)
+    else
+      if (tag(i)%track == 0) call self%add_track(tag(i))
+      self%track(tag(i)%track) = track_t(0_int64, i, self%owns(tag(i)%cell), tag(i)%cell, tag(i)%cell)
+    end if
   end subroutine begin_track
+
+  !> Gives a disk a track that is still to begin.
+  subroutine add_track(self, tag)
+    class(domain_grid_t), intent(inout) :: self
+    type(tag_t), intent(inout) :: tag
+    type(track_t), allocatable :: more(:)
+
+    if (.not. allocated(self%track)) allocate (self%track(1024))
+    if (self%n_tracks == size(self%track)) then
+      allocate (more(2*self%n_tracks))
+      more(:self%n_tracks) = self%track
+      call move_alloc(more, self%track)
+    end if
+    self%n_tracks = self%n_tracks + 1
+    tag%track = self%n_tracks
+  end subroutine add_track
+
+  !> Drops the k-th track, if any (k > 0); the last one takes its number.
+  subroutine drop_track(self, tag, k)
+    class(domain_grid_t), intent(inout) :: self
+    type(tag_t), intent(inout) :: tag(:)
+    integer(int32), value :: k
+
+    if (k == 0) return
+    tag(self%track(k)%slot)%track = 0
+    if (k < self%n_tracks) then
+      self%track(k) = self%track(self%n_tracks)
+      tag(self%track(k)%slot)%track = k
+    end if
+    self%n_tracks = self%n_tracks - 1
+  end subroutine drop_track
 
   !> Takes the counts and sums of a simulation as booked.
   subroutine keep_sums(self, sim)
@@ -89,48 +125,56 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
 
-    if (self%role(i) == vacant) then
+    if (sim%tag(i)%id == 0) then                   ! a vacant slot
       sim%disk(i)%event_time = forever
       sim%disk(i)%partner = nothing
       return
     end if
     if (sim%events /= self%events) then
-      if (self%role(i) == copy) then
+      if (self%is_own(sim%tag(i))) then
+        call self%keep_sums(sim)
+      else
         sim%events = self%events
         sim%dissipated = self%dissipated
         sim%wall_collisions = self%wall_collisions
         sim%obstacle_collisions = self%obstacle_collisions
         sim%wall_impulse = self%wall_impulse
-      else
-        call self%keep_sums(sim)
       end if
     end if
     call self%cell_grid_t%predict(sim, i)
   end subroutine predict
 
-  !> Predicts the disks i and j, which have just collided. That counts where the one with the lower id is an own one.
+  !> Predicts the disks i and j, which have just collided.
   subroutine predict_both(self, sim, i, j)
     class(domain_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
 
-    if (self%role(merge(i, j, sim%tag(i)%id < sim%tag(j)%id)) == copy) then
-      sim%events = self%events
-      sim%collisions = self%collisions
-      sim%virial = self%virial
-      sim%dissipated = self%dissipated
-    else
-      self%events = sim%events
-      self%collisions = sim%collisions
-      self%virial = sim%virial
-      self%dissipated = sim%dissipated
-    end if
-    if (self%role(i) /= deep) call add_moment(self%track(i)%digest, sim%disk(i)%clock)
-    if (self%role(j) /= deep) call add_moment(self%track(j)%digest, sim%disk(j)%clock)
+    if (sim%tag(i)%track + sim%tag(j)%track > 0) call note_collision(self, sim, i, j)
+    self%events = sim%events
+    self%collisions = sim%collisions
+    self%virial%units = sim%virial%units
+    self%dissipated%units = sim%dissipated%units
     call self%cell_grid_t%predict_both(sim, i, j)
-    call self%note(sim%tag(i)%cell, i)
-    call self%note(sim%tag(j)%cell, j)
+    if (.not. self%roomy) return
+    call self%note(sim%tag(i), i)                  ! in cells that they have chosen again
+    call self%note(sim%tag(j), j)
   end subroutine predict_both
+
+  !> Notes a collision of disks of which others may have copies. It counts where the one with the lower id is an own one.
+  subroutine note_collision(self, sim, i, j)
+    class(domain_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+
+    if (sim%tag(i)%track > 0) call add_moment(self%track(sim%tag(i)%track)%digest, sim%disk(i)%clock)
+    if (sim%tag(j)%track > 0) call add_moment(self%track(sim%tag(j)%track)%digest, sim%disk(j)%clock)
+    if (self%is_own(sim%tag(merge(i, j, sim%tag(i)%id < sim%tag(j)%id)))) return
+    sim%events = self%events
+    sim%collisions = self%collisions
+    sim%virial%units = self%virial%units
+    sim%dissipated%units = self%dissipated%units
+  end subroutine note_collision
 
   !> Adds a collision to a digest.
   elemental subroutine add_moment(digest, time)
@@ -148,24 +192,25 @@ contains
     integer(int32), intent(in) :: code
 
     call self%cell_grid_t%cross(sim, i, code)
-    call self%note(sim%tag(i)%cell, i)
+    call self%note(sim%tag(i), i)
   end subroutine cross
 
-  !> Notes that disk i is in a cell.
-  subroutine note(self, cell, i)
+  !> Notes where disk i is.
+  subroutine note(self, tag, i)
     class(domain_grid_t), intent(inout) :: self
-    integer(int16), intent(in) :: cell(2)
+    type(tag_t), intent(inout) :: tag
     integer(int32), intent(in) :: i
 
-    if (self%role(i) == deep) then
-      if (all(cell >= self%deep_low .and. cell <= self%deep_high)) return
-      self%role(i) = rim                           ! from here on others could have seen it
-      self%track(i) = track_t(cell, cell)
-    else
-      self%track(i)%low = min(self%track(i)%low, cell)
-      self%track(i)%high = max(self%track(i)%high, cell)
+    if (tag%track == 0) then
+      if (within(tag%cell, self%deep_low, self%deep_high)) return
+      call self%add_track(tag)                     ! from here on others could have seen it
+      self%track(tag%track) = track_t(0_int64, i, .true., tag%cell, tag%cell)
     end if
-    if (self%role(i) == rim .and. .not. self%owns(cell)) call reach(self, cell)
+    associate (track => self%track(tag%track))
+      track%low = min(track%low, tag%cell)
+      track%high = max(track%high, tag%cell)
+      if (track%own .and. .not. self%owns(tag%cell)) call reach(self, tag%cell)
+    end associate
   end subroutine note
 
   !> Notes that an own disk has left the domain: it may meet whoever is in the nine cells around.
@@ -174,7 +219,7 @@ contains
     integer(int16), intent(in) :: cell(2)
     integer(int32) :: there(2), dx, dy
 
-    if (any(cell < self%safe_low .or. cell > self%safe_high)) then
+    if (.not. within(cell, self%safe_low, self%safe_high)) then
       self%too_far = .true.
       return
     end if
@@ -187,14 +232,33 @@ contains
     end do
   end subroutine reach
 
+  !> Whether a cell is in a rectangle.
+  pure function within(cell, low, high) result(yes)
+    integer(int16), intent(in) :: cell(2)
+    integer(int32), intent(in) :: low(2), high(2)
+    logical :: yes
+
+    yes = cell(1) >= low(1) .and. cell(1) <= high(1) .and. cell(2) >= low(2) .and. cell(2) <= high(2)
+  end function within
+
   !> Whether a cell belongs to the domain.
   pure function owns(self, cell) result(yes)
     class(domain_grid_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
 
-    yes = all(cell >= self%own_low .and. cell <= self%own_high)
+    yes = within(cell, self%own_low, self%own_high)
   end function owns
+
+  !> Whether a disk is an own one.
+  pure function is_own(self, tag) result(yes)
+    class(domain_grid_t), intent(in) :: self
+    type(tag_t), intent(in) :: tag
+    logical :: yes
+
+    yes = tag%track == 0
+    if (.not. yes) yes = self%track(tag%track)%own
+  end function is_own
 
   !> Whether a disk that was in these columns and rows, and nowhere else, could have met an own one.
   pure function could_have_met(self, low, high) result(yes)

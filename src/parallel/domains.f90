@@ -2,10 +2,10 @@
 !> for copies of those around, up to the ends of a patch. There its world ends: who should come in is missing, and wrong
 !> histories creep inwards, until `domain_borders` puts them right.
 module domains
-  use kinds, only: int32, int64, real64
+  use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
   use disks, only: disk_t, tag_t
-  use domain_grid, only: copy, deep, domain_grid_t, forever, rim, track_t, vacant
+  use domain_grid, only: domain_grid_t, forever
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t
@@ -14,21 +14,20 @@ module domains
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, report_t
+  public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, next_time, news_t
 
   integer, parameter :: log_capacity = 1024
+  integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
 
-  !> What an own disk near the border did in a window, and where it is now. Columns and rows are those of the box, beyond
-  !> a periodic side counted on.
-  type :: report_t
+  !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
+  type :: news_t
     type(disk_t) :: disk
     type(tag_t) :: tag
-    type(track_t) :: track
     integer(int64) :: image(2) = 0
     integer(int32) :: home = 0                     !! number of the disk in the whole simulation
-    integer(int32) :: low(2) = 0, high(2) = 0      !! columns and rows where it was
-    integer(int32) :: cell(2) = 0
-  end type report_t
+    integer(int32) :: cell(2) = 0                  !! in this domain's patch, or beyond its ends
+    integer(int32) :: slot = 0                     !! of the copy; 0: none
+  end type news_t
 
   type :: domain_t
     integer(int32) :: low(2) = 0, high(2) = 0      !! columns, rows of the whole grid that it owns
@@ -37,29 +36,70 @@ module domains
     type(patch_t) :: patch
     type(simulation_t) :: sim                      !! own disks and copies in slots, clocks since the epoch of the whole
     type(event_driven_t) :: engine
-    integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation
-    integer(int32) :: n_reports = 0
-    type(report_t), allocatable :: reported(:)     !! (n_reports, and room for more)
+    integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation; or next vacant slot
+    integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
     type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
-    integer(int32) :: n_vacant = 0
-    integer(int32), allocatable :: vacancy(:)      !! (n_vacant) slots
+    integer(int32) :: n_news = 0
+    type(news_t), allocatable :: news(:)           !! (n_news, and room for more) to be taken over
     integer(int32), allocatable, private :: key(:), slot(:)  !! (0:) the copies by their ids: a hash table
     integer(int32), private :: last_key = 0        !! one less than a power of two
-    logical, allocatable :: same(:)       !! of the reports that came from the neighbours
   end type domain_t
 
 contains
 
   !> Fills a domain with the disks that are in its patch, and predicts their events.
-  subroutine load(self, sim, member)
+  subroutine load(self, sim, cell)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: member(:)        !! numbers of the disks
-    integer(int32) :: k, slots
+    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) of the whole grid
+    logical :: column(self%patch%whole(1)), row(self%patch%whole(2))
+    integer(int32) :: i, n, slots
 
-    slots = size(member, kind=int32) + size(member, kind=int32)/8 + 200
+    column = [(modulo(i - self%patch%first(1), self%patch%whole(1)) < self%patch%n(1), i=1, self%patch%whole(1))]
+    row = [(modulo(i - self%patch%first(2), self%patch%whole(2)) < self%patch%n(2), i=1, self%patch%whole(2))]
+    n = 0
+    do i = 1, sim%n_disks()
+      if (column(cell(1, i)) .and. row(cell(2, i))) n = n + 1
+    end do
+    call make_room(self, sim, n)
+    n = 0
+    do i = 1, sim%n_disks()
+      if (.not. (column(cell(1, i)) .and. row(cell(2, i)))) cycle
+      n = n + 1
+      self%sim%disk(n) = sim%disk(i)
+      self%sim%tag(n) = sim%tag(i)
+      self%sim%tag(n)%track = 0
+      self%home(n) = i
+      if (any(sim%box%periodic)) self%sim%image(:, n) = sim%image(:, i)
+    end do
+    slots = self%sim%n_disks()
+    do i = n + 1, slots
+      self%sim%disk(i) = disk_t(event_time=forever, partner=nothing)
+      self%sim%tag(i) = tag_t()
+      self%home(i) = merge(i + 1, 0, i < slots)
+    end do
+    self%vacant = n + 1
+    self%n_news = 0
+    self%good = .true.
+    self%sim%now = sim%now
+    call self%engine%log%clear()
+    call self%log%clear()
+    call clear_sums(self, sim)
+    select type (grid => self%engine%search)
+    type is (domain_grid_t)
+      call start(self, grid, n)
+    end select
+  end subroutine load
+
+  !> Makes slots for n disks and some more.
+  subroutine make_room(self, sim, n)
+    type(domain_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: n
+    integer(int32) :: slots
+
     if (.not. allocated(self%sim%species)) then
       self%sim%box = sim%box
       self%sim%law = sim%law
@@ -69,36 +109,14 @@ contains
       self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
       allocate (domain_grid_t :: self%engine%search)
     end if
-    if (allocated(self%sim%disk)) then
-      if (size(self%sim%disk) < slots .or. size(self%sim%disk) > 2*slots) deallocate (self%sim%disk)
+    slots = n + n/spare + spare_at_least
+    if (allocated(self%home)) then
+      if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
+      deallocate (self%sim%disk, self%sim%tag, self%sim%image, self%home)
     end if
-    if (.not. allocated(self%sim%disk)) then
-      if (allocated(self%home)) deallocate (self%sim%tag, self%sim%image, self%home, self%vacancy)
-      allocate (self%sim%disk(slots), self%sim%tag(slots), self%home(slots), self%vacancy(slots))
-      allocate (self%sim%image(2, merge(slots, 0, any(sim%box%periodic))))
-    end if
-    slots = self%sim%n_disks()
-    do k = 1, size(member, kind=int32)
-      self%sim%disk(k) = sim%disk(member(k))
-      self%sim%tag(k) = sim%tag(member(k))
-      self%home(k) = member(k)
-    end do
-    if (any(sim%box%periodic)) self%sim%image(:, :size(member)) = sim%image(:, member)
-    self%sim%disk(size(member) + 1:) = disk_t()
-    self%sim%tag(size(member) + 1:) = tag_t()
-    self%sim%disk%event_time = forever
-    self%sim%disk%partner = nothing
-    self%n_vacant = slots - size(member, kind=int32)
-    self%vacancy(:self%n_vacant) = [(slots + 1 - k, k=1, self%n_vacant)]
-    self%sim%now = sim%now
-    call self%engine%log%clear()
-    call self%log%clear()
-    call clear_sums(self, sim)
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      call start(self, grid, size(member, kind=int32))
-    end select
-  end subroutine load
+    allocate (self%sim%disk(slots), self%sim%tag(slots), self%home(slots))
+    allocate (self%sim%image(2, merge(slots, 0, any(sim%box%periodic))))
+  end subroutine make_room
 
   !> Builds cells and queue for the first n slots.
   subroutine start(self, grid, n)
@@ -106,9 +124,8 @@ contains
     type(domain_grid_t), intent(inout) :: grid
     integer(int32), intent(in) :: n
     logical :: cut_low(2), cut_high(2)
-    integer(int32) :: slots, k
+    integer(int32) :: k
 
-    slots = self%sim%n_disks()
     grid%is_part = .true.
     grid%patch = self%patch
     associate (patch => self%patch)
@@ -124,17 +141,11 @@ contains
       if (allocated(grid%reached)) deallocate (grid%reached)
       allocate (grid%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
     end associate
-    if (allocated(grid%role)) then
-      if (size(grid%role) /= slots) deallocate (grid%role, grid%track)
-    end if
-    if (.not. allocated(grid%role)) allocate (grid%role(slots), grid%track(slots))
-    grid%role = vacant
-    grid%role(:n) = copy
     call self%engine%start(self%sim)
     call grid%begin_window()
+    grid%n_tracks = 0
     do k = 1, n
-      if (grid%owns(self%sim%tag(k)%cell)) grid%role(k) = rim
-      call grid%begin_track(self%sim%tag(k), k)
+      call grid%begin_track(self%sim%tag, k)
     end do
     call list_copies(self, grid)
   end subroutine start
@@ -143,23 +154,24 @@ contains
   subroutine list_copies(self, grid)
     type(domain_t), intent(inout) :: self
     type(domain_grid_t), intent(in) :: grid
-    integer(int32) :: n, k, place
+    integer(int32) :: k, place
 
-    n = int(count(grid%role == copy), int32)
-    if (2*n > self%last_key .or. .not. allocated(self%key)) then
+    if (2*grid%n_tracks > self%last_key .or. .not. allocated(self%key)) then
       self%last_key = 255
-      do while (self%last_key < 4*n)
+      do while (self%last_key < 3*grid%n_tracks)
         self%last_key = 2*self%last_key + 1
       end do
       if (allocated(self%key)) deallocate (self%key, self%slot)
       allocate (self%key(0:self%last_key), self%slot(0:self%last_key))
     end if
     self%key = 0
-    do k = 1, size(grid%role, kind=int32)
-      if (grid%role(k) /= copy) cycle
-      place = place_of(self, self%sim%tag(k)%id)
-      self%key(place) = self%sim%tag(k)%id
-      self%slot(place) = k
+    do k = 1, grid%n_tracks
+      associate (track => grid%track(k))
+        if (track%own) cycle
+        place = place_of(self, self%sim%tag(track%slot)%id)
+        self%key(place) = self%sim%tag(track%slot)%id
+        self%slot(place) = track%slot
+      end associate
     end do
   end subroutine list_copies
 
@@ -217,6 +229,8 @@ contains
     type(limits_t) :: limits
     type(error_t), allocatable :: error
 
+    self%done = .false.
+    if (.not. self%good) return                    ! there was no room for all copies
     limits%time = t_end
     limits%turns = turns
     do
@@ -227,6 +241,16 @@ contains
     call take_log(self)
     self%done = self%sim%now >= t_end .and. .not. allocated(error)
   end subroutine move_on
+
+  !> When the next event is due.
+  function next_time(self) result(t)
+    type(domain_t), intent(inout) :: self
+    real(real64) :: t                              !! since the epoch [time]
+    integer(int32) :: i
+
+    call self%engine%queue%first(self%sim%disk, self%sim%tag, i)
+    t = self%sim%disk(i)%event_time
+  end function next_time
 
   !> Switches the list of collisions on or off.
   subroutine keep_log(self, on)
@@ -264,8 +288,8 @@ contains
 
     select type (grid => self%engine%search)
     type is (domain_grid_t)
-      do k = 1, size(grid%role, kind=int32)
-        if (grid%role(k) /= deep .and. grid%role(k) /= rim) cycle
+      do k = 1, self%sim%n_disks()
+        if (self%sim%tag(k)%id == 0 .or. .not. grid%is_own(self%sim%tag(k))) cycle
         sim%disk(self%home(k)) = self%sim%disk(k)
         sim%tag(self%home(k)) = self%sim%tag(k)
         if (size(self%sim%image) > 0) sim%image(:, self%home(k)) = self%sim%image(:, k)

@@ -3,11 +3,12 @@
 !> to the state in which they set out. What is rare and awkward is left to the plain engine: small or idle systems, a
 !> moment within simultaneous collisions, a collapse.
 module parallel_events
-  use kinds, only: int32, int64, real64
+  use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
-  use domain_borders, only: publish, refresh, verify
+  use cell_grid, only: whole_box
+  use domain_borders, only: refresh, verify
   use domain_cuts, only: domain_cuts_t
-  use domains, only: clear_sums, domain_t, gather, keep_log, load, merge_logs, move_on
+  use domains, only: clear_sums, domain_t, gather, keep_log, load, merge_logs, move_on, next_time
   use epochs, only: begin_first_epoch, most_events, move_epoch, stands_still
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -20,9 +21,10 @@ module parallel_events
   private
   public :: parallel_events_t
 
-  real(real64), parameter :: longest_visit = 0.5_real64        !! until the caller can look at signals and clocks [s]
-  integer, parameter :: most_windows = 8                       !! of a visit
+  real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
+  integer, parameter :: most_windows = 24                      !! of a visit
   real(real64), parameter :: turns_per_event = 20.0_real64
+  real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken one by one
   real(real64), parameter :: shortest = 0.01_real64            !! window to be tried, in usual ones
   !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
@@ -32,8 +34,8 @@ module parallel_events
   type, extends(evolution_t) :: parallel_events_t
     type(event_driven_t) :: plain                  !! the engine for all that is not worth more
     integer(int32) :: threads = 1
-    real(real64) :: window = 1.0_real64            !! collisions per disk in a window of time
-    integer(int32) :: halo = 8                     !! columns and rows of copies around a domain
+    real(real64) :: window = 0.5_real64            !! collisions per disk in a window of time
+    integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
     integer(int32) :: least_disks = 1000           !! of a domain
     integer(int64) :: windows_done = 0, windows_failed = 0
     type(domain_t), allocatable, private :: domain(:)
@@ -42,6 +44,7 @@ module parallel_events
     integer, private :: holder = 0                 !! of the events predicted: nobody, the plain engine, the domains
     real(real64), private :: rate = 0.0_real64     !! of events [1/time]
     real(real64), private :: shortening = 1.0_real64   !! of windows, after failures
+    integer(int32), private :: widening = 0        !! of the halo, after failures
     integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
   contains
     procedure :: start
@@ -103,6 +106,7 @@ contains
 
     call move_epoch(sim)
     self%holder = nobody
+    self%widening = max(self%widening - 1, 0)
   end subroutine end_epoch
 
   !> Lets the plain engine go on for a while.
@@ -140,34 +144,27 @@ contains
     type(limits_t), intent(in) :: goal             !! its time counts since the epoch
     logical, intent(out) :: held
     type(event_log_t) :: merged
-    real(real64) :: began, elapsed, t, t_end
+    real(real64) :: began, t
     integer(int32) :: k
     integer :: w
-    logical :: counting, good
+    logical :: good
 
+    began = seconds()
     if (self%holder /= all_domains) call load_all(self, sim)
     held = self%cuts%n > 1
     if (.not. held) return
     self%holder = all_domains
-    began = seconds()
+    do k = 1, self%cuts%n
+      call keep_log(self%domain(k), self%log%is_on())
+    end do
     t = sim%now
     do w = 1, most_windows
-      t_end = window_end(self, sim, t, goal%time)
-      counting = expected(self, sim, t_end - t) >= left(sim, self%domain, goal)
-      if (counting .and. w > 1) exit
-      do k = 1, self%cuts%n
-        call keep_log(self%domain(k), counting .or. self%log%is_on())
-      end do
-      call run_window(self, sim, t, t_end, refreshing=w > 1, good=good)
-      if (.not. good) exit
-      t = t_end
-      elapsed = seconds() - began
-      if (counting .or. .not. t < goal%time .or. elapsed > longest_visit) exit
+      call run_window(self, sim, goal, t, good)
+      if (.not. good .or. .not. t < goal%time .or. .not. left(sim, self%domain, goal) > 0) exit
       if (stop_requested()) exit
+      if (seconds() - began > longest_visit) exit
     end do
-    counting = counting .and. w == 1
-    if (good .and. (counting .or. self%log%is_on())) call merge_logs(self%domain, merged, good)
-    if (good .and. counting) call go_back_to_goal(self, sim, goal, merged, t, good)
+    if (good .and. self%log%is_on()) call merge_logs(self%domain, merged, good)
     if (good) held = sim%dissipated%value() + sum(self%domain%sim%dissipated%value()) < goal%dissipated &
       .and. t - sim%last_advance >= sim%blink      ! else the plain engine looks for a collapse
     if (good .and. held) then
@@ -217,37 +214,6 @@ contains
       real(goal%collisions - sim%collisions - sum(domain%sim%collisions), real64))
   end function left
 
-  !> If the window passed the limit of a count, does it again up to there. The moment is known from the list of collisions;
-  !> with several at that very moment it is not good enough.
-  subroutine go_back_to_goal(self, sim, goal, merged, t, good)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    type(limits_t), intent(in) :: goal
-    type(event_log_t), intent(inout) :: merged
-    real(real64), intent(inout) :: t               !! in: end of the window; out: of the shorter one, since the epoch [time]
-    logical, intent(out) :: good
-    integer(int64) :: collisions
-    integer :: k
-
-    good = .true.
-    collisions = sim%collisions
-    do k = 1, merged%n
-      if (merged%record(3, k) > 0) collisions = collisions + 1
-      if (sim%events + k >= goal%events .or. collisions >= goal%collisions) exit
-    end do
-    if (k > merged%n) return
-    if (k < merged%n) good = merged%record(1, k + 1) > merged%record(1, k)
-    if (.not. good) return
-    t = merged%record(1, k)
-    merged%n = k
-    call load_all(self, sim)
-    call run_window(self, sim, sim%now, t, refreshing=.false., good=good)
-    good = good .and. sum(self%domain%sim%events) == k
-    do k = 1, self%cuts%n
-      call self%domain(k)%log%clear()              ! the list is known already
-    end do
-  end subroutine go_back_to_goal
-
   !> Events per time that are to be expected.
   pure function rate_of(self, sim) result(rate)
     class(parallel_events_t), intent(in) :: self
@@ -262,75 +228,116 @@ contains
   subroutine load_all(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    type(patch_t), allocatable :: patch(:)
-    integer(int32), allocatable :: first(:), member(:)
-    integer(int32) :: k
+    type(patch_t) :: whole
+    integer(int16), allocatable :: cell(:, :)
+    integer(int32) :: i, k
 
-    call self%cuts%cut(sim, self%wanted, self%halo)
-    if (self%cuts%n < 2 .or. self%cuts%whole%small < maxval(sim%disk%radius)) then
-      self%cuts%n = 1
-      return
-    end if
+    whole = whole_box(sim)
+    self%cuts%n = 1
+    if (whole%small < maxval(sim%disk%radius)) return
+    allocate (cell(2, sim%n_disks()))
+    !$omp parallel do num_threads(self%threads)
+    do i = 1, sim%n_disks()
+      cell(:, i) = int(whole%cell_at(sim%position(i)), int16)
+    end do
+    !$omp end parallel do
+    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%halo + self%widening)
+    if (self%cuts%n < 2) return
     if (allocated(self%domain)) then
       if (size(self%domain) /= self%cuts%n) deallocate (self%domain)
     end if
     if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
-    patch = [(self%cuts%patch_of(k, sim%box%periodic), k=1, self%cuts%n)]
-    call self%cuts%list_members(sim, patch, first, member)
-    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
-      self%domain(k)%patch = patch(k)
-      self%domain(k)%halo = self%halo
-      self%domain(k)%low = self%cuts%low(:, k)
-      self%domain(k)%high = self%cuts%high(:, k)
-      self%domain(k)%neighbour = self%cuts%neighbours_of(k, patch(k))
-      call load(self%domain(k), sim, member(first(k):first(k + 1) - 1))
+      associate (domain => self%domain(k))
+        domain%patch = self%cuts%patch_of(k, sim%box%periodic)
+        domain%halo = self%cuts%halo
+        domain%low = self%cuts%low(:, k)
+        domain%high = self%cuts%high(:, k)
+        domain%neighbour = self%cuts%neighbours_of(k, domain%patch)
+        call load(domain, sim, cell)
+      end associate
     end do
     !$omp end parallel do
   end subroutine load_all
 
-  !> Runs one window in all domains. `good`: it holds.
-  subroutine run_window(self, sim, t, t_end, refreshing, good)
+  !> Runs one window in all domains, which first take over what came of the one before. It ends early at the limit of a
+  !> count. `good`: it holds.
+  subroutine run_window(self, sim, goal, t, good)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: t, t_end           !! since the epoch [time]
-    logical, intent(in) :: refreshing              !! the domains have not yet taken over what came of the window before
+    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    real(real64), intent(inout) :: t               !! since the epoch [time]
     logical, intent(out) :: good
-    integer(int64) :: events, turns                ! the latter of one engine, of which some collisions take several
+    integer(int64) :: events
     integer(int32) :: k
+    real(real64) :: t_begin, t_end
 
     events = sum(self%domain%sim%events)
-    turns = int(turns_per_event*expected(self, sim, t_end - t), int64)
-    self%domain%good = .true.
-    if (refreshing) then
-      !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
-      do k = 1, self%cuts%n
-        call refresh(self%domain, k)
-      end do
-      !$omp end parallel do
-    end if
-    good = all(self%domain%good)
-    if (.not. good) return
-    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    t_begin = t
+    t_end = window_end(self, sim, t, goal%time)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
-      call move_on(self%domain(k), t_end, turns)
-      call publish(self%domain(k))
+      call refresh(self%domain(k))
     end do
     !$omp end parallel do
-    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    do
+      call stride(self, sim, goal, t, t_end)
+      good = all(self%domain%done)
+      if (.not. (good .and. t < t_end .and. left(sim, self%domain, goal) > 0)) exit
+    end do
+    !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       call verify(self%domain, k)
     end do
     !$omp end parallel do
-    good = all(self%domain%good)
+    good = all(self%domain%good) .and. left(sim, self%domain, goal) >= 0     ! else several at the last moment
     self%windows_done = self%windows_done + 1
     if (.not. good) then
       self%windows_failed = self%windows_failed + 1
+      self%widening = min(self%widening + 2, self%halo)
     else
-      if (t_end > t) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t_end - t)
+      if (t > t_begin) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t - t_begin)
       self%shortening = min(1.0_real64, 1.1_real64*self%shortening)
     end if
   end subroutine run_window
+
+  !> Lets all domains go on, to the end of the window unless a count would pass its limit: then most of the way there and,
+  !> in the end, from event to event.
+  subroutine stride(self, sim, goal, t, t_end)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: goal
+    real(real64), intent(inout) :: t               !! since the epoch [time]
+    real(real64), intent(in) :: t_end              !! likewise
+    integer(int64) :: turns                        ! of one engine, of which some collisions take several
+    integer(int32) :: k
+    real(real64) :: sure, t_next
+    logical :: stepping
+
+    turns = int(turns_per_event*expected(self, sim, t_end - t), int64)
+    t_next = t_end
+    sure = left(sim, self%domain, goal)
+    stepping = .false.
+    if (sure <= expected(self, sim, t_end - t)) then
+      sure = 0.9_real64*sure - 5*sqrt(sure)
+      stepping = sure < few_events
+      if (stop_requested()) stepping = .false.     ! see `advance` of the engine
+      if (stepping) then
+        do k = 1, self%cuts%n
+          t_next = min(t_next, next_time(self%domain(k)))
+        end do
+      else
+        t_next = min(t_next, t + sure/rate_of(self, sim))
+      end if
+    end if
+    !$omp parallel do schedule(static, 1) num_threads(self%threads) if (.not. stepping)
+    do k = 1, self%cuts%n
+      call move_on(self%domain(k), t_next, turns)
+    end do
+    !$omp end parallel do
+    t = t_next
+  end subroutine stride
 
   !> Adds collisions to a log.
   pure subroutine append_log(log, epoch, more)
@@ -352,13 +359,11 @@ contains
     real(real64), intent(in) :: now                !! since the epoch [time]
     integer(int32) :: k
 
-    !$omp parallel do schedule(dynamic, 1) num_threads(self%threads)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       call gather(self%domain(k), sim)
-      call refresh(self%domain, k)
     end do
     !$omp end parallel do
-    if (.not. all(self%domain%good)) self%holder = nobody
     sim%now = now
     do k = 1, self%cuts%n
       associate (own => self%domain(k)%sim)

@@ -28,7 +28,7 @@ module cell_grid
     type(patch_t), public :: patch                 !! the cells; chosen here unless they are only a part of the box
     logical, public :: is_part = .false.
     type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
-    logical :: roomy = .false.                     !! cells overlap: a disk that collides chooses its cell again
+    logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
     type(cell_contents_t) :: cells                 !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells

@@ -10,7 +10,7 @@ module memory
   public :: check_memory, available_memory, number_after
 
   ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
-  integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 460, &
+  integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 410, &
     besides = 25000000
   integer(int64), parameter :: unlimited = huge(1_int64)
   ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.

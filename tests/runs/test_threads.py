@@ -1,13 +1,16 @@
 """One run on several cores: the bits of one core, whatever is written and however it is stopped."""
 
 import random
+import re
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from whole_runs import FINISHED, STOPPED, differences, write_input
 
 CHECK = pytest.mark.check
+INPUTS = Path(__file__).resolve().parents[2] / "input"
 
 #: About the size at which several cores begin to pay.
 GAS = "&species name = 'gas' count = 5000 packing_fraction = {} placement = '{}' temperature = 1 /"
@@ -98,3 +101,32 @@ def test_a_run_goes_on_with_other_threads(program, whole):
         # a signal before there is output ends the program as it would any other
         assert process.returncode in (STOPPED, -15), message
     assert differences(whole / "one.h5", whole / "parts.h5") == []
+
+
+COUNT = re.compile(r"^( *count = )(\d+)", re.MULTILINE)
+RADIUS = re.compile(r"^( *radius = )([\d.]+)", re.MULTILINE)
+
+
+def scaled(text, disks):
+    """An input with about so many disks, packed as before; a few disks stay as they are."""
+    factor = disks / max(sum(int(match[2]) for match in COUNT.finditer(text)), 1)
+
+    def scale(match):
+        group = COUNT.sub(lambda m: f"{m[1]}{round(int(m[2]) * factor)}", match[0])
+        return RADIUS.sub(lambda m: f"{m[1]}{float(m[2]) / factor**0.5}", group)
+
+    if factor > disks / 30:
+        return text
+    return re.sub(r"^&species(?![^&]*relative_to)[^&]*", scale, text, flags=re.MULTILINE)
+
+
+@CHECK
+@pytest.mark.parametrize("name", sorted(path.stem for path in INPUTS.glob("*.nml")))
+def test_every_input_gives_the_same_with_threads(program, tmp_path, name):
+    write_input(tmp_path, scaled((INPUTS / f"{name}.nml").read_text(), 10_000))
+    for threads in 1, 2, 3:
+        options = f"--set=run.threads={threads}", "--set=stop.events=30000"
+        done = run(program, tmp_path, f"{threads}.h5", *options)
+        assert done.returncode == FINISHED, done.stderr
+    assert differences(tmp_path / "1.h5", tmp_path / "2.h5") == []
+    assert differences(tmp_path / "1.h5", tmp_path / "3.h5") == []
