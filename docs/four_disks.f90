@@ -45,7 +45,6 @@ contains
     sim%law%restitution = reshape([1.0_real64], [1, 1])
     sim%box%upper = 4
     sim%species(1)%count = n
-    sim%species(1)%radius = radius
     sim%disk%radius = radius
     do i = 1, n
       sim%disk(i)%x = x(:, i)
