@@ -159,7 +159,8 @@ unit-tests:
 	  $(BUILD)/unit_tests $$(sed 's,.*(\(.*\)_suite),$(suites)/\1.pf,' $(T)/tests.inc)
 
 demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
-	@.ci/set-up demo && $(MAKE) $(jobs) all
+	@.ci/set-up demo
+	@$(MAKE) $(jobs) all
 	$(BUILD)/ricochet input/crater.nml -o runs/demo/crater.h5 --force --set output.frames_every_time=0.002 --set output.event_log=.true.
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas.h5 --force
 	$(BUILD)/ricochet input/gas.nml -o runs/demo/gas_start.h5 --force --set stop.collisions_per_disk=8 \
@@ -172,7 +173,8 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)
-	@.ci/set-up demo && $(MAKE) $(jobs) all
+	@.ci/set-up demo
+	@$(MAKE) $(jobs) all
 	@runs/figures.sh
 
 test:  ## sets up, then unit tests and whole runs (two minutes)
@@ -183,7 +185,8 @@ test:  ## sets up, then unit tests and whole runs (two minutes)
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
 
 check:  ## validates the physics and provokes faults (minutes)
-	@.ci/set-up demo test check && $(MAKE) $(jobs) all
+	@.ci/set-up demo test check
+	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
@@ -192,7 +195,8 @@ bench: all  ## measures collisions per second; FULL=1: and more
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
 
 bench-check:  ## counts instructions per collision against what is promised
-	@.ci/set-up bench && $(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
+	@.ci/set-up bench
+	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@RICOCHET=$(BUILD)/v3/ricochet runs/bench.sh --check
 
 # Unit tests, runs that write, stop and resume, damaged input. Leaks do not count in unit tests: gfortran 12 never
@@ -208,7 +212,8 @@ sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 
 lint:  ## warnings, style, and the rules of the design
-	@.ci/set-up lint && $(MAKE) $(jobs) --keep-going --output-sync $(lints)
+	@.ci/set-up lint
+	@$(MAKE) $(jobs) --keep-going --output-sync $(lints)
 
 lints := lint-compiler lint-flang lint-fortran lint-python lint-shell
 lint-compiler:

@@ -304,6 +304,8 @@ def main() -> None:
     if args.colour == "psi6":
         raise RunError("--colour psi6 is for snapshot.py and animate.py")
     if args.live:
+        if args.output:
+            raise RunError("--live writes no file: leave out -o")
         print(serve(run, page(run, None), lambda now: texts(*chosen_film(now, args, LIVE_ROOM)[1])))
         return
     path = args.output or Path(run.path.name).with_suffix(".html")

@@ -102,6 +102,8 @@ def colour_map(colour: str) -> str:
 
 def chosen_colour(run: Run, wish: str | None) -> str:
     """The wish if the run has the data; without one by species where there are several."""
+    if wish not in (None, "species", *LABELS):
+        raise RunError(f"colour {wish!r}: choose species, {', '.join(LABELS)}")
     if wish == "collisions" and run.collisions is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     return wish or ("species" if len(run.names) > 1 else "speed")

@@ -19,7 +19,7 @@ from .drawing import (
     values_of,
     warn,
 )
-from .reader import Run
+from .reader import Run, RunError
 
 
 def colour_limits(run: Run, frames: Sequence[int], colour: str) -> tuple[float, float]:
@@ -40,6 +40,8 @@ def animate(
     (`drawing.STYLE`) shows the film with buttons; its `save(path)` writes a file.
     """
     frames = range(run.frames) if frames is None else frames
+    if not len(frames):
+        raise RunError(f"{run.path}: no frames for a film")
     colour = chosen_colour(run, colour)
     aspect = run.edges[1] / run.edges[0]
     height = min(6.4, 6.4 * aspect)

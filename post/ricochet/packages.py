@@ -10,7 +10,10 @@ from pathlib import Path
 missing = [name for name in ("numpy", "h5py", "matplotlib", "scipy", "tqdm") if not find_spec(name)]
 if missing:
     script, root = Path(sys.argv[0]).resolve(), Path(__file__).resolve().parents[2]
-    way = f"`make demo` in {root} installs them for {root / '.venv/bin/python'}"
+    if (root / "Makefile").exists():
+        way = f"`make demo` in {root} installs them for {root / '.venv/bin/python'}"
+    else:
+        way = f"`{sys.executable} -m pip install {' '.join(missing)}` does, best in a venv"
     reason = f"{sys.executable} has no {', '.join(missing)}; {way}"
     if script.parent != root / "post":
         raise ImportError(reason)

@@ -211,7 +211,8 @@ contains
     character(len=:), allocatable :: text
 
     text = "ricochet "//program_version//eol//"commit:   "//git_commit//eol// &
-      "compiler: "//compiler_version()//eol//"flags:    "//build_flags//eol//"HDF5:     "//hdf5_version()
+      "compiler: "//compiler_version()//eol//"flags:    "//build_flags//eol//"HDF5:     "//hdf5_version()//eol// &
+      "threads:  "//trim(merge("as run.threads says", "one, no OpenMP     ", index(build_flags, "-fopenmp") > 0))
   end function version_text
 
   !> One screen.

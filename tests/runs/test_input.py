@@ -204,7 +204,7 @@ def test_the_version_names_all_that_a_report_needs(ricochet):
     lines = ricochet("--version").stdout.splitlines()
     assert re.fullmatch(r"ricochet \d+\.\d+\.\d+", lines[0])
     facts = dict(line.split(":", 1) for line in lines[1:])
-    assert set(facts) == {"commit", "compiler", "flags", "HDF5"}
+    assert set(facts) == {"commit", "compiler", "flags", "HDF5", "threads"}
     assert re.fullmatch(r" +([0-9a-f]{7,40}|unknown)(\+changes)?", facts["commit"])
     assert "GCC" in facts["compiler"] and "-std=f2008" in facts["flags"]
     assert re.fullmatch(r" +\d+\.\d+\.\d+", facts["HDF5"])
