@@ -14,6 +14,7 @@ module run_setup
   use namelist_input, only: read_settings
   use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
+  use parameters, only: most_threads
   use renumbering, only: renumber
   use run_input, only: run_input_t
   use settings, only: run_settings_t, settings_t
@@ -115,7 +116,7 @@ contains
     call get_environment_variable("OMP_NUM_THREADS", value)
     read (value, *, iostat=status) n
     if (status /= 0 .or. n < 1) n = 1
-    n = min(n, 1024)
+    n = min(n, most_threads)
   end function threads_for
 
 end module run_setup

@@ -83,7 +83,7 @@ contains
     real(real64) :: drift(2), mass(sim%n_disks())
     integer(int32) :: i
 
-    mass = [(sim%mass_of(i), i=1, sim%n_disks())]
+    mass = sim%masses()
     drift = 0
     do i = 1, sim%n_disks()
       drift = drift + mass(i)*sim%velocity(i)

@@ -8,9 +8,10 @@ module parameters
   implicit none
   private
   public :: parameter_t, table, group_names, obstacle_groups, is_repeated, variables_of, row_of, full_names, words_of
-  public :: allowed, either, defaults_text, explain, smallest, largest, name_length
+  public :: allowed, either, defaults_text, explain, smallest, largest, most_threads, name_length
 
   integer, parameter :: name_length = 28
+  integer, parameter :: most_threads = 1024
   real(real64), parameter :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
   real(real64), parameter :: largest = 1.0e100_real64      !! squared or multiplied
 
@@ -27,7 +28,7 @@ module parameters
   type(range_t), parameter :: anything = range_t(-largest, largest, "")
   type(range_t), parameter :: positive = range_t(smallest, largest, "> 0")
   type(range_t), parameter :: not_negative = range_t(0, largest, ">= 0")
-  type(range_t), parameter :: up_to_1024 = range_t(0, 1024, "from 0 to 1024")
+  type(range_t), parameter :: number_of_threads = range_t(0, most_threads, "from 0 to 1024")
   type(range_t), parameter :: unit_interval = range_t(0, 1, "from 0 to 1")
   type(range_t), parameter :: fraction = range_t(smallest, nearest(1.0_real64, -1.0), "> 0 and < 1")
   type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
@@ -69,7 +70,7 @@ module parameters
     parameter_t("run", "queue", "text", 1, "default", "'calendar'", "event queue; same trajectory", &
       choices="calendar heap"), &
     parameter_t("run", "threads", "integer", 1, "default", "0", &
-      "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", up_to_1024)]
+      "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", number_of_threads)]
 
   type(parameter_t), parameter :: box_rows(*) = [ &
     parameter_t("box", "lower", "real", 2, "default", "0, 0", "lower left corner", unit="length"), &

@@ -98,7 +98,7 @@ contains
     integer(int32) :: i
 
     sunk = 0.5_real64*abs(sim%box%gravity)*dt*sim%now
-    fall = sum([(sim%mass_of(i), i=1, sim%n_disks())])*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
+    fall = sum(sim%masses())*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
     flaw = ""
     do i = 1, sim%n_disks()
       associate (speed => sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)))

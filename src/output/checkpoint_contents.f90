@@ -2,7 +2,7 @@
 !> come. It is written to a file of its own, and into the output of a finished run.
 module checkpoint_contents
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
@@ -191,7 +191,6 @@ contains
     type(simulation_t), intent(inout) :: sim
     real(real64), allocatable :: masses(:)
     integer(int64) :: n
-    integer(int32) :: i
     integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
@@ -225,7 +224,7 @@ contains
     if (sim%own_sizes) then
       call file%exchange("disks/radius", sim%disk%radius, sizes)
       allocate (masses(n), source=1.0_real64)
-      if (file%writing) masses(sim%tag%id) = [(sim%mass_of(i), i=1, sim%n_disks())]
+      if (file%writing) masses(sim%tag%id) = sim%masses()
       call file%exchange("masses", masses, sizes)
       if (.not. file%writing) call sim%take_masses(masses)
     end if

@@ -97,7 +97,7 @@ contains
     call file%put(disk_id, [size(numbers)], numbers)
     numbers(sim%tag%id) = sim%tag%species
     call file%put(disk_species, [size(numbers)], numbers)
-    sizes(sim%tag%id) = [(sim%mass_of(i), i=1, sim%n_disks())]
+    sizes(sim%tag%id) = sim%masses()
     call file%put(disk_mass, [size(sizes)], sizes)
     sizes(sim%tag%id) = sim%disk%radius
     call file%put(disk_radius, [size(sizes)], sizes)

@@ -274,7 +274,7 @@ contains
     do k = 1, self%engine%log%n
       associate (record => self%engine%log%record(:, k))
         if (copy_of(self, int(record(2), int32)) > 0) cycle
-        call self%log%append(record(1), int(record(2), int32), int(record(3), int32), record(4))
+        call self%log%append_record(record)
       end associate
     end do
     call self%engine%log%clear()
@@ -317,9 +317,7 @@ contains
       m = minloc(head, dim=1)
       if (.not. head(m) < huge(head)) exit
       good = good .and. count(head <= head(m)) == 1
-      associate (record => domain(m)%log%record(:, next(m)))
-        call merged%append(record(1), int(record(2), int32), int(record(3), int32), record(4))
-      end associate
+      call merged%append_record(domain(m)%log%record(:, next(m)))
       next(m) = next(m) + 1
     end do
     do k = 1, size(domain)

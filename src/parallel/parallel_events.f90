@@ -347,8 +347,7 @@ contains
     integer :: k
 
     do k = 1, more%n
-      call log%append(epoch + more%record(1, k), int(more%record(2, k), int32), int(more%record(3, k), int32), &
-        more%record(4, k))
+      call log%append_record([epoch + more%record(1, k), more%record(2:, k)])
     end do
   end subroutine append_log
 

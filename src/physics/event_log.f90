@@ -17,6 +17,7 @@ module event_log
     procedure :: is_on
     procedure :: is_full
     procedure :: append
+    procedure :: append_record
     procedure :: clear
   end type event_log_t
 
@@ -51,12 +52,20 @@ contains
     if (self%is_on()) yes = 2*self%n >= size(self%record, 2)
   end function is_full
 
-  !> Lists a collision. The list grows only if one time step needs more than the free half.
+  !> Lists a collision.
   pure subroutine append(self, time, i, j, impulse)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: time
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: impulse
+
+    call self%append_record([time, real(i, real64), real(j, real64), impulse])
+  end subroutine append
+
+  !> Lists a collision from another list. The list grows only if one time step needs more than the free half.
+  pure subroutine append_record(self, record)
+    class(event_log_t), intent(inout) :: self
+    real(real64), intent(in) :: record(4)
     real(real64), allocatable :: longer(:, :)
 
     if (self%n == size(self%record, 2)) then
@@ -65,8 +74,8 @@ contains
       call move_alloc(longer, self%record)
     end if
     self%n = self%n + 1
-    self%record(:, self%n) = [time, real(i, real64), real(j, real64), impulse]
-  end subroutine append
+    self%record(:, self%n) = record
+  end subroutine append_record
 
   !> Empties the list.
   pure subroutine clear(self)

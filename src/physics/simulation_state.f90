@@ -45,6 +45,7 @@ module simulation_state
     procedure :: time
     procedure :: n_disks
     procedure :: mass_of
+    procedure :: masses
     procedure :: take_masses
     procedure :: position
     procedure :: velocity
@@ -83,6 +84,15 @@ contains
       mass = self%species(self%tag(i)%species)%mass
     end if
   end function mass_of
+
+  !> Masses of all disks, in their order.
+  pure function masses(self) result(mass)
+    class(simulation_t), intent(in) :: self
+    real(real64) :: mass(size(self%disk))         !! [mass]
+    integer(int32) :: i
+
+    mass = [(self%mass_of(i), i=1, self%n_disks())]
+  end function masses
 
   !> Keeps masses of all disks, as few as possible.
   pure subroutine take_masses(self, mass)

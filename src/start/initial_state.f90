@@ -73,15 +73,17 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(inout) :: error
     type(random_stream_t) :: stream
+    real(real64) :: mass(size(sim%disk))
     logical :: balanced
     integer :: s, first
 
+    mass = sim%masses()
     balanced = all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. .not. sim%box%falling()
     first = 1
     do s = 1, size(settings%species)
       associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
         call stream%seed(settings%run%seed, [s, purpose])
-        call draw_velocities(species, masses(first, last), stream, balanced, sim%disk(first:last))
+        call draw_velocities(species, mass(first:last), stream, balanced, sim%disk(first:last))
         first = last + 1
       end associate
     end do
@@ -90,20 +92,10 @@ contains
     do s = 1, size(settings%species)
       associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
         if (species%exact_temperature >= 0 .and. .not. allocated(error)) &
-          call scale_to_temperature(species, masses(first, last), sim%disk(first:last), error)
+          call scale_to_temperature(species, mass(first:last), sim%disk(first:last), error)
         first = last + 1
       end associate
     end do
-  contains
-
-    !> Masses of some disks.
-    pure function masses(first, last)
-      integer, intent(in) :: first, last
-      real(real64) :: masses(last - first + 1)
-      integer(int32) :: i
-
-      masses = [(sim%mass_of(i), i=int(first, int32), int(last, int32))]
-    end function masses
   end subroutine set_in_motion
 
   !> Warns of a disk that starts so low above the floor that it would hardly do anything but bounce; empty if there is none.

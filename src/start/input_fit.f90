@@ -9,6 +9,7 @@ module input_fit
   use packing, only: packing_t
   use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
+  use position_file, only: radius_row
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use starting_disks, only: read_disks, resolution
@@ -81,9 +82,9 @@ contains
         end if
         s%count = size(rows)
         call group%put_text("count", written(s%count))
-        if (s%radius_in_file) s%radius = maxval(table(5, :))
+        if (s%radius_in_file) s%radius = maxval(table(radius_row, :))
         if (all(s%region([1, 3]) < s%region([2, 4]))) call group%put_reals("packing_fraction", &
-          [pi*sum(table(5, :)**2)/product(s%region([2, 4]) - s%region([1, 3]))])
+          [pi*sum(table(radius_row, :)**2)/product(s%region([2, 4]) - s%region([1, 3]))])
       end associate
     end do
   end subroutine survey_files

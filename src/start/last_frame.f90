@@ -8,6 +8,7 @@ module last_frame
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use parameters, only: largest, smallest
+  use position_file, only: mass_row, radius_row
   use texts, only: counted, joined, written
   implicit none
   private
@@ -75,8 +76,8 @@ contains
       call read_vectors(file, position//value_of, n, chosen, table(1:2, :))
       call read_vectors(file, velocity//value_of, n, chosen, table(3:4, :))
       there(5:6) = [file%length(disk_radius), file%length(disk_mass)] >= 0
-      if (there(5)) call read_numbers(file, disk_radius, n, chosen, table(5, :))
-      if (there(6)) call read_numbers(file, disk_mass, n, chosen, table(6, :))
+      if (there(radius_row)) call read_numbers(file, disk_radius, n, chosen, table(radius_row, :))
+      if (there(mass_row)) call read_numbers(file, disk_mass, n, chosen, table(mass_row, :))
       if (present(box)) then
         lower = 0
         edges = 1

@@ -17,6 +17,7 @@ module placement
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
+  use position_file, only: mass_row, radius_row
   use starting_disks, only: origin, read_disks
   use status_line, only: status_line_t
   use texts, only: legible, written
@@ -113,9 +114,9 @@ contains
     call read_disks(species, s, sim%box, table, rows, error)
     if (allocated(error)) return
     x = table(1:2, :)
-    radius = table(5, :)
-    if (.not. allocated(sim%mass)) sim%mass = [(sim%mass_of(int(k, int32)), k=1, size(sim%disk))]
-    sim%mass(offset(species, s) + 1:offset(species, s) + size(rows)) = table(6, :)
+    radius = table(radius_row, :)
+    if (.not. allocated(sim%mass)) sim%mass = sim%masses()
+    sim%mass(offset(species, s) + 1:offset(species, s) + size(rows)) = table(mass_row, :)
     do k = 1, size(rows)
       if (species(s)%velocities == "file") sim%disk(offset(species, s) + k)%v = table(3:4, k)
     end do

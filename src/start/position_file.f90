@@ -9,10 +9,11 @@ module position_file
   use texts, only: counted, joined, place_of, shown, suggestion, written
   implicit none
   private
-  public :: column_names, read_positions
+  public :: column_names, radius_row, mass_row, read_positions
 
   !> What is known of a disk, in the order of the rows of a table.
   character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "radius", "mass"]
+  integer, parameter :: radius_row = 5, mass_row = 6
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
   integer, parameter :: species_column = size(known_names)
   integer, parameter :: longest_line = 1024

@@ -8,7 +8,7 @@ module starting_disks
   use h5md_layout, only: disk_mass, disk_radius, position, value_of, velocity
   use last_frame, only: is_run, read_last_frame
   use parameters, only: largest, smallest
-  use position_file, only: column_names, read_positions
+  use position_file, only: column_names, mass_row, radius_row, read_positions
   use settings, only: species_settings_t
   use texts, only: counted, written
   implicit none
@@ -16,7 +16,6 @@ module starting_disks
   public :: origin, read_disks, resolution
 
   real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
-  integer, parameter :: radius_row = 5, mass_row = 6          !! of `column_names`
 
 contains
 
