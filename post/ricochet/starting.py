@@ -1,10 +1,13 @@
 """Starting files: disks from arrays, in the text that `species.file` reads."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 
 from .files import destination
+
+SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads them
 
 
 def write_start(
@@ -29,6 +32,12 @@ def write_start(
     words = [[f"{value:.17g}" for value in values] for values in columns.values()]
     if species is not None:
         words.append([str(name) for name in sized("species", np.asarray(species), len(position))])
+        for name in set(words[-1]):
+            if not SPECIES.fullmatch(name):
+                raise ValueError(
+                    f"species: {name!r} is neither a number from 1 nor a name: a letter, then "
+                    "up to 39 letters, digits, _ and -"
+                )
     path = destination(Path(path))
     with path.open("w", encoding="utf-8") as file:
         file.write(" ".join([*columns, "species"][: len(words)]) + "\n")

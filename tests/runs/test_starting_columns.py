@@ -304,6 +304,9 @@ def test_arrays_in_files_of_numpy_become_starting_files(tmp_path):
         ({"position": [[1, 2]], "velocity": np.ones((2, 2))}, "velocity: of 2 disks, not of 1"),
         ({"position": [[1, 2]], "radius": [0]}, "radius: not all numbers are above 0"),
         ({"position": [[1, 2]], "species": ["a", "b"]}, "species: of 2 disks, not of 1"),
+        ({"position": [[1, 2]], "species": "big ones"}, "species: 'big ones' is neither a number"),
+        ({"position": [[1, 2]], "species": [0]}, "species: '0' is neither a number from 1 nor"),
+        ({"position": [[1, 2]], "species": "x" * 41}, "species: 'xxxx"),
     ],
 )
 def test_arrays_that_are_no_disks_are_refused(tmp_path, arrays, says):
