@@ -13,7 +13,7 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -138,8 +138,14 @@ class Run:
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
     walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
-    parameters: dict = field(repr=False)  # group -> variable -> value, as used
-    provenance: dict = field(repr=False)
+    parameters: dict  # group -> variable -> value, as used
+    provenance: dict
+
+    def __repr__(self) -> str:
+        """One line, however many disks there are."""
+        kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
+        frames = f"{self.frames} frame{'s' * (self.frames > 1)}, t = {span(self.time)}"
+        return f"<Run {self.path}: {kinds}; {frames}>"
 
     @property
     def count(self) -> int:

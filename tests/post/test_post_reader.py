@@ -56,6 +56,11 @@ def test_constants_and_parameters(small):
     assert obstacle[1:] == Obstacle(None, 0.2, False)[1:]
 
 
+def test_a_run_is_shown_in_one_line(small):
+    run = read_run(small)
+    assert repr(run) == f"<Run {small}: 1 light, 1 heavy one; 3 frames, t = 0 to 1>"
+
+
 def test_derived_quantities(small):
     run = read_run(small)
     np.testing.assert_allclose(run.speed(0), [5, 1])
