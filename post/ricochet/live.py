@@ -20,7 +20,7 @@ from .reader import Run, read_run
 
 ADDRESS = "127.0.0.1"
 LOOK = 0.5  # seconds between looks whether the run has ended
-PATIENCE = 10.0  # seconds that pages have to fetch the end of the run
+PATIENCE = 10.0  # seconds since a page last asked, after which none is left to be told the end
 
 
 class Live:
@@ -31,9 +31,9 @@ class Live:
         self.part, self.filmed = run.path, filmed
         self.final = run.path.with_suffix("")
         self.claim = Path(f"{self.final}.lock")  # there while the program writes; never opened here
-        self.claimed = self.claim.exists()
         self.lock = threading.Lock()
         self.stamp, self.news = "", b""
+        self.asked = -PATIENCE  # when a page asked last
         self.delivered = False  # a page has the end
 
     @property
@@ -41,11 +41,12 @@ class Live:
         """Empty while the run goes on.  The final name means that it has finished."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
-        return "has stopped" if self.claimed and not self.claim.exists() else ""
+        return "" if self.claim.exists() else "has stopped"
 
     def answer(self, known: str) -> bytes:
         """What a page does not know yet; nothing if there is nothing new."""
         with self.lock:
+            self.asked = time.monotonic()
             end = self.end
             with suppress(RunError):  # caught at an unlucky moment: the next look will do
                 run = read_run(self.part if self.part.exists() else self.final)
@@ -102,6 +103,8 @@ def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")
     live = Live(run, filmed)
+    if live.end:
+        raise RunError(f"{run.path}: the run {live.end}; leave out --live")
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ThreadingHTTPServer((ADDRESS, 0), handler(live, page.encode())) as server:
         server.daemon_threads = True
@@ -110,11 +113,12 @@ def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
             print(f"http://{ADDRESS}:{server.server_address[1]}/  (Ctrl-C ends)", flush=True)
             while not live.end:
                 time.sleep(LOOK)
-            asked = time.monotonic()
-            while not live.delivered and time.monotonic() < asked + PATIENCE:
+            while not live.delivered and time.monotonic() < live.asked + PATIENCE:
                 time.sleep(LOOK)
-            return f"the run {live.end}: {live.part if live.part.exists() else live.final}"
         except KeyboardInterrupt:
-            return "stopped; the run goes on"
+            pass
         finally:
             server.shutdown()
+    if not live.end:
+        return "stopped; the run goes on"
+    return f"the run {live.end}: {live.part if live.part.exists() else live.final}"

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ricochet import read_run
+from ricochet.live import PATIENCE
 from synthetic_run import ROOT, run_script, write_run
 from whole_runs import FINISHED, frames_in, wait_for, write_input
 
@@ -414,6 +415,18 @@ def test_a_run_that_stops_ends_the_show_too(live, browser, tmp_path):
     assert out.strip() == f"the run has stopped: {tmp_path / 'gas.h5.part'}"
     wait_for(lambda: "has stopped, at t" in browser.run("return $('live').textContent"))
     assert "is unfinished" in browser.run("return $('warning').textContent")
+
+
+def test_a_show_without_a_page_ends_at_once(live, tmp_path, capsys):
+    """Of a run that has stopped there is none."""
+    run, show, _ = live
+    run.send_signal(signal.SIGTERM)
+    run.wait()
+    out, _ = show.communicate(timeout=PATIENCE / 2)
+    part = tmp_path / "gas.h5.part"
+    assert out.strip() == f"the run has stopped: {part}"
+    assert run_script("player", part, "--live") == 2
+    assert "gas.h5.part: the run has stopped; leave out --live" in capsys.readouterr().err
 
 
 def test_a_finished_run_is_not_live(tmp_path, capsys):
