@@ -81,7 +81,8 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             style = {"facecolors": species_colours(run)}
         else:
             norm = scale(values[k], args.log, colour) if args.per_frame else whole
-            style = {"array": values[k], "norm": norm, "cmap": colour_map(colour)}
+            seen = np.maximum(values[k], norm.vmin)  # 0 has no place on a logarithmic scale
+            style = {"array": seen, "norm": norm, "cmap": colour_map(colour)}
         disks = disk_collection(axes, run, run.position[frames[k]], **style)
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)

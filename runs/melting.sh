@@ -1,28 +1,64 @@
 #!/usr/bin/env bash
 # Melting: pressure against packing fraction, and pictures of the order of the bonds.
 #
-# 64^2 and 128^2 disks, from crystals, briefly: some minutes. Between 0.70 and 0.72 they have not quite
-# molten by then: the pressure is too low, errors are large, and warnings say so. With FULL=1 long
-# runs, and 256^2 disks: some 40 hours of processor time in all.
+# A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks
+# start from a crystal that has half molten at 0.66, once a little less and once a little more; the
+# scatter of the two is part of the error. 128^2 disks start as four copies of these, with other
+# velocities. Some minutes; errors near melting are then 0.02 to 0.1, with warnings. With FULL=1 long
+# runs, and 256^2 disks: some ten hours of processor time in all.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
-  lengths='64 1000000 128 500000 256 200000' data=$data/full
+  sides=(64 128 256) length=([64]=500000 [128]=250000 [256]=100000) data=$data/full
 else
-  lengths='64 10000 128 2000'
+  sides=(64 128) length=([64]=4000 [128]=1500)
 fi
-points=0.68,0.69,0.698,0.702,0.705,0.708,0.712,0.716,0.72,0.73
-read -ra pairs <<<"$lengths"
-for ((k = 0; k < ${#pairs[@]}; k += 2)); do
-  side=${pairs[k]} count=$((pairs[k] ** 2))
-  runs/ensemble.sh input/bulk.nml -d "$data/$side" --set species.disks.placement=lattice \
-    --set "species.disks.count=$count" --set box.upper=1,0.8660254037844386 \
-    --set "stop.collisions_per_disk=${pairs[k + 1]}" \
-    --set "output.observables_every_collisions=$((5 * count))" \
-    --scan "species.disks.packing_fraction=$points" "$@"
+
+disks() { # side of the square, folder, further options of ensemble.sh
+  local upper
+  upper=$(awk -v n="$1" 'BEGIN { printf "%.17g,%.17g", n / 64, n / 64 * sqrt(3) / 2 }')
+  runs/ensemble.sh input/bulk.nml -d "$data/$2" --set "species.disks.count=$(($1 ** 2))" \
+    --set "box.upper=$upper" --set "output.observables_every_collisions=$((5 * $1 ** 2))" "${@:3}"
+}
+
+# Four copies of the last frame of run $1, side by side, into the starting file $2.
+four_copies() {
+  "$python" - "$1" "$2" <<'PYTHON'
+import sys
+import numpy as np
+from ricochet import read_run, write_start
+run = read_run(sys.argv[1])
+shifts = run.edges * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+write_start(sys.argv[2], np.concatenate(run.position[-1] + shifts[:, None]))
+PYTHON
+}
+
+disks 64 molten --set species.disks.placement=lattice --set species.disks.packing_fraction=0.66 \
+  --scan stop.collisions_per_disk=20,30 "$@"
+declare -A start=([crystal_0.73]='--set species.disks.placement=lattice')
+for packing in 0.68 0.69 0.698 0.704 0.708 0.712 0.716 0.72; do
+  for tau in 20 30; do
+    start[molten_${tau}_$packing]="--set species.disks.placement=grown \
+--set species.disks.file=$data/molten/collisions_per_disk_$tau.h5"
+  done
 done
-"$python" post/melting.py "$data"/*/*.h5 -o "$figures/melting.png" --csv "$figures/melting.csv"
+
+runs=()
+for side in "${sides[@]}"; do
+  for name in "${!start[@]}"; do
+    printf '%s\t%s --set species.disks.packing_fraction=%s\n' "$name" "${start[$name]}" "${name##*_}"
+  done | sort | replace "$data/$side.txt"
+  disks "$side" "$side" --set "stop.collisions_per_disk=${length[side]}" \
+    --manifest "$data/$side.txt" "$@"
+  for name in "${!start[@]}"; do
+    runs+=("$data/$side/$name.h5")
+    [[ $side == "${sides[-1]}" ]] && continue
+    four_copies "$data/$side/$name.h5" "$data/$side/$name.txt"
+    start[$name]="--set species.disks.file=$data/$side/$name.txt"
+  done
+done
+"$python" post/melting.py "${runs[@]}" -o "$figures/melting.png" --csv "$figures/melting.csv"
 for packing in 0.698 0.708 0.72; do
-  "$python" post/snapshot.py "$data/$side"/*"packing_fraction_$packing"*.h5 --colour psi6 \
+  "$python" post/snapshot.py "$data/$side/molten_20_$packing.h5" --colour psi6 \
     -o "$figures/melting_$packing.png"
 done

@@ -659,6 +659,18 @@ def test_a_snapshot_has_one_scale_or_one_for_each_frame(tmp_path, rng, monkeypat
     plt.close("all")
 
 
+def test_disks_at_rest_are_seen_on_a_logarithmic_scale(tmp_path, monkeypatch):
+    v = np.zeros((1, 9, 2))
+    v[0, 0] = 1, 2
+    path = write_run(tmp_path / "run.h5", np.full(v.shape, 0.5), v)
+    figures = []
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    draw("snapshot", path, "--colour", "speed", "--log")
+    disks = figures[0].axes[0].collections[-1]
+    assert np.all(disks.to_rgba(disks.get_array())[:, 3] == 1)
+    plt.close("all")
+
+
 def test_paths_break_where_a_period_is_crossed(tmp_path):
     x = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]])
     run = read_run(
