@@ -2,14 +2,15 @@
 # Melting: pressure against packing fraction, and pictures of the order of the bonds.
 #
 # A crystal takes very long to melt between 0.70 and 0.72, and a liquid to freeze. Therefore 64^2 disks
-# start from a crystal that has half molten at 0.66, once a little less and once a little more; the
-# scatter of the two is part of the error. 128^2 disks start as four copies of these, with other
-# velocities. Some minutes; errors near melting are then 0.02 to 0.1, with warnings. With FULL=1 long
-# runs, and 256^2 disks: some ten hours of processor time in all.
+# start from a crystal that has half molten at 0.66, once a little less and once a little more, so
+# that a memory of the start shows in their scatter. 128^2 disks start as four copies of these, with
+# other velocities. Some minutes; P* is then right to 0.1 near melting, and warnings say where the two
+# starts still differ. With FULL=1 long runs, and 256^2 disks: some eight hours of processor time.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 if [[ -n ${FULL:-} ]]; then
   sides=(64 128 256) length=([64]=500000 [128]=250000 [256]=100000) data=$data/full
+  mkdir -p -- "$data"
 else
   sides=(64 128) length=([64]=4000 [128]=1500)
 fi
@@ -21,15 +22,17 @@ disks() { # side of the square, folder, further options of ensemble.sh
     --set "box.upper=$upper" --set "output.observables_every_collisions=$((5 * $1 ** 2))" "${@:3}"
 }
 
-# Four copies of the last frame of run $1, side by side, into the starting file $2.
-four_copies() {
-  "$python" - "$1" "$2" <<'PYTHON'
+# Of runs in a folder: four copies of the last frame, side by side, as a starting file.
+copy_four_times() { # folder, names of the runs
+  "$python" - "$@" <<'PYTHON'
 import sys
 import numpy as np
 from ricochet import read_run, write_start
-run = read_run(sys.argv[1])
-shifts = run.edges * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
-write_start(sys.argv[2], np.concatenate(run.position[-1] + shifts[:, None]))
+folder, *names = sys.argv[1:]
+for name in names:
+    run = read_run(f"{folder}/{name}.h5")
+    shifts = run.edges * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+    write_start(f"{folder}/{name}.txt", np.concatenate(run.position[-1] + shifts[:, None]))
 PYTHON
 }
 
@@ -50,10 +53,10 @@ for side in "${sides[@]}"; do
   done | sort | replace "$data/$side.txt"
   disks "$side" "$side" --set "stop.collisions_per_disk=${length[side]}" \
     --manifest "$data/$side.txt" "$@"
+  [[ $side == "${sides[-1]}" || " $* " == *' --dry-run '* ]] ||
+    copy_four_times "$data/$side" "${!start[@]}"
   for name in "${!start[@]}"; do
     runs+=("$data/$side/$name.h5")
-    [[ $side == "${sides[-1]}" ]] && continue
-    four_copies "$data/$side/$name.h5" "$data/$side/$name.txt"
     start[$name]="--set species.disks.file=$data/$side/$name.txt"
   done
 done

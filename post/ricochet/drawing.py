@@ -216,7 +216,8 @@ def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
     """Below the figure, what speaks against its numbers; at most three notes in full."""
     if not notes:
         return
-    more = [f"and {len(notes) - 3} more warnings, as printed"] if len(notes) > 3 else []
+    rest = len(notes) - 3
+    more = [f"and {rest} more warning{'s' * (rest > 1)}, as printed"] if rest > 0 else []
     lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
     text = "\n".join([line for part in lines for line in part] + more)
     figure.supxlabel(text, fontsize=9, color="firebrick")

@@ -66,6 +66,14 @@ def test_a_study_names_its_members_and_draws_its_figures(study, tmp_path, system
         assert set((tmp_path / "language.txt").read_text().split()) == {"C"}
 
 
+def test_many_disks_near_melting_begin_as_copies_of_fewer(study):
+    for full, sides in (("", ("64",)), ("1", ("full/64", "full/128"))):
+        run = study("melting", "--dry-run", FULL=full)
+        assert run.returncode == 0, run.stderr
+        for side in sides:
+            assert run.stdout.count(f"species.disks.file=runs/melting/{side}/molten_") == 16
+
+
 def test_a_list_of_members_is_not_written_through_a_link(study, tmp_path):
     precious = tmp_path / "precious"
     precious.write_text("precious")
