@@ -232,7 +232,7 @@ contains
       "  --check             read and check everything, run nothing"//eol// &
       "  --force             start over: delete FILE.part and the checkpoints of a run"//eol// &
       "                      that did not finish; at the end, replace a finished FILE"//eol// &
-      "  --quiet             no progress on stderr"//eol// &
+      "  --quiet             no progress, notes or warnings on stderr"//eol// &
       "  --print-defaults    an input file with every variable and its default"//eol// &
       "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &
       "  --version           version, commit, compiler, flags and HDF5 version"//eol// &
