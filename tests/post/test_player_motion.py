@@ -289,6 +289,14 @@ def test_box_and_controls_are_seen_without_scrolling(browser, tmp_path, size, ed
         if not tall:  # the lowest controls of a narrow, high box
             assert box["left"] >= 0 and box["right"] <= width, (name, box)
             assert box["top"] >= 0 and box["bottom"] <= height, (name, box)
+    assert browser.run(
+        """const shown = $('colour'), free = shown.cloneNode(true);
+        free.style.cssText = 'position: absolute; flex: none; width: auto; min-width: 0';
+        shown.parentNode.append(free);
+        const widths = [shown.offsetWidth, free.offsetWidth];
+        free.remove();
+        return widths[0] >= widths[1] ? '' : widths;"""
+    ) == "", "the words of the menu are cut"
     assert boxes[0][1]["height"] >= (110 if edges == (3, 1) or size == "upright" else 260)
     assert browser.complaints() == []
 
