@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -22,13 +23,13 @@ double system_seconds(void)
     return (double)now.tv_sec + 1e-9*(double)now.tv_nsec;
 }
 
-/* All that a signal handler may write to. */
-static volatile sig_atomic_t stop_signal, checkpoint_signals;
-static volatile double first_stop_at;
+/* All that a signal handler may write to; it may run in any thread. */
+static atomic_int stop_signal, checkpoint_signals;
+static _Atomic double first_stop_at;
 
 /* How the program ends at a stop signal while there is nothing to lose. */
 static struct {
-    volatile sig_atomic_t code;  /* 0: there is something to lose */
+    atomic_int code;  /* 0: there is something to lose */
     char message[256];
 } ending;
 
