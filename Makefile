@@ -202,7 +202,8 @@ bench-check:  ## counts instructions per collision against what is promised
 # Unit tests, runs that write, stop and resume, damaged input. Leaks do not count in unit tests: gfortran 12 never
 # frees array constructors of obstacles, which they are full of.
 sanitized := $(BUILD)/sanitized
-sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
+raced := $(BUILD)/raced
+sanitize:  ## searches faults of memory and races: sanitizers, valgrind (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
 	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q tests/runs/test_output_file.py tests/runs/test_restart.py
@@ -210,6 +211,8 @@ sanitize:  ## searches faults of memory: sanitizers, valgrind (long)
 	@$(venv) tests/runs/fuzz_checkpoint.py --count 1000 --program $(sanitized)/ricochet
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
+	@$(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=thread' BUILD=$(raced) tests=tests/unit/test_parallel_events.pf $(raced)/unit_tests $(raced)/ricochet
+	@tests/support/find_races.sh $(raced)
 
 lint:  ## warnings, style, and the rules of the design
 	@.ci/set-up lint

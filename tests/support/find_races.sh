@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Searches races between threads under the thread sanitizer: the unit tests of domains, and all kinds of whole runs.
+# usage: find_races.sh BUILD     (a folder with `ricochet` and `unit_tests`, built with -fsanitize=thread)
+#
+# The sanitizer cannot see how GNU's OpenMP library lets threads wait for each other. LLVM's has the same entries, and
+# its tool Archer tells the sanitizer; so it takes the place of GNU's here. First it has to prove that it sees a race in
+# a program that has one, and none where threads do wait.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+build=$(realpath "$1")
+archer=$(find /usr/lib* /usr/local/lib* -name libarcher.so 2>/dev/null | sort | tail -n 1)
+if [ -z "$archer" ]; then
+  echo 'races: not searched: the tool Archer of LLVM (libarcher.so; Debian: libomp-14-dev) is not installed'
+  exit 0
+fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+ln -s "${archer%/*}/libomp.so" "$work/libgomp.so.1"
+export TSAN_OPTIONS=halt_on_error=1:exitcode=66:ignore_noninstrumented_modules=1
+
+# A command under the sanitizer.
+watched() { LD_LIBRARY_PATH=$work OMP_TOOL_LIBRARIES=$archer "$@"; }
+
+# Arguments: a status, and which element of n a turn of the loop adds to.
+expect() {
+  local status=0
+  # shellcheck disable=SC2016
+  printf '%s\n' 'integer :: i, k, n(100)' 'n = 0' 'do k = 1, 9' '!$omp parallel do num_threads(2)' 'do i = 1, 100' \
+    "n($2) = n($2) + i" 'end do' 'end do' 'if (sum(n) < 0) print *, n' 'end' >"$work/try.f90"
+  gfortran -g -fopenmp -fsanitize=thread "$work/try.f90" -o "$work/try"
+  watched "$work/try" >"$work/log" 2>&1 || status=$?
+  [ "$status" -eq "$1" ] || { echo "races: the detector is not to be trusted: status $status instead of $1" >&2; exit 1; }
+}
+
+expect 66 'mod(i*k, 7) + 1'
+expect 0 'mod(i + k, 100) + 1'
+watched "$build/unit_tests"
+RICOCHET=$build/ricochet watched .venv/bin/python -m pytest -q tests/runs/test_threads.py -m 'check or not check' \
+  -k 'change_no_bit or goes_on or every_input'
+echo 'races: none found'
