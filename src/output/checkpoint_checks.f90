@@ -120,13 +120,15 @@ contains
     real(real64), intent(in) :: speed             !! that it cannot have had [length/time]
     real(real64), intent(in) :: beyond(2)         !! how far it may be beyond a wall [length]
     character(len=:), allocatable, intent(inout) :: flaw
-    real(real64) :: x(2), reach(2), periods(2)
+    real(real64) :: x(2), reach(2), periods(2), gone(2)
 
     associate (disk => sim%disk(i), edges => sim%box%edges())
       periods = merge(2 + speed*sim%time()/edges, 0.0_real64, sim%box%periodic)
+      gone = 0
+      if (size(sim%image) > 0) gone = sim%image(:, i)
       if (disk%clock > sim%now .or. disk%clock < -sim%epoch*(1 + rounding)) then
         flaw = in_row("clock", i)//" is "//written(disk%clock)//"; possible: "//written(-sim%epoch)//" to "//written(sim%now)
-      else if (any(abs(real(sim%image(:, i), real64)) > periods)) then
+      else if (any(abs(gone) > periods)) then
         flaw = in_row("image1, image2", i)//": the disk cannot have gone so far"
       else
         x = sim%position(i)

@@ -2,7 +2,7 @@
 !> come. It is written to a file of its own, and into the output of a finished run.
 module checkpoint_contents
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
@@ -212,10 +212,7 @@ contains
     call exchange_sum(file, "dissipated", sim%dissipated)
     call file%exchange("start_energy", sim%start_energy, not_negative)
     n = sum(int(sim%species%count, int64))
-    if (.not. allocated(sim%disk)) then
-      allocate (sim%disk(n), sim%tag(n))
-      allocate (sim%image(2, n), source=0_int64)
-    end if
+    if (.not. allocated(sim%disk)) call sim%make_room(int(n, int32))
     call file%exchange("disks/x1", sim%disk%x(1), places)
     call file%exchange("disks/x2", sim%disk%x(2), places)
     call file%exchange("disks/v1", sim%disk%v(1), speeds)
@@ -232,9 +229,23 @@ contains
     call file%exchange("disks/id", sim%tag%id, [1_int64, n])
     call file%exchange("disks/collisions", sim%tag%collisions, counts)
     call file%exchange("disks/met", sim%tag%met, [int(obstacle_code(sim%box%n_obstacles()), int64), n])
-    call file%exchange("disks/image1", sim%image(1, :), [-counts(2), counts(2)])
-    call file%exchange("disks/image2", sim%image(2, :), [-counts(2), counts(2)])
+    call exchange_periods(file, "disks/image1", sim, 1)
+    call exchange_periods(file, "disks/image2", sim, 2)
   end subroutine exchange_state
+
+  !> Writes or reads how many periods the disks have travelled along an axis.
+  subroutine exchange_periods(file, name, sim, axis)
+    type(component_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: axis
+    integer(int64), allocatable :: periods(:)
+
+    allocate (periods(sim%n_disks()), source=0_int64)
+    if (size(sim%image) > 0) periods = sim%image(axis, :)
+    call file%exchange(name, periods, merge(counts(2), 0_int64, sim%box%periodic(axis))*[-1, 1])
+    if (size(sim%image) > 0) sim%image(axis, :) = periods
+  end subroutine exchange_periods
 
   !> Writes or reads a sum: the halves of a whole number of units, which may grow to twice as much.
   subroutine exchange_sum(file, name, sum)

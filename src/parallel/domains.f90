@@ -114,8 +114,8 @@ contains
       if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
       deallocate (self%sim%disk, self%sim%tag, self%sim%image, self%home)
     end if
-    allocate (self%sim%disk(slots), self%sim%tag(slots), self%home(slots))
-    allocate (self%sim%image(2, merge(slots, 0, any(sim%box%periodic))))
+    allocate (self%home(slots))
+    call self%sim%make_room(slots)
   end subroutine make_room
 
   !> Builds cells and queue for the first n slots.

@@ -22,7 +22,7 @@ module simulation_state
     ! Stored in a checkpoint
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    integer(int64), allocatable :: image(:, :)    !! (2,n) periods travelled: true position = x + image*edges
+    integer(int64), allocatable :: image(:, :)    !! (2,n) periods travelled: true position = x + image*edges; (2,0) between walls
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
@@ -44,6 +44,7 @@ module simulation_state
   contains
     procedure :: time
     procedure :: n_disks
+    procedure :: make_room
     procedure :: mass_of
     procedure :: masses
     procedure :: take_masses
@@ -71,6 +72,15 @@ contains
 
     n = size(self%disk, kind=int32)
   end function n_disks
+
+  !> Makes room for n disks.
+  pure subroutine make_room(self, n)
+    class(simulation_t), intent(inout) :: self    !! with its box
+    integer(int32), intent(in) :: n
+
+    allocate (self%disk(n), self%tag(n))
+    allocate (self%image(2, merge(n, 0, any(self%box%periodic))), source=0_int64)
+  end subroutine make_room
 
   !> Mass of disk i.
   pure function mass_of(self, i) result(mass)

@@ -106,8 +106,7 @@ contains
     sim%box%gravity = 0
     sim%species = species
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
-    allocate (sim%disk(n), sim%tag(n))
-    allocate (sim%image(2, n), source=0_int64)
+    call sim%make_room(int(n, int32))
     sim%tag%id = [(int(k, int32), k=1, n)]
     sim%tag%species = [([(int(s, int32), k=1, species(s)%count)], s=1, size(species))]
   end subroutine describe

@@ -54,9 +54,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: s, i, k
 
-    k = sum(sim%species%count)
-    allocate (sim%disk(k), sim%tag(k))
-    allocate (sim%image(2, k), source=0_int64)
+    call sim%make_room(sum(sim%species%count))
     k = 0
     do s = 1, size(sim%species, kind=int32)
       do i = 1, sim%species(s)%count

@@ -13,12 +13,14 @@ from whole_runs import FILES, FINISHED, STOPPED, USAGE, one_line, seal, write_in
 
 CHECK = pytest.mark.check
 
-TWO_SPECIES = """&species name = 'gas' count = 30 radius = 0.02 temperature = 1 /
+TWO_SPECIES = """&box boundary = 'periodic', 'wall' /
+&species name = 'gas' count = 30 radius = 0.02 temperature = 1 /
 &species name = 'stone' count = 10 radius = 0.04 mass = 4 temperature = 1 /
 &stop time = 20 /
 &output frames_every_time = 5 /
 """
-ONWARD = """&species name = 'gas' count = 30 radius = 0.02 file = 'x.h5' velocities = 'file' /
+ONWARD = """&box boundary = 'periodic', 'wall' /
+&species name = 'gas' count = 30 radius = 0.02 file = 'x.h5' velocities = 'file' /
 &species name = 'stone' count = 10 radius = 0.04 mass = 4 file = 'x.h5' velocities = 'file' /
 &stop time = 1 /
 """
@@ -132,7 +134,8 @@ FRAMES = "progress/frames/"
         (put("disks/clock", 1, -1e99), "disks/clock, row 2 is -1e99; possible: "),
         (put("disks/collisions", 1, -1), "disks/collisions, row 2 is -1; possible: 0 to "),
         (change("disks/collisions", 1, lambda n: n + 1), "disks/collisions add up to "),
-        (put("disks/image1", 1, 3), "disks/image1, image2, row 2: the disk cannot have gone"),
+        (put("disks/image1", 1, 10**9), "disks/image1, image2, row 2: the disk cannot have gone"),
+        (put("disks/image2", 1, 3), "disks/image2, row 2 is 3; possible: 0 to 0;"),
         (put("collisions", 0, -5), "collisions is -5; possible: 0 to 9007199254740992;"),
         (change("collisions", 0, lambda n: n + 1), "events is "),
         (put("wall_collisions", 2, 2**63 - 1), "wall_collisions, row 3 is 9223372036854775807;"),
