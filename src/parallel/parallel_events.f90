@@ -32,12 +32,14 @@ module parallel_events
   real(real64), parameter :: rounding = 1.0e-12_real64
 
   type, extends(evolution_t) :: parallel_events_t
-    type(event_driven_t) :: plain                  !! the engine for all that is not worth more
+    type(event_driven_t) :: plain                  !! an engine for all that is not worth more; it is copied to run
     integer(int32) :: threads = 1
     real(real64) :: window = 0.5_real64            !! collisions per disk in a window of time
     integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
     integer(int32) :: least_disks = 1000           !! of a domain
     integer(int64) :: windows_done = 0, windows_failed = 0
+    ! Of these two only one is there at a time, to save memory.
+    type(event_driven_t), allocatable, private :: engine   !! the plain one at work
     type(domain_t), allocatable, private :: domain(:)
     type(domain_cuts_t), private :: cuts
     integer(int32), private :: wanted = 1          !! domains
@@ -116,12 +118,14 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
 
-    if (self%holder /= plain_engine) call self%plain%start(sim)
+    if (allocated(self%domain)) deallocate (self%domain)
+    if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
+    if (self%holder /= plain_engine) call self%engine%start(sim)
     self%holder = plain_engine
-    self%plain%log = self%log
-    call self%plain%advance(sim, limits, error)
-    self%log = self%plain%log
-    self%idle = self%plain%idle
+    self%engine%log = self%log
+    call self%engine%advance(sim, limits, error)
+    self%log = self%engine%log
+    self%idle = self%engine%idle
   end subroutine advance_plainly
 
   !> Whether several domains can be faster than the plain engine.
@@ -243,6 +247,7 @@ contains
     !$omp end parallel do
     call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%halo + self%widening)
     if (self%cuts%n < 2) return
+    if (allocated(self%engine)) deallocate (self%engine)
     if (allocated(self%domain)) then
       if (size(self%domain) /= self%cuts%n) deallocate (self%domain)
     end if

@@ -2,7 +2,7 @@
 !> Positions and velocities of each species have random streams of their own, so that a change of one
 !> does not change what the others draw.
 module initial_state
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, real64
   use errors, only: error_t
   use placement, only: place_disks
   use random_stream, only: random_stream_t
