@@ -10,8 +10,9 @@ module memory
   public :: check_memory, available_memory, number_after
 
   ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
-  integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 410, &
+  integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 430, &
     besides = 25000000
+  integer(int64), parameter :: per_logged_disk = 80        !! in the lists of collisions of several threads
   integer(int64), parameter :: unlimited = huge(1_int64)
   ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.
   integer, parameter :: most_lines = 1000
@@ -32,7 +33,7 @@ contains
       if (any(settings%species(k)%placement == [character(len=5) :: "dense", "grown"])) each = per_growing_disk
     end do
     if (settings%run%dynamics == "steps") each = max(each, per_stepped_disk)
-    if (settings%run%threads > 1) each = max(each, per_shared_disk)
+    if (settings%run%threads > 1) each = max(each, per_shared_disk + merge(per_logged_disk, 0_int64, settings%output%event_log))
     needed = n*each + besides
     call available_memory("", available, limit)
     if (needed > available) call fail(error, exit_usage, "species.count: "//written(n)//" disks need about " &
