@@ -203,7 +203,7 @@ bench-check:  ## counts instructions per collision against what is promised
 # frees array constructors of obstacles, which they are full of.
 sanitized := $(BUILD)/sanitized
 raced := $(BUILD)/raced
-sanitize:  ## searches faults of memory and races: sanitizers, valgrind (long)
+sanitize:  ## searches faults of memory, and races, with sanitizers (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
 	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q tests/runs/test_output_file.py tests/runs/test_restart.py
