@@ -75,7 +75,8 @@ contains
     if (size(chosen) > 0 .and. .not. allocated(error)) then
       call read_vectors(file, position//value_of, n, chosen, table(1:2, :))
       call read_vectors(file, velocity//value_of, n, chosen, table(3:4, :))
-      there(5:6) = [file%length(disk_radius), file%length(disk_mass)] >= 0
+      there(radius_row) = file%length(disk_radius) >= 0
+      there(mass_row) = file%length(disk_mass) >= 0
       if (there(radius_row)) call read_numbers(file, disk_radius, n, chosen, table(radius_row, :))
       if (there(mass_row)) call read_numbers(file, disk_mass, n, chosen, table(mass_row, :))
       if (present(box)) then

@@ -12,12 +12,12 @@ module placement
   use errors, only: error_t, exit_usage, fail
   use known_places, only: add_known, misfit_t, misfit_text, offset
   use packing, only: packing_t
+  use position_file, only: mass_row, radius_row
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
-  use position_file, only: mass_row, radius_row
   use starting_disks, only: origin, read_disks
   use status_line, only: status_line_t
   use texts, only: legible, written
