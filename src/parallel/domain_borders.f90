@@ -3,7 +3,6 @@
 !> in docs/theory.md.
 module domain_borders
   use kinds, only: int16, int32
-  use disks, only: tag_t
   use domain_grid, only: domain_grid_t, forever, track_t
   use domains, only: copy_of, domain_t, list_copies, news_t
   use partners, only: nothing
@@ -51,7 +50,7 @@ contains
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
-          associate (track => grid%track(self%sim%tag(s)%track))
+          associate (track => grid%track(grid%track_of(s)))
             same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t)
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(self, grid, theirs%track(r), shift, met)
@@ -136,7 +135,7 @@ contains
   subroutine refresh(self)
     type(domain_t), intent(inout) :: self
     integer(int32), allocatable :: waiting(:)
-    integer(int32) :: k, n_waiting
+    integer(int32) :: k, n_waiting, slot
 
     allocate (waiting(self%n_news))
     n_waiting = 0
@@ -144,7 +143,8 @@ contains
     type is (domain_grid_t)
       call grid%begin_window()
       do k = grid%n_tracks, 1, -1
-        call grid%begin_track(self%sim%tag, grid%track(k)%slot)
+        slot = grid%track(k)%slot
+        call grid%begin_track(self%sim%tag(slot)%cell, slot)
       end do
       do k = 1, self%n_news
         call take_over(self, grid, self%news(k), n_waiting, waiting)
@@ -164,8 +164,7 @@ contains
     type(domain_grid_t), intent(inout) :: grid
     type(news_t), intent(in) :: news
     integer(int32), intent(inout) :: n_waiting, waiting(:)   !! (n_waiting) slots whose events are to be predicted
-    integer(int32) :: s
-    type(tag_t) :: tag
+    integer(int32) :: s, window
 
     s = news%slot
     if (any(news%cell > self%patch%n)) then
@@ -180,10 +179,9 @@ contains
     else if (self%patch%holds(self%sim%tag(s)%cell)) then
       call grid%take_out(self%sim%tag(s), s)
     end if
-    tag = self%sim%tag(s)
+    window = self%sim%tag(s)%window
     self%sim%tag(s) = news%tag
-    self%sim%tag(s)%window = tag%window
-    self%sim%tag(s)%track = tag%track
+    self%sim%tag(s)%window = window
     associate (disk => self%sim%disk(s), stamp => self%sim%disk(s)%stamp + 1)
       disk = news%disk
       disk%stamp = stamp
@@ -192,7 +190,7 @@ contains
     self%home(s) = news%home
     if (size(self%sim%image) > 0) self%sim%image(:, s) = news%image
     call grid%insert(self%sim%tag(s), s, int(news%cell, int16))
-    call grid%begin_track(self%sim%tag, s)
+    call grid%begin_track(self%sim%tag(s)%cell, s)
     n_waiting = n_waiting + 1
     waiting(n_waiting) = s
   end subroutine take_over
@@ -204,7 +202,7 @@ contains
     integer(int32), intent(in) :: s
 
     if (self%patch%holds(self%sim%tag(s)%cell)) call grid%take_out(self%sim%tag(s), s)
-    call grid%drop_track(self%sim%tag, self%sim%tag(s)%track)
+    call grid%drop_track(s)
     self%sim%disk(s)%event_time = forever
     self%sim%disk(s)%partner = nothing
     self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1

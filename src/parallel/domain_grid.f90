@@ -5,7 +5,6 @@ module domain_grid
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
   use cell_grid, only: cell_grid_t
-  use disks, only: tag_t
   use exact_sums, only: exact_sum_t
   use partners, only: n_sides, nothing
   use simulation_state, only: simulation_t
@@ -27,6 +26,7 @@ module domain_grid
   type, extends(cell_grid_t) :: domain_grid_t
     integer(int32) :: n_tracks = 0
     type(track_t), allocatable :: track(:)         !! (n_tracks, and room for more)
+    integer(int32), allocatable :: track_of(:)     !! (slots) number of its track; 0: none
     integer(int32) :: own_low(2) = 0, own_high(2) = 0      !! columns, rows of the domain
     integer(int32) :: deep_low(2) = 0, deep_high(2) = 0    !! those that are in no other domain's patch
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch has an open end
@@ -61,23 +61,23 @@ contains
   end subroutine begin_window
 
   !> A new track of disk i begins where it is, if it needs one there. Whose disk it is follows from that as well.
-  subroutine begin_track(self, tag, i)
+  subroutine begin_track(self, cell, i)
     class(domain_grid_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag(:)
+    integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
-    if (within(tag(i)%cell, self%deep_low, self%deep_high)) then
-      call self%drop_track(tag, tag(i)%track)
+    if (within(cell, self%deep_low, self%deep_high)) then
+      call self%drop_track(i)
     else
-      if (tag(i)%track == 0) call self%add_track(tag(i))
-      self%track(tag(i)%track) = track_t(0_int64, i, self%owns(tag(i)%cell), tag(i)%cell, tag(i)%cell)
+      if (self%track_of(i) == 0) call self%add_track(i)
+      self%track(self%track_of(i)) = track_t(0_int64, i, self%owns(cell), cell, cell)
     end if
   end subroutine begin_track
 
-  !> Gives a disk a track that is still to begin.
-  subroutine add_track(self, tag)
+  !> Gives disk i a track that is still to begin.
+  subroutine add_track(self, i)
     class(domain_grid_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag
+    integer(int32), intent(in) :: i
     type(track_t), allocatable :: more(:)
 
     if (.not. allocated(self%track)) allocate (self%track(1024))
@@ -87,20 +87,21 @@ contains
       call move_alloc(more, self%track)
     end if
     self%n_tracks = self%n_tracks + 1
-    tag%track = self%n_tracks
+    self%track_of(i) = self%n_tracks
   end subroutine add_track
 
-  !> Drops the k-th track, if any (k > 0); the last one takes its number.
-  subroutine drop_track(self, tag, k)
+  !> Drops the track of disk i, if any; the last one takes its number.
+  subroutine drop_track(self, i)
     class(domain_grid_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag(:)
-    integer(int32), value :: k
+    integer(int32), intent(in) :: i
+    integer(int32) :: k
 
+    k = self%track_of(i)
     if (k == 0) return
-    tag(self%track(k)%slot)%track = 0
+    self%track_of(i) = 0
     if (k < self%n_tracks) then
       self%track(k) = self%track(self%n_tracks)
-      tag(self%track(k)%slot)%track = k
+      self%track_of(self%track(k)%slot) = k
     end if
     self%n_tracks = self%n_tracks - 1
   end subroutine drop_track
@@ -131,7 +132,7 @@ contains
       return
     end if
     if (sim%events /= self%events) then
-      if (self%is_own(sim%tag(i))) then
+      if (self%is_own(i)) then
         call self%keep_sums(sim)
       else
         sim%events = self%events
@@ -150,15 +151,15 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
 
-    if (sim%tag(i)%track + sim%tag(j)%track > 0) call note_collision(self, sim, i, j)
+    if (self%track_of(i) + self%track_of(j) > 0) call note_collision(self, sim, i, j)
     self%events = sim%events
     self%collisions = sim%collisions
     self%virial%units = sim%virial%units
     self%dissipated%units = sim%dissipated%units
     call self%cell_grid_t%predict_both(sim, i, j)
     if (.not. self%roomy) return
-    call self%note(sim%tag(i), i)                  ! in cells that they have chosen again
-    call self%note(sim%tag(j), j)
+    call self%note(sim%tag(i)%cell, i)                  ! in cells that they have chosen again
+    call self%note(sim%tag(j)%cell, j)
   end subroutine predict_both
 
   !> Notes a collision of disks of which others may have copies. It counts where the one with the lower id is an own one.
@@ -167,9 +168,9 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
 
-    if (sim%tag(i)%track > 0) call add_moment(self%track(sim%tag(i)%track)%digest, sim%disk(i)%clock)
-    if (sim%tag(j)%track > 0) call add_moment(self%track(sim%tag(j)%track)%digest, sim%disk(j)%clock)
-    if (self%is_own(sim%tag(merge(i, j, sim%tag(i)%id < sim%tag(j)%id)))) return
+    if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, sim%disk(i)%clock)
+    if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, sim%disk(j)%clock)
+    if (self%is_own(merge(i, j, sim%tag(i)%id < sim%tag(j)%id))) return
     sim%events = self%events
     sim%collisions = self%collisions
     sim%virial%units = self%virial%units
@@ -192,24 +193,24 @@ contains
     integer(int32), intent(in) :: code
 
     call self%cell_grid_t%cross(sim, i, code)
-    call self%note(sim%tag(i), i)
+    call self%note(sim%tag(i)%cell, i)
   end subroutine cross
 
   !> Notes where disk i is.
-  subroutine note(self, tag, i)
+  subroutine note(self, cell, i)
     class(domain_grid_t), intent(inout) :: self
-    type(tag_t), intent(inout) :: tag
+    integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
-    if (tag%track == 0) then
-      if (within(tag%cell, self%deep_low, self%deep_high)) return
-      call self%add_track(tag)                     ! from here on others could have seen it
-      self%track(tag%track) = track_t(0_int64, i, .true., tag%cell, tag%cell)
+    if (self%track_of(i) == 0) then
+      if (within(cell, self%deep_low, self%deep_high)) return
+      call self%add_track(i)                       ! from here on others could have seen it
+      self%track(self%track_of(i)) = track_t(0_int64, i, .true., cell, cell)
     end if
-    associate (track => self%track(tag%track))
-      track%low = min(track%low, tag%cell)
-      track%high = max(track%high, tag%cell)
-      if (track%own .and. .not. self%owns(tag%cell)) call reach(self, tag%cell)
+    associate (track => self%track(self%track_of(i)))
+      track%low = min(track%low, cell)
+      track%high = max(track%high, cell)
+      if (track%own .and. .not. self%owns(cell)) call reach(self, cell)
     end associate
   end subroutine note
 
@@ -250,14 +251,14 @@ contains
     yes = within(cell, self%own_low, self%own_high)
   end function owns
 
-  !> Whether a disk is an own one.
-  pure function is_own(self, tag) result(yes)
+  !> Whether disk i is an own one.
+  pure function is_own(self, i) result(yes)
     class(domain_grid_t), intent(in) :: self
-    type(tag_t), intent(in) :: tag
+    integer(int32), intent(in) :: i
     logical :: yes
 
-    yes = tag%track == 0
-    if (.not. yes) yes = self%track(tag%track)%own
+    yes = self%track_of(i) == 0
+    if (.not. yes) yes = self%track(self%track_of(i))%own
   end function is_own
 
   !> Whether a disk that was in these columns and rows, and nowhere else, could have met an own one.

@@ -70,7 +70,6 @@ contains
       n = n + 1
       self%sim%disk(n) = sim%disk(i)
       self%sim%tag(n) = sim%tag(i)
-      self%sim%tag(n)%track = 0
       self%home(n) = i
       if (any(sim%box%periodic)) self%sim%image(:, n) = sim%image(:, i)
     end do
@@ -141,11 +140,13 @@ contains
       if (allocated(grid%reached)) deallocate (grid%reached)
       allocate (grid%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
     end associate
+    if (allocated(grid%track_of)) deallocate (grid%track_of)
+    allocate (grid%track_of(self%sim%n_disks()), source=0)
     call self%engine%start(self%sim)
     call grid%begin_window()
     grid%n_tracks = 0
     do k = 1, n
-      call grid%begin_track(self%sim%tag, k)
+      call grid%begin_track(self%sim%tag(k)%cell, k)
     end do
     call list_copies(self, grid)
   end subroutine start
@@ -289,7 +290,7 @@ contains
     select type (grid => self%engine%search)
     type is (domain_grid_t)
       do k = 1, self%sim%n_disks()
-        if (self%sim%tag(k)%id == 0 .or. .not. grid%is_own(self%sim%tag(k))) cycle
+        if (self%sim%tag(k)%id == 0 .or. .not. grid%is_own(k)) cycle
         sim%disk(self%home(k)) = self%sim%disk(k)
         sim%tag(self%home(k)) = self%sim%tag(k)
         if (size(self%sim%image) > 0) sim%image(:, self%home(k)) = self%sim%image(:, k)

@@ -30,7 +30,6 @@ module disks
     integer(int16) :: cell(2) = 0_int16         !! column and row of the cell grid
     integer(int32) :: window = 0                !! of time in which the queue filed the expected event
     integer(int32) :: partner_stamp = 0         !! the partner's stamp when the event was predicted
-    integer(int32) :: track = 0                 !! where several cores run: number of its track, 0: none (`domain_grid`)
   end type tag_t
 
   !> Disks of one species share what the contact law says of them and, unless a file says otherwise, their mass.
