@@ -1,6 +1,6 @@
 !> The part of the event queue for later times: append-only buckets of one cache line, one for each of the next
 !> windows of time, and unordered lists for longer spans beyond. Appending touches few cache lines; nothing is ever
-!> searched or removed singly.
+!> searched or removed singly. All lists share one array, in chunks: what a span leaves is used by the next.
 module calendar
   use kinds, only: int32, real64
   use disks, only: tag_t
@@ -22,21 +22,24 @@ module calendar
     integer(int32) :: disk(bucket_capacity)
   end type bucket_t
 
-  !> A disk and the window in which it expects its event.
+  integer(int32), parameter :: log_chunk = 7
+  integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)    !! of a list, its link among it: one KiB
+  integer(int32), parameter :: none = -1
+
+  !> A disk and the window in which it expects its event; at the beginning of a chunk, as `disk`, the number of another one.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
   end type filed_t
 
-  !> Events of one span, this turn of the ring or later.
-  type :: span_t
-    integer(int32) :: n = 0
-    type(filed_t), allocatable :: filed(:)         !! (n, and room for more)
-  end type span_t
-
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
-    type(span_t), allocatable :: span(:)           !! (0:) a ring as well; a span is half a turn of the other
+    !> (0:) a ring as well; a span is half a turn of the other. Its list holds events of this turn or later, and ends before
+    !> this place; the chunk before is linked to, or `none`.
+    integer(int32), allocatable :: list_end(:)
+    type(filed_t), allocatable :: filed(:)         !! (0:) the lists, in chunks
+    integer(int32) :: n_chunks = 0                 !! in use, or vacant again
+    integer(int32) :: vacant = none                !! a vacant chunk, which links to others
     integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
     integer(int32) :: last_span = 0                !! likewise, of spans
     integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
@@ -50,7 +53,7 @@ module calendar
     procedure :: span_begins
     procedure :: open_span
     procedure :: list_coming
-    procedure, private :: lengthen                 ! bound, so that it is not inlined into the hot path
+    procedure, private :: add_chunk                ! bound, so that it is not inlined into the hot path
   end type calendar_t
 
 contains
@@ -60,7 +63,7 @@ contains
   subroutine empty(self, n)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: n                !! number of disks
-    integer(int32) :: s, length
+    integer(int32) :: length
 
     length = min(2*n, merge(2048, max(512, 3*nint(sqrt(real(n)))), n <= few_disks))
     self%log_span = 3
@@ -73,17 +76,17 @@ contains
       self%last_span = 2*self%last_span + 1
     end do
     if (allocated(self%bucket)) then
-      if (size(self%bucket) /= self%last_bucket + 1 .or. size(self%span) /= self%last_span + 1) &
-        deallocate (self%bucket, self%span)
+      if (size(self%bucket) /= self%last_bucket + 1 .or. size(self%list_end) /= self%last_span + 1) &
+        deallocate (self%bucket, self%list_end, self%filed)
     end if
     if (.not. allocated(self%bucket)) then
-      allocate (self%bucket(0:self%last_bucket), self%span(0:self%last_span))
-      do s = 0, self%last_span
-        allocate (self%span(s)%filed(16))
-      end do
+      allocate (self%bucket(0:self%last_bucket), self%list_end(0:self%last_span))
+      allocate (self%filed(0:chunk*(self%last_span + 1 + 2*n/chunk) - 1))      ! what is not used takes no memory
     end if
     self%bucket%n = 0
-    self%span%n = 0
+    self%list_end = 0
+    self%n_chunks = 0
+    self%vacant = none
   end subroutine empty
 
   !> Begins with a window.
@@ -115,28 +118,38 @@ contains
   subroutine put_far(self, i, window)
     class(calendar_t), intent(inout) :: self
     integer(int32), intent(in) :: i, window
-    integer(int32) :: s, n
+    integer(int32) :: s, place
 
     s = iand(shiftr(window, self%log_span), self%last_span)
-    n = self%span(s)%n + 1
-    if (n > size(self%span(s)%filed)) call self%lengthen(s)
-    self%span(s)%filed(n)%disk = i
-    self%span(s)%filed(n)%window = window
-    self%span(s)%n = n
+    place = self%list_end(s)
+    if (iand(place, chunk - 1) == 0) call self%add_chunk(place)
+    self%filed(place)%disk = i
+    self%filed(place)%window = window
+    self%list_end(s) = place + 1
   end subroutine put_far
 
-  !> Doubles the room of a span. What is not used of it takes no memory.
-  subroutine lengthen(self, s)
+  !> Adds a chunk to the list that ends before `place`.
+  subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    integer(int32), intent(in) :: s
-    type(filed_t), allocatable :: longer(:)
+    integer(int32), intent(inout) :: place         !! that of the first event in the chunk
+    type(filed_t), allocatable :: more(:)
+    integer(int32) :: c
 
-    associate (filed => self%span(s)%filed)
-      allocate (longer(2*size(filed)))
-      longer(:size(filed)) = filed
-    end associate
-    call move_alloc(longer, self%span(s)%filed)
-  end subroutine lengthen
+    c = self%vacant
+    if (c /= none) then
+      self%vacant = self%filed(chunk*c)%disk
+    else
+      c = self%n_chunks
+      self%n_chunks = c + 1
+      if (chunk*self%n_chunks > size(self%filed)) then
+        allocate (more(0:2*size(self%filed) - 1))
+        more(:size(self%filed) - 1) = self%filed
+        call move_alloc(more, self%filed)
+      end if
+    end if
+    self%filed(chunk*c)%disk = shiftr(place, log_chunk) - 1
+    place = chunk*c + 1
+  end subroutine add_chunk
 
   !> Whether a window is the first of a span.
   pure function span_begins(self, window) result(yes)
@@ -155,25 +168,32 @@ contains
     integer(int32), intent(out) :: n_surplus
     integer(int32), allocatable, intent(inout) :: surplus(:)     !! (n_surplus) disks; grows as needed
     type(filed_t) :: filed
-    integer(int32) :: s, k, n
+    integer(int32) :: s, c, k, list_end, before
     logical :: full
 
     s = iand(shiftr(self%ring_end, self%log_span), self%last_span)
     self%ring_end = self%ring_end + shiftl(1_int32, self%log_span)
-    n = self%span(s)%n
-    self%span(s)%n = 0
+    list_end = self%list_end(s)
+    self%list_end(s) = 0
     n_surplus = 0
-    do k = 1, n
-      filed = self%span(s)%filed(k)
-      if (filed%window < self%ring_end) then
-        call self%put_near(filed%disk, filed%window, full)
-        if (.not. full) cycle
-        n_surplus = n_surplus + 1
-        if (n_surplus > size(surplus)) surplus = [surplus, surplus]
-        surplus(n_surplus) = filed%disk
-      else if (tag(filed%disk)%window == filed%window) then    ! appends at most where it has read
-        call self%put_far(filed%disk, filed%window)
-      end if
+    do while (list_end > 0)
+      c = shiftr(list_end - 1, log_chunk)
+      do k = chunk*c + 1, list_end - 1
+        filed = self%filed(k)
+        if (filed%window < self%ring_end) then
+          call self%put_near(filed%disk, filed%window, full)
+          if (.not. full) cycle
+          n_surplus = n_surplus + 1
+          if (n_surplus > size(surplus)) surplus = [surplus, surplus]
+          surplus(n_surplus) = filed%disk
+        else if (tag(filed%disk)%window == filed%window) then
+          call self%put_far(filed%disk, filed%window)
+        end if
+      end do
+      before = self%filed(chunk*c)%disk
+      self%filed(chunk*c)%disk = self%vacant
+      self%vacant = c
+      list_end = chunk*(before + 1)
     end do
   end subroutine open_span
 
