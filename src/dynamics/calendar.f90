@@ -26,7 +26,7 @@ module calendar
   integer(int32), parameter :: chunk = shiftl(1_int32, log_chunk)    !! of a list, its link among it: one KiB
   integer(int32), parameter :: none = -1
 
-  !> A disk and the window in which it expects its event; at the beginning of a chunk, as `disk`, the number of another one.
+  !> A disk and the window in which it expects its event. In the first place of a chunk `disk` is the number of another chunk.
   type :: filed_t
     integer(int32) :: disk
     integer(int32) :: window
@@ -34,12 +34,12 @@ module calendar
 
   type :: calendar_t
     type(bucket_t), allocatable :: bucket(:)       !! (0:) a ring, length a power of two
-    !> (0:) a ring as well; a span is half a turn of the other. Its list holds events of this turn or later, and ends before
-    !> this place; the chunk before is linked to, or `none`.
+    !> (0:) a ring as well: the place in `filed` behind the list of each span, 0 if it is empty. A span is half a turn of the
+    !> other ring; its list holds events of this turn or later.
     integer(int32), allocatable :: list_end(:)
-    type(filed_t), allocatable :: filed(:)         !! (0:) the lists, in chunks
-    integer(int32) :: n_chunks = 0                 !! in use, or vacant again
-    integer(int32) :: vacant = none                !! a vacant chunk, which links to others
+    type(filed_t), allocatable :: filed(:)         !! (0:) all lists, in chunks that link to those filled before
+    integer(int32) :: n_chunks = 0                 !! that have been in use
+    integer(int32) :: vacant = none                !! a chunk that is no longer in use, which links to others
     integer(int32) :: last_bucket = 0              !! one less than a power of two: masks numbers of windows
     integer(int32) :: last_span = 0                !! likewise, of spans
     integer(int32) :: log_span = 0                 !! binary logarithm of the windows in a span
@@ -131,7 +131,7 @@ contains
   !> Adds a chunk to the list that ends before `place`.
   subroutine add_chunk(self, place)
     class(calendar_t), intent(inout) :: self
-    integer(int32), intent(inout) :: place         !! that of the first event in the chunk
+    integer(int32), intent(inout) :: place         !! afterwards that of the first event in the chunk
     type(filed_t), allocatable :: more(:)
     integer(int32) :: c
 

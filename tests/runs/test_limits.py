@@ -189,13 +189,13 @@ def test_the_memory_foretold_is_the_memory_used(limited, program, placement, cou
 
 
 @pytest.mark.check
-def test_two_threads_use_at_most_340_bytes_per_disk(program, tmp_path):
+def test_two_threads_use_at_most_275_bytes_per_disk(program, tmp_path):
     """And 25 MB, samples apart; to the end, where one core goes on alone."""
     count = 500_000
     (tmp_path / "gas.nml").write_text(GAS.format(count=count, collisions=5 * count))
     command = [program, "gas.nml", "-o", "two.h5", "--quiet", "--set", "run.threads=2"]
     used = subprocess.check_output(["python3", "-c", MEASURE, *command], cwd=tmp_path, text=True)
-    assert int(used) * 1024 < 340 * count + 25e6
+    assert int(used) * 1024 < 275 * count + 25e6
 
 
 @pytest.mark.check
