@@ -6,6 +6,7 @@ module domain_grid
   use kinds, only: int16, int32, int64, real64
   use cell_grid, only: cell_grid_t
   use exact_sums, only: exact_sum_t
+  use memory_hints, only: prefetch
   use partners, only: n_sides, nothing
   use simulation_state, only: simulation_t
   implicit none
@@ -39,6 +40,7 @@ module domain_grid
     procedure :: predict
     procedure :: predict_both
     procedure :: cross
+    procedure :: read_ahead
     procedure :: begin_window
     procedure :: begin_track
     procedure :: drop_track
@@ -195,6 +197,22 @@ contains
     call self%cell_grid_t%cross(sim, i, code)
     call self%note(sim%tag(i)%cell, i)
   end subroutine cross
+
+  !> Prefetches what predictions of some disks will read, and the numbers of the tracks of them and of their partners.
+  subroutine read_ahead(self, sim, stage, disks)
+    class(domain_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: stage
+    integer(int32), intent(in) :: disks(:)
+    integer(int32) :: k
+
+    call self%cell_grid_t%read_ahead(sim, stage, disks)
+    if (stage /= 2) return
+    do k = 1, size(disks)
+      call prefetch(self%track_of(disks(k)))
+      call prefetch(self%track_of(max(sim%disk(disks(k))%partner, 1)))
+    end do
+  end subroutine read_ahead
 
   !> Notes where disk i is.
   subroutine note(self, cell, i)
