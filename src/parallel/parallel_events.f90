@@ -37,12 +37,15 @@ module parallel_events
     real(real64) :: window = 0.5_real64            !! collisions per disk in a window of time
     integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
     integer(int32) :: least_disks = 1000           !! of a domain
+    integer(int32) :: most_disks = 50000           !! likewise, if it is to fit into caches
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! Of these two only one is there at a time, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the plain one at work
     type(domain_t), allocatable, private :: domain(:)
     type(domain_cuts_t), private :: cuts
     integer(int32), private :: wanted = 1          !! domains
+    real(real64), private :: usual_window = 0.5_real64     !! `window`, or more where each thread has several domains
+    integer(int32), private :: usual_halo = 6      !! `halo`, or more, likewise
     integer, private :: holder = 0                 !! of the events predicted: nobody, the plain engine, the domains
     real(real64), private :: rate = 0.0_real64     !! of events [1/time]
     real(real64), private :: shortening = 1.0_real64   !! of windows, after failures
@@ -64,10 +67,19 @@ contains
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
+    integer(int32) :: per_thread
 
     self%holder = nobody
     self%idle = .false.
     self%wanted = min(self%threads, sim%n_disks()/self%least_disks)
+    self%usual_window = self%window
+    self%usual_halo = self%halo
+    per_thread = sim%n_disks()/self%most_disks/max(self%wanted, 1)
+    if (self%wanted > 1 .and. per_thread > 1) then ! a cache takes in one after the other for a window of time
+      self%wanted = per_thread*self%wanted
+      self%usual_window = 2*self%window
+      self%usual_halo = self%halo + 2
+    end if
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
@@ -192,7 +204,7 @@ contains
     real(real64), intent(in) :: t, t_limit         !! since the epoch [time]
     real(real64) :: t_end, length
 
-    length = self%window*self%shortening*sim%n_disks()/(2*rate_of(self, sim))
+    length = self%usual_window*self%shortening*sim%n_disks()/(2*rate_of(self, sim))
     t_end = t + length
     if (t_end + 0.5_real64*length > t_limit) t_end = t_limit
   end function window_end
@@ -245,7 +257,7 @@ contains
       cell(:, i) = int(whole%cell_at(sim%position(i)), int16)
     end do
     !$omp end parallel do
-    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%halo + self%widening)
+    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%usual_halo + self%widening)
     if (self%cuts%n < 2) return
     if (allocated(self%engine)) deallocate (self%engine)
     if (allocated(self%domain)) then
@@ -300,7 +312,7 @@ contains
     self%windows_done = self%windows_done + 1
     if (.not. good) then
       self%windows_failed = self%windows_failed + 1
-      self%widening = min(self%widening + 2, self%halo)
+      self%widening = min(self%widening + 2, self%usual_halo)
     else
       if (t > t_begin) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t - t_begin)
       self%shortening = min(1.0_real64, 1.1_real64*self%shortening)
