@@ -17,7 +17,7 @@ module domains
   public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, next_time, news_t
 
   integer, parameter :: log_capacity = 1024
-  integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
+  integer(int32), parameter :: spare = 64, spare_at_least = 200    !! slots for disks to come: one of so many, and more
 
   !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
   type :: news_t
@@ -155,11 +155,12 @@ contains
   subroutine list_copies(self, grid)
     type(domain_t), intent(inout) :: self
     type(domain_grid_t), intent(in) :: grid
-    integer(int32) :: k, place
+    integer(int32) :: k, place, copies
 
-    if (2*grid%n_tracks > self%last_key .or. .not. allocated(self%key)) then
+    copies = count(.not. grid%track(:grid%n_tracks)%own, kind=int32)
+    if (.not. allocated(self%key) .or. 3*copies > 2*self%last_key) then
       self%last_key = 255
-      do while (self%last_key < 3*grid%n_tracks)
+      do while (self%last_key < 2*copies)
         self%last_key = 2*self%last_key + 1
       end do
       if (allocated(self%key)) deallocate (self%key, self%slot)
