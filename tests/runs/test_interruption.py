@@ -149,7 +149,7 @@ def test_progress_stays_on_one_line_of_a_narrow_terminal(program, tmp_path):
     run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
     assert run.wait(timeout=20) == STOPPED
     os.close(keyboard)
-    shown = os.read(screen, 65536).decode()
+    shown = all_of(screen).decode()
     os.close(screen)
     lines = re.findall(r"\r\x1b\[\?7l(.*?)\x1b\[K\x1b\[\?7h", shown)
     shares = [float(re.search(r"([\d.]+) %", line)[1]) for line in lines]
@@ -239,11 +239,20 @@ def test_the_terminal_shows_how_far_the_disks_are_placed(program, tmp_path):
     finally:
         run.kill()
     os.close(keyboard)
-    shown = os.read(screen, 65536).decode()
+    shown = all_of(screen).decode()
     os.close(screen)
     shares = [float(share) for share in re.findall(r"\rplacing disks: ([\d.]+) %", plain(shown))]
     assert len(shares) >= 2 and 0 <= shares[0] < shares[-1] < 100
     assert shown.split("\r\x1b[K")[-1].startswith("stopped before the run began")
+
+
+def all_of(screen) -> bytes:
+    """What a terminal got from a program that has ended; it may arrive in several pieces."""
+    pieces = []
+    with contextlib.suppress(OSError):  # at the end, on Linux
+        while pieces[-1:] != [b""]:
+            pieces.append(os.read(screen, 65536))
+    return b"".join(pieces)
 
 
 def plain(shown) -> str:
