@@ -17,7 +17,7 @@ module domains
   public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, next_time, news_t
 
   integer, parameter :: log_capacity = 1024
-  integer(int32), parameter :: spare = 64, spare_at_least = 200    !! slots for disks to come: one of so many, and more
+  integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
 
   !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
   type :: news_t
