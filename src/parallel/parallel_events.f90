@@ -185,6 +185,8 @@ contains
       .and. t - sim%last_advance >= sim%blink      ! else the plain engine looks for a collapse
     if (good .and. held) then
       call gather_all(self, sim, t)
+      ! Not before: windows that the next failure throws away could make up for each halving, for ever.
+      self%shortening = min(1.0_real64, 1.1_real64**w*self%shortening)
       if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
       if (all(self%domain%engine%idle)) self%plain_until = sim%events + 1
     else
@@ -315,7 +317,6 @@ contains
       self%widening = min(self%widening + 2, self%usual_halo)
     else
       if (t > t_begin) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t - t_begin)
-      self%shortening = min(1.0_real64, 1.1_real64*self%shortening)
     end if
   end subroutine run_window
 
