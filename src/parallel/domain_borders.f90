@@ -27,7 +27,7 @@ contains
       do m = 1, size(domain(k)%neighbour)
         if (domain(k)%good) call compare(domain(k), grid, domain(domain(k)%neighbour(m)), found)
       end do
-      if (found < count(.not. grid%track(:grid%n_tracks)%own)) domain(k)%good = .false.     ! a copy that nobody owns
+      if (found < grid%n_copies()) domain(k)%good = .false.    ! a copy that nobody owns
     end select
   end subroutine verify
 

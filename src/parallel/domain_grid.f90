@@ -48,6 +48,7 @@ module domain_grid
     procedure :: could_have_met
     procedure :: owns
     procedure :: is_own
+    procedure :: n_copies
     procedure, private :: add_track
     procedure, private :: note
   end type domain_grid_t
@@ -278,6 +279,14 @@ contains
     yes = self%track_of(i) == 0
     if (.not. yes) yes = self%track(self%track_of(i))%own
   end function is_own
+
+  !> How many copies there are.
+  pure function n_copies(self) result(n)
+    class(domain_grid_t), intent(in) :: self
+    integer(int32) :: n
+
+    n = count(.not. self%track(:self%n_tracks)%own, kind=int32)
+  end function n_copies
 
   !> Whether a disk that was in these columns and rows, and nowhere else, could have met an own one.
   pure function could_have_met(self, low, high) result(yes)

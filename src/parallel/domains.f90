@@ -157,7 +157,7 @@ contains
     type(domain_grid_t), intent(in) :: grid
     integer(int32) :: k, place, copies
 
-    copies = count(.not. grid%track(:grid%n_tracks)%own, kind=int32)
+    copies = grid%n_copies()
     if (.not. allocated(self%key) .or. 3*copies > 2*self%last_key) then
       self%last_key = 255
       do while (self%last_key < 2*copies)

@@ -44,8 +44,6 @@ module parallel_events
     type(domain_t), allocatable, private :: domain(:)
     type(domain_cuts_t), private :: cuts
     integer(int32), private :: wanted = 1          !! domains
-    real(real64), private :: usual_window = 0.5_real64     !! `window`, or more where each thread has several domains
-    integer(int32), private :: usual_halo = 6      !! `halo`, or more, likewise
     integer, private :: holder = 0                 !! of the events predicted: nobody, the plain engine, the domains
     real(real64), private :: rate = 0.0_real64     !! of events [1/time]
     real(real64), private :: shortening = 1.0_real64   !! of windows, after failures
@@ -72,14 +70,8 @@ contains
     self%holder = nobody
     self%idle = .false.
     self%wanted = min(self%threads, sim%n_disks()/self%least_disks)
-    self%usual_window = self%window
-    self%usual_halo = self%halo
     per_thread = sim%n_disks()/self%most_disks/max(self%wanted, 1)
-    if (self%wanted > 1 .and. per_thread > 1) then ! a cache takes in one after the other for a window of time
-      self%wanted = per_thread*self%wanted
-      self%usual_window = 2*self%window
-      self%usual_halo = self%halo + 2
-    end if
+    if (self%wanted > 1) self%wanted = max(per_thread, 1)*self%wanted
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
@@ -206,7 +198,8 @@ contains
     real(real64), intent(in) :: t, t_limit         !! since the epoch [time]
     real(real64) :: t_end, length
 
-    length = self%usual_window*self%shortening*sim%n_disks()/(2*rate_of(self, sim))
+    length = self%window*self%shortening*sim%n_disks()/(2*rate_of(self, sim))
+    if (self%wanted > self%threads) length = 2*length      ! a cache takes in each domain once in a window
     t_end = t + length
     if (t_end + 0.5_real64*length > t_limit) t_end = t_limit
   end function window_end
@@ -259,7 +252,8 @@ contains
       cell(:, i) = int(whole%cell_at(sim%position(i)), int16)
     end do
     !$omp end parallel do
-    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%usual_halo + self%widening)
+    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, &
+      self%halo + self%widening + merge(2, 0, self%wanted > self%threads))
     if (self%cuts%n < 2) return
     if (allocated(self%engine)) deallocate (self%engine)
     if (allocated(self%domain)) then
@@ -314,9 +308,9 @@ contains
     self%windows_done = self%windows_done + 1
     if (.not. good) then
       self%windows_failed = self%windows_failed + 1
-      self%widening = min(self%widening + 2, self%usual_halo)
-    else
-      if (t > t_begin) self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t - t_begin)
+      self%widening = min(self%widening + 2, self%halo)
+    else if (t > t_begin) then
+      self%rate = max(sum(self%domain%sim%events) - events, 1_int64)/(t - t_begin)
     end if
   end subroutine run_window
 
