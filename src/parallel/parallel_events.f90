@@ -110,6 +110,7 @@ contains
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
+    if (allocated(self%domain)) deallocate (self%domain)   ! which leaves room to sort the disks
     call move_epoch(sim)
     self%holder = nobody
     self%widening = max(self%widening - 1, 0)
