@@ -93,7 +93,7 @@ contains
         events%search%everyone = settings%run%search == "rescan"
       end if
       events%windowed = settings%run%queue == "calendar"
-      if (settings%run%search == "cells" .and. settings%run%threads > 1) then
+      if (settings%wants_domains()) then
         allocate (parallel)
         parallel%plain = events
         parallel%threads = settings%run%threads

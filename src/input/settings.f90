@@ -10,6 +10,8 @@ module settings
   private
   public :: settings_t, run_settings_t, species_settings_t, output_settings_t
 
+  integer, parameter :: many_disks = 500000           !! from here on parts of the box that fit into caches pay
+
   type :: run_settings_t
     character(len=:), allocatable :: title
     integer(int64) :: seed
@@ -59,6 +61,19 @@ module settings
     type(species_settings_t), allocatable :: species(:)
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
+  contains
+    procedure :: wants_domains
   end type settings_t
+
+contains
+
+  !> Whether the box is to be cut into domains: for several threads, or one after the other.
+  pure function wants_domains(self) result(yes)
+    class(settings_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
+      .and. (self%run%threads > 1 .or. sum(int(self%species%count, int64)) >= many_disks)
+  end function wants_domains
 
 end module settings

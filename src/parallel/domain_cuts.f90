@@ -27,20 +27,20 @@ module domain_cuts
 
 contains
 
-  !> Cuts the box into at most `wanted` domains, none narrower than two halos.
-  subroutine cut(self, whole, periodic, cell, wanted, halo)
+  !> Cuts the box into at most `wanted` domains for some threads, none narrower than two halos.
+  subroutine cut(self, whole, periodic, cell, wanted, threads, halo)
     class(domain_cuts_t), intent(inout) :: self
     type(patch_t), intent(in) :: whole
     logical, intent(in) :: periodic(2)
     integer(int16), intent(in) :: cell(:, :)       !! (2,disks) where they are
-    integer(int32), intent(in) :: wanted, halo
+    integer(int32), intent(in) :: wanted, threads, halo
     type(cuts_t) :: slabs, pieces
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
     self%whole = whole
     self%halo = halo
-    n = numbers(self, periodic, wanted)
+    n = numbers(self, periodic, wanted, threads)
     self%n = product(n)
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
@@ -68,31 +68,33 @@ contains
     end do
   end subroutine cut
 
-  !> How many slabs, and domains in each: as square as can be, and none too narrow.
-  pure function numbers(self, periodic, wanted) result(n)
+  !> How many slabs, and domains in each: not many fewer than wanted, none too narrow, and so that the work is least.
+  pure function numbers(self, periodic, wanted, threads) result(n)
     class(domain_cuts_t), intent(in) :: self
     logical, intent(in) :: periodic(2)
-    integer(int32), intent(in) :: wanted
-    integer(int32) :: n(2), most(2), columns
+    integer(int32), intent(in) :: wanted, threads
+    integer(int32) :: n(2), most(2), columns, rows
 
     most = max(self%whole%n/(2*self%halo + 1), 1)
     n = 1
     do columns = 1, min(wanted, most(1))
-      if (crowding(self, [columns, min(wanted/columns, most(2))], periodic, wanted) &
-        < crowding(self, n, periodic, wanted)) n = [columns, min(wanted/columns, most(2))]
+      rows = min(wanted/columns, most(2))
+      if (3*columns*rows < 2*min(wanted, product(most))) cycle
+      if (all(n == 1) .or. work(self, [columns, rows], periodic, threads) < work(self, n, periodic, threads)) &
+        n = [columns, rows]
     end do
   end function numbers
 
-  !> What is to be small: the largest number of cells in a patch, as if cuts were even, with a penalty for few domains.
-  pure function crowding(self, n, periodic, wanted)
+  !> The cells in the largest patch, as if cuts were even, as often as a thread has another domain.
+  pure function work(self, n, periodic, threads)
     class(domain_cuts_t), intent(in) :: self
-    integer(int32), intent(in) :: n(2), wanted
+    integer(int32), intent(in) :: n(2), threads
     logical, intent(in) :: periodic(2)
-    real(real64) :: crowding
+    real(real64) :: work
 
-    crowding = product(real(self%whole%n, real64)/n + merge(2*self%halo, 0, n > merge(1, 2, periodic)) &
-      + merge(self%halo, 0, n == 2 .and. .not. periodic))*real(wanted, real64)/product(n)
-  end function crowding
+    work = product(real(self%whole%n, real64)/n + merge(2*self%halo, 0, n > merge(1, 2, periodic)) &
+      + merge(self%halo, 0, n == 2 .and. .not. periodic))*((product(n) + threads - 1)/threads)
+  end function work
 
   !> Cuts a line of cells into n pieces of about equal weight, each at least `least` cells long.
   pure subroutine divide(weight, n, least, cuts)

@@ -37,7 +37,7 @@ module parallel_events
     real(real64) :: window = 0.5_real64            !! collisions per disk in a window of time
     integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
     integer(int32) :: least_disks = 1000           !! of a domain
-    integer(int32) :: most_disks = 50000           !! likewise, if it is to fit into caches
+    integer(int32) :: most_disks = 62000           !! likewise, if it is to fit into caches
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! Of these two only one is there at a time, to save memory.
     type(event_driven_t), allocatable, private :: engine   !! the plain one at work
@@ -65,13 +65,11 @@ contains
   subroutine start(self, sim)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32) :: per_thread
 
     self%holder = nobody
     self%idle = .false.
     self%wanted = min(self%threads, sim%n_disks()/self%least_disks)
-    per_thread = sim%n_disks()/self%most_disks/max(self%wanted, 1)
-    if (self%wanted > 1) self%wanted = max(per_thread, 1)*self%wanted
+    if (self%wanted > 0) self%wanted = self%wanted*max(sim%n_disks()/self%most_disks/self%wanted, 1)
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
@@ -110,7 +108,7 @@ contains
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    if (allocated(self%domain)) deallocate (self%domain)   ! which leaves room to sort the disks
+    if (self%wanted > self%threads .and. allocated(self%domain)) deallocate (self%domain)  ! to leave room for sorting many
     call move_epoch(sim)
     self%holder = nobody
     self%widening = max(self%widening - 1, 0)
@@ -253,7 +251,7 @@ contains
       cell(:, i) = int(whole%cell_at(sim%position(i)), int16)
     end do
     !$omp end parallel do
-    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, &
+    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%threads, &
       self%halo + self%widening + merge(2, 0, self%wanted > self%threads))
     if (self%cuts%n < 2) return
     if (allocated(self%engine)) deallocate (self%engine)

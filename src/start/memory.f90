@@ -33,7 +33,7 @@ contains
       if (any(settings%species(k)%placement == [character(len=5) :: "dense", "grown"])) each = per_growing_disk
     end do
     if (settings%run%dynamics == "steps") each = max(each, per_stepped_disk)
-    if (settings%run%threads > 1) each = max(each, per_shared_disk + merge(per_logged_disk, 0_int64, settings%output%event_log))
+    if (settings%wants_domains()) each = max(each, per_shared_disk + merge(per_logged_disk, 0_int64, settings%output%event_log))
     needed = n*each + besides
     call available_memory("", available, limit)
     if (needed > available) call fail(error, exit_usage, "species.count: "//written(n)//" disks need about " &
