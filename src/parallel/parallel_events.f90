@@ -1,7 +1,8 @@
-!> Event-driven dynamics on several cores, with every bit of one core. Space is cut into domains; each has an engine of
-!> its own, and they compare at the end of every window of time (see `domains`). If a window does not hold, all go back
-!> to the state in which they set out. What is rare and awkward is left to the plain engine: small or idle systems, a
-!> moment within simultaneous collisions, a collapse.
+!> Event-driven dynamics on several cores, or on one whose cache takes in a part of the disks at a time, with every
+!> bit of the plain engine. Space is cut into domains; each has an engine of its own, and they compare at the end of
+!> every window of time (see `domains`). If a window does not hold, all go back to the state in which they set out.
+!> What is rare and awkward is left to the plain engine: small or idle systems, a moment within simultaneous
+!> collisions, a collapse.
 module parallel_events
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t

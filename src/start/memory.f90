@@ -12,7 +12,7 @@ module memory
   ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
   integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 430, &
     besides = 25000000
-  integer(int64), parameter :: per_logged_disk = 110       !! in the lists of collisions of several threads
+  integer(int64), parameter :: per_logged_disk = 110       !! in the lists of collisions of several domains
   integer(int64), parameter :: unlimited = huge(1_int64)
   ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.
   integer, parameter :: most_lines = 1000

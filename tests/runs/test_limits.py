@@ -189,11 +189,13 @@ def test_the_memory_foretold_is_the_memory_used(limited, program, placement, cou
 
 
 @pytest.mark.check
-def test_two_threads_use_at_most_275_bytes_per_disk(program, tmp_path):
+@pytest.mark.parametrize("threads", [1, 2])
+def test_domains_use_at_most_275_bytes_per_disk(program, tmp_path, threads):
     """And 25 MB, samples apart; to the end, where one core goes on alone."""
     count = 500_000
     (tmp_path / "gas.nml").write_text(GAS.format(count=count, collisions=5 * count))
-    command = [program, "gas.nml", "-o", "two.h5", "--quiet", "--set", "run.threads=2"]
+    command = [program, "gas.nml", "-o", "many.h5", "--quiet"]
+    command += ["--set", f"run.threads={threads}"]
     used = subprocess.check_output(["python3", "-c", MEASURE, *command], cwd=tmp_path, text=True)
     assert int(used) * 1024 < 275 * count + 25e6
 
