@@ -160,7 +160,10 @@ contains
     began = seconds()
     if (self%holder /= all_domains) call load_all(self, sim)
     held = self%cuts%n > 1
-    if (.not. held) return
+    if (.not. held) then
+      self%plain_until = sim%events + plain_events*sim%n_disks()
+      return
+    end if
     self%holder = all_domains
     do k = 1, self%cuts%n
       call keep_log(self%domain(k), self%log%is_on())
