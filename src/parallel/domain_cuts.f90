@@ -85,7 +85,7 @@ contains
     end do
   end function numbers
 
-  !> The cells in the largest patch, as if cuts were even, as often as a thread has another domain.
+  !> What one thread has to do: its number of domains times the cells in the largest patch, as if cuts were even.
   pure function work(self, n, periodic, threads)
     class(domain_cuts_t), intent(in) :: self
     integer(int32), intent(in) :: n(2), threads
