@@ -11,6 +11,7 @@ module run_setup
   use input_fit, only: check_fit
   use input_problems, only: problem_list_t
   use input_text, only: read_text
+  use memory, only: room_for_domains
   use namelist_input, only: read_settings
   use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
@@ -78,7 +79,10 @@ contains
     type(event_driven_t), allocatable :: events
     type(parallel_events_t), allocatable :: parallel
     type(time_stepped_t), allocatable :: steps
+    logical :: cuts_space
 
+    cuts_space = settings%wants_domains()
+    if (cuts_space) cuts_space = room_for_domains(settings)
     if (settings%run%dynamics == "steps") then
       allocate (steps)
       steps%dt = settings%run%dt
@@ -93,7 +97,7 @@ contains
         events%search%everyone = settings%run%search == "rescan"
       end if
       events%windowed = settings%run%queue == "calendar"
-      if (settings%wants_domains()) then
+      if (cuts_space) then
         allocate (parallel)
         parallel%plain = events
         parallel%threads = settings%run%threads

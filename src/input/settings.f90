@@ -62,10 +62,19 @@ module settings
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
   contains
+    procedure :: n_disks
     procedure :: wants_domains
   end type settings_t
 
 contains
+
+  !> The number of all disks.
+  pure function n_disks(self) result(n)
+    class(settings_t), intent(in) :: self
+    integer(int64) :: n
+
+    n = sum(int(self%species%count, int64))
+  end function n_disks
 
   !> Whether the box is to be cut into domains: for several threads, or one after the other.
   pure function wants_domains(self) result(yes)
@@ -73,7 +82,7 @@ contains
     logical :: yes
 
     yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
-      .and. (self%run%threads > 1 .or. sum(int(self%species%count, int64)) >= many_disks)
+      .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
   end function wants_domains
 
 end module settings

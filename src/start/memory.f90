@@ -1,5 +1,5 @@
-!> How much memory a run may use: a run that cannot fit is refused before it starts. On Linux; elsewhere no
-!> limit is known.
+!> How much memory a run may use: a run that cannot fit is refused before it starts, and one that is short of it goes
+!> without domains. On Linux; elsewhere no limit is known.
 module memory
   use kinds, only: int64
   use errors, only: error_t, exit_usage, fail
@@ -7,7 +7,7 @@ module memory
   use texts, only: size_text, written
   implicit none
   private
-  public :: check_memory, available_memory, number_after
+  public :: check_memory, room_for_domains, available_memory, number_after
 
   ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
   integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 430, &
@@ -24,21 +24,40 @@ contains
     type(settings_t), intent(in) :: settings
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: limit
-    integer(int64) :: n, each, needed, available
+    integer(int64) :: available
+
+    call available_memory("", available, limit)
+    if (bytes_needed(settings, .false.) > available) call fail(error, exit_usage, "species.count: " &
+      //written(settings%n_disks())//" disks need about "//size_text(bytes_needed(settings, .false.)) &
+      //" of memory; "//limit//" leaves "//size_text(available)//"; use fewer disks")
+  end subroutine check_memory
+
+  !> Whether there is memory to cut the box into domains.
+  function room_for_domains(settings) result(yes)
+    type(settings_t), intent(in) :: settings
+    logical :: yes
+    integer(int64) :: available
+    character(len=:), allocatable :: limit
+
+    call available_memory("", available, limit)
+    yes = bytes_needed(settings, .true.) <= available
+  end function room_for_domains
+
+  !> What a run needs at most, with domains or without.
+  pure function bytes_needed(settings, domains) result(bytes)
+    type(settings_t), intent(in) :: settings
+    logical, intent(in) :: domains
+    integer(int64) :: bytes, each
     integer :: k
 
-    n = sum(int(settings%species%count, int64))
     each = per_disk
     do k = 1, size(settings%species)
       if (any(settings%species(k)%placement == [character(len=5) :: "dense", "grown"])) each = per_growing_disk
     end do
     if (settings%run%dynamics == "steps") each = max(each, per_stepped_disk)
-    if (settings%wants_domains()) each = max(each, per_shared_disk + merge(per_logged_disk, 0_int64, settings%output%event_log))
-    needed = n*each + besides
-    call available_memory("", available, limit)
-    if (needed > available) call fail(error, exit_usage, "species.count: "//written(n)//" disks need about " &
-      //size_text(needed)//" of memory; "//limit//" leaves "//size_text(available)//"; use fewer disks")
-  end subroutine check_memory
+    if (domains) each = max(each, per_shared_disk + merge(per_logged_disk, 0_int64, settings%output%event_log))
+    bytes = settings%n_disks()*each + besides
+  end function bytes_needed
 
   !> The tightest of all limits: free memory of the machine, ulimit, control groups.
   subroutine available_memory(root, bytes, limit)
