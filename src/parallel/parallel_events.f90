@@ -37,7 +37,7 @@ module parallel_events
     integer(int32) :: threads = 1
     real(real64) :: window = 0.5_real64            !! collisions per disk in a window of time
     integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
-    integer(int32) :: least_disks = 1000           !! of a domain
+    integer(int32) :: least_disks = 1250           !! of a domain; twice as many in a periodic box, which has twice as many cuts
     integer(int32) :: most_disks = 62000           !! likewise, if it is to fit into caches
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! Of these two only one is there at a time, to save memory.
@@ -69,7 +69,7 @@ contains
 
     self%holder = nobody
     self%idle = .false.
-    self%wanted = min(self%threads, sim%n_disks()/self%least_disks)
+    self%wanted = min(self%threads, sim%n_disks()/(self%least_disks*merge(2, 1, all(sim%box%periodic))))
     if (self%wanted > 0) self%wanted = self%wanted*max(sim%n_disks()/self%most_disks/self%wanted, 1)
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)

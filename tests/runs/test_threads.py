@@ -12,8 +12,8 @@ from whole_runs import FINISHED, STOPPED, differences, write_input
 CHECK = pytest.mark.check
 INPUTS = Path(__file__).resolve().parents[2] / "input"
 
-#: About the size at which several cores begin to pay.
-GAS = "&species name = 'gas' count = 5000 packing_fraction = {} placement = '{}' temperature = 1 /"
+#: So many that four cores share a periodic box.
+GAS = "&species name = 'gas' count = 10000 packing_fraction = {} placement = '{}' temperature = 1 /"
 BIG = "&species name = 'big' count = 3 radius = 0.03 mass = 9 temperature = 1 /\n"
 WALLS = "&box /"
 PERIODIC = "&box boundary = 'periodic', 'periodic' /"
@@ -33,12 +33,12 @@ SYSTEMS = {
     "thin": [
         PERIODIC,
         GAS.format(0.1, "random"),
-        "&stop events = 30000 / &output observables_every_events = 1111" + LOG,
+        "&stop events = 60000 / &output observables_every_events = 1111" + LOG,
     ],
     "dense": [
         PERIODIC,
         GAS.format(0.7, "lattice"),
-        "&stop collisions = 40000 / &output frames_every_collisions = 7001 /",
+        "&stop collisions = 80000 / &output frames_every_collisions = 7001 /",
     ],
     "pegs": [
         CHANNEL,
