@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Run many members of an ensemble or a scan: seeds x values, all cores, safe to stop and repeat.
 set -euo pipefail
+export OMP_NUM_THREADS=1 # a core for each member; run.threads still decides
 
 usage() {
   cat <<'TEXT'

@@ -97,6 +97,14 @@ def test_members_are_seeds_times_values(lab):
     assert "6 of 6 members finished, 0 failed" in result.stderr
 
 
+def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    with (lab / "program").open("a") as program:
+        program.write('echo "$OMP_NUM_THREADS" >"$out.threads"\n')
+    assert ensemble(lab, "--seeds", "1").returncode == 0
+    assert (lab / "out" / "seed_1.threads").read_text() == "1\n"
+
+
 def test_vector_values_are_separated_by_semicolons(lab):
     assert ensemble(lab, "--scan", "species.ball.velocity=0,-1;0,-2").returncode == 0
     assert [lines[0] for lines in starts(lab).values()] == [
