@@ -170,7 +170,7 @@ contains
         if (by_collisions .or. any(law%restitution < 1) .or. law%wall_restitution < 1) return
         call problems%add(0, "stop.energy_fraction", &
           "is never reached by elastic collisions; give another rule, or a restitution below 1")
-      else if (by_collisions .and. sum(settings%species%count) == 1) then
+      else if (by_collisions .and. settings%n_disks() == 1) then
         call problems%add(0, "stop", "a single disk never collides with another; give time or events")
       end if
     end associate

@@ -96,7 +96,10 @@ contains
     goal%events = min(limits%events, most_events(sim))
     goal%dissipated = limits%dissipated - abs(limits%dissipated)*rounding
     held = held .and. goal%time > sim%now
-    if (held) call self%visit(sim, goal, held)
+    if (held) then
+      call self%visit(sim, goal, held)
+      if (.not. held) self%plain_until = sim%events + plain_events*sim%n_disks()
+    end if
     if (.not. held) then
       call self%advance_plainly(sim, limits, error)
     else if (sim%events >= most_events(sim)) then
@@ -160,10 +163,7 @@ contains
     began = seconds()
     if (self%holder /= all_domains) call load_all(self, sim)
     held = self%cuts%n > 1
-    if (.not. held) then
-      self%plain_until = sim%events + plain_events*sim%n_disks()
-      return
-    end if
+    if (.not. held) return
     self%holder = all_domains
     do k = 1, self%cuts%n
       call keep_log(self%domain(k), self%log%is_on())
@@ -189,9 +189,7 @@ contains
       self%shortening = 0.5_real64*self%shortening
       held = held .and. self%shortening > shortest
     end if
-    if (held) return
-    self%plain_until = sim%events + plain_events*sim%n_disks()
-    self%shortening = 1
+    if (.not. held) self%shortening = 1
   end subroutine visit
 
   !> When the next window ends.

@@ -24,12 +24,12 @@ contains
     type(settings_t), intent(in) :: settings
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: limit
-    integer(int64) :: available
+    integer(int64) :: needed, available
 
+    needed = bytes_needed(settings, .false.)
     call available_memory("", available, limit)
-    if (bytes_needed(settings, .false.) > available) call fail(error, exit_usage, "species.count: " &
-      //written(settings%n_disks())//" disks need about "//size_text(bytes_needed(settings, .false.)) &
-      //" of memory; "//limit//" leaves "//size_text(available)//"; use fewer disks")
+    if (needed > available) call fail(error, exit_usage, "species.count: "//written(settings%n_disks()) &
+      //" disks need about "//size_text(needed)//" of memory; "//limit//" leaves "//size_text(available)//"; use fewer disks")
   end subroutine check_memory
 
   !> Whether there is memory to cut the box into domains.

@@ -13,7 +13,7 @@ module random_insertion
   public :: insert_at_random
 
   integer(int32), parameter :: disks_per_look = 1024    !! at the clock
-  integer, parameter :: n_ahead = 8                    !! attempts to read ahead for
+  integer, parameter :: n_ahead = 8                     !! attempts to read ahead for
 
   !> Where a centre may still fit.
   type :: voxels_t
