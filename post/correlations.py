@@ -8,12 +8,13 @@ Frames before equilibrium, which is found or begins after --skip, count for a2 a
 units of the mean free time 1/w, lengths of the mean diameter.
 
 VACF: at first it falls as exp(-w t), late, in theory, as 1/t (mode coupling).  Diffusion: D(t) is
-a quarter of the slope of the mean square displacement, and half the integral of <v(0) v(t)>; for
-equal disks beside D_E of Enskog.  In two dimensions the tail makes D(t) grow without end, as the
-logarithm of t: a D belongs to a time, and to a box, whose images are felt when sound has crossed
-it.  The table has both D, which must agree, between half of `D_time` and `D_time`; that is the time
-of crossing if an eighth of the run is longer.  Periodic boxes only.  a2 = <v^4> / (2 <v^2>^2) - 1
-is 0 in equilibrium and -1/2 for equal speeds.
+a quarter of the slope of the mean square displacement, here between neighbouring lags; and half the
+integral of <v(0) v(s)> from 0 to t, which is half of <v(0) (x(t) - x(0))> and so exact however far
+apart the frames are.  For equal disks it stands beside D_E of Enskog.  In two dimensions the tail
+makes D(t) grow without end, as the logarithm of t: a D belongs to a time, and to a box, whose
+images are felt when sound has crossed it.  The table has both D, which must agree, between half of
+`D_time` and `D_time`; that is the time of crossing if an eighth of the run is longer.  Periodic
+boxes only.  a2 = <v^4> / (2 <v^2>^2) - 1 is 0 in equilibrium and -1/2 for equal speeds.
 
 S(k) = <|sum of exp(i k x)|^2> / N.  psi6 of a disk: mean of exp(6 i theta) over its Delaunay
 neighbours; local is its modulus, global the modulus of the mean over all disks: 1 in a perfect
@@ -24,7 +25,13 @@ power of r in a hexatic phase, and not at all in a crystal.
 from typing import NamedTuple
 
 from ricochet import Run, RunError, hard_disks
-from ricochet.diffusion import crossing_time, diffusion, displacement, velocity_memory
+from ricochet.diffusion import (
+    crossing_time,
+    diffusion,
+    displacement,
+    integrated_memory,
+    velocity_memory,
+)
 from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import SeriesMean, combined, doubts, estimate, excess_kurtosis, series_mean
@@ -39,10 +46,8 @@ from ricochet.thermodynamics import (
 )
 
 import numpy as np
-import scipy
 
 MOST_FRAMES = 50  # for the structure
-SCARCE = 0.5  # mean free times between frames beyond which they cannot be integrated
 
 
 class Found(NamedTuple):
@@ -51,7 +56,6 @@ class Found(NamedTuple):
     members: dict[str, list[SeriesMean]]
     curves: dict[str, tuple[np.ndarray, np.ndarray]]
     lag: float  # of the diffusion coefficients, in mean free times
-    step: float  # between frames, in mean free times
 
 
 def lags(frames: int, per_decade: int = 12) -> np.ndarray:
@@ -159,10 +163,10 @@ def motion(runs: list[Run], frames: list[slice]) -> dict[str, tuple[np.ndarray, 
         density = first.count / np.prod(first.edges)
         curves["vacf_tail"] = wt, hard_disks.long_time_tail(time, density, *enskog(first))
     if first.periodic.all():
-        squares = np.mean(first.speed(frames[0].start) ** 2)
-        integral = scipy.integrate.cumulative_trapezoid(np.append(1, vacf), np.append(0, time))
-        curves["D_velocities(t)"] = wt, squares / 2 * integral
-        curves["D_displacement(t)"] = wt, np.gradient(np.append(0, msd), np.append(0, time))[1:] / 4
+        memory = estimate([integrated_memory(*one, at) for one in pairs]).mean
+        curves["D_velocities(t)"] = wt, memory
+        ends, slope = np.append(0, wt), np.diff(msd, prepend=0) / np.diff(time, prepend=0)
+        curves["D_displacement(t)"] = (ends[1:] + ends[:-1]) / 2, slope / 4
     return curves
 
 
@@ -181,7 +185,7 @@ def analysed(runs: list[Run], skip: float | None) -> Found:
         curves[name] = ((edges[1:] + edges[:-1]) / 2)[known], y[known]
     named = {name: [one[name] for one in members] for name in members[0]}
     step = (runs[0].time[1] - runs[0].time[0]) / np.mean([mean_free_time(run) for run in runs])
-    return Found(named, curves, float(lag * step), float(step))
+    return Found(named, curves, float(lag * step))
 
 
 def table(groups: list, results: list[Found]) -> list[dict]:
@@ -199,16 +203,12 @@ def table(groups: list, results: list[Found]) -> list[dict]:
 
 def notes(groups: list, results: list[Found]) -> list[str]:
     """What speaks against the numbers."""
-    said = []
-    for (eta, _), found in zip(groups, results, strict=True):
-        for name, members in found.members.items():
-            said += doubts(f"η = {eta:g}, {name}", members)
-        if found.step > SCARCE and "D_velocities" in found.members:
-            said.append(
-                f"η = {eta:g}: frames are {found.step:.2g} mean free times apart, too far for D "
-                f"from the velocities; take at most {SCARCE:g}"
-            )
-    return said
+    return [
+        note
+        for (eta, _), found in zip(groups, results, strict=True)
+        for name, members in found.members.items()
+        for note in doubts(f"η = {eta:g}, {name}", members)
+    ]
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:

@@ -247,6 +247,41 @@ def test_the_diffusion_coefficient_is_that_of_a_langevin_walk(tmp_path, rng):
     assert spread.mean == pytest.approx(memory.mean, abs=2 * spread.error)
 
 
+def flights(rng, count, time):
+    """Positions and velocities (T, count, 2) of points that take a new velocity at the rate 1.
+
+    Each component is normal with variance 1, so that <v(0) v(t)> / 2 = D'(t) = exp(-t).
+    """
+    x, v = np.empty((2, len(time), count, 2))
+    for k in range(count):
+        turns = np.cumsum(rng.exponential(size=int(time[-1] + 10 * np.sqrt(time[-1]) + 30)))
+        turns = np.append(0, turns)
+        speed = rng.normal(size=(len(turns), 2))
+        place = np.cumsum(np.diff(turns, prepend=0)[:, None] * np.roll(speed, 1, axis=0), axis=0)
+        last = np.searchsorted(turns, time, side="right") - 1
+        v[:, k] = speed[last]
+        x[:, k] = place[last] + (time - turns[last])[:, None] * speed[last]
+    return x, v
+
+
+@pytest.mark.parametrize(("step", "lag"), [(0.4, 8), (1.0, 4), (2.0, 2), (5.0, 2)])
+def test_diffusion_is_right_however_far_apart_frames_are(tmp_path, rng, step, lag):
+    """In mean free times; the ways and slopes of each flight are exact."""
+    count, time = 1000, step * np.arange(1200)
+    x, v = flights(rng, count, time)
+    image = np.floor(x).astype(int)
+    sides = {"image": image, "time": time, "periodic": PERIODIC}
+    run = written(tmp_path / "run.h5", x - image, v, **sides)
+    early, late = np.exp(-step * np.array([lag // 2, lag]))
+    expected = 1 - (early - late) / (step * (lag - lag // 2))
+    for found in diffusion.diffusion(run, slice(None), lag):
+        assert found.mean == pytest.approx(expected * (1 - 1 / count), abs=4 * found.error)
+        assert found.error < 0.006
+    at = np.array([1, 2, 4])
+    in_time = diffusion.integrated_memory(run, slice(None), at)
+    np.testing.assert_allclose(in_time, 1 - np.exp(-step * at), atol=0.015)
+
+
 def test_enskog_is_boltzmann_in_a_dilute_gas():
     assert hd.speed_of_sound(1e-6) == pytest.approx(np.sqrt(2), rel=1e-4)
     eta = 1e-4
