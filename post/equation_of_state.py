@@ -24,8 +24,8 @@ WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the wal
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """Z by virial, rate, walls, where they apply."""
-    if run.restitution != 1 or run.gravity.any():
-        raise RunError(f"{run.path}: is not elastic or falls, it has no equation of state")
+    if run.gravity.any():
+        raise RunError(f"{run.path}: falls, it has no equation of state")
     equal = np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0
     empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
     walled = empty and np.ptp(run.radius) == 0

@@ -21,7 +21,7 @@ from ricochet.drawing import COLOURS, caption, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import equilibrium_frames, kinds_of_disks
+from ricochet.thermodynamics import frames_from, kinds_of_disks, start_of_equilibrium
 
 import numpy as np
 import scipy
@@ -205,7 +205,7 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
     run = read_run(args.run)
-    frames = equilibrium_frames(run, args.skip)
+    frames = frames_from(run, start_of_equilibrium(run, args.skip))
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in kinds_of_disks(run)]

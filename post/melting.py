@@ -51,8 +51,8 @@ def main() -> None:
     args = command_line(__doc__, "melting.png", skip=None).parse_args()
     runs = read_all(args.runs)
     for run in runs:
-        if run.restitution != 1 or not run.periodic.all() or not equal_disks(run):
-            raise RunError(f"{run.path}: needs equal elastic disks in a periodic box")
+        if not run.periodic.all() or run.gravity.any() or not equal_disks(run):
+            raise RunError(f"{run.path}: needs equal disks in a periodic box without gravity")
     groups = grouped(runs, lambda run: (run.count, round(packing(run), 6)))
     rows, notes = table(groups, args.skip)
     report(args, runs, "Melting of hard disks", draw(rows, runs), rows, notes=notes)

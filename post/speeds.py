@@ -6,18 +6,29 @@ Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the spec
 equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start
 u is v itself.  Runs of the same N are combined.  Equilibrium is found, or begins after --skip; it
 takes the frames of --frames that are at least --apart collisions per disk from each other.
+A gas that loses energy in collisions has no equilibrium: its histogram is of the frames after
+--skip, or else 15 collisions per disk, with the kT of each frame for itself; `kT_first` and
+`kT_last` say how far it has cooled meanwhile.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
 disks that share a fixed energy, which matters if they are few.  A disk forgets its speed within 5
 collisions: frames that are closer count for the tests as one frame every 5 collisions per disk.
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
-from ricochet import Run
+from argparse import Namespace
+from typing import NamedTuple
+
+from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, dilute_limit, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
-from ricochet.thermodynamics import equal_disks
+from ricochet.thermodynamics import (
+    after_start,
+    equal_disks,
+    loses_energy,
+    start_of_equilibrium,
+)
 
 import numpy as np
 
@@ -25,11 +36,24 @@ BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
 MEMORY = 5.0  # collisions per disk after which a speed is independent
 
 
-def reduced_speeds(run: Run, frames: list[int]) -> np.ndarray:
-    """(F * N,) speeds of these frames, each species by its own thermal speed."""
+class Pool(NamedTuple):
+    """The histogram of the runs with the same number of disks."""
+
+    speeds: np.ndarray  # (S,) reduced
+    independent: int  # so many of them count
+    kts: tuple[float, float]  # in the first and the last frame
+
+
+def reduced_speeds(run: Run, frames: list[int], each: bool = False) -> np.ndarray:
+    """(F * N,) speeds of these frames, each species by its own thermal speed.
+
+    That is the one of all these frames, or of `each` for itself.
+    """
     energy = np.array([run.kinetic_energy(k) for k in frames])
     for kind in run.by_species:
-        energy[:, kind.disks] /= np.mean(energy[:, kind.disks]) or 1.0
+        own = energy[:, kind.disks]
+        kt = np.mean(own, axis=1 if each else None, keepdims=True)
+        energy[:, kind.disks] /= np.where(kt > 0, kt, 1)
     return np.sqrt(energy).ravel()
 
 
@@ -46,10 +70,31 @@ def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
     return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
 
 
-def table(groups: list, samples: list[np.ndarray], independent: list[int]) -> list[dict]:
+def all_cool(runs: list[Run]) -> bool:
+    """Whether the runs lose energy: all of them, or none."""
+    cool = [loses_energy(run) for run in runs]
+    if any(cool) and not all(cool):
+        lossy, elastic = runs[cool.index(True)], runs[cool.index(False)]
+        raise RunError(f"{lossy.path}: loses energy, {elastic.path} does not: draw them apart")
+    return all(cool)
+
+
+def pooled(runs: list[Run], args: Namespace, cool: bool) -> Pool:
+    """The late frames of all runs; of those that cool, each at its own temperature."""
+    begin = after_start if cool else start_of_equilibrium
+    picked = [(run, late_frames(run, args, begin)) for run in runs]
+    kts = [[run.kinetic_energy(f[k]).mean() for run, f in picked] for k in (0, -1)]
+    return Pool(
+        np.concatenate([reduced_speeds(*one, each=cool) for one in picked]),
+        runs[0].count * sum(independent_frames(*one) for one in picked),
+        tuple(float(np.mean(kt)) for kt in kts),
+    )
+
+
+def table(groups: list, pools: list[Pool]) -> list[dict]:
     """The tests of each group."""
     rows = []
-    for (count, runs), u, n in zip(groups, samples, independent, strict=True):
+    for (count, runs), (u, n, kts) in zip(groups, pools, strict=True):
         maxwell = hold_against(u, maxwell_cdf, independent=n)
         law = finite_n_cdf(count, bool(runs[0].periodic.all()))
         exact = hold_against(u, law, independent=n)
@@ -59,6 +104,8 @@ def table(groups: list, samples: list[np.ndarray], independent: list[int]) -> li
                 "runs": len(runs),
                 "speeds": len(u),
                 "independent": n,
+                "kT_first": kts[0],
+                "kT_last": kts[1],
                 "mean_u": float(np.mean(u)),
                 "kurtosis": float(np.mean(u**4)),
                 "KS_D": maxwell.ks,
@@ -94,7 +141,7 @@ def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str])
     axes.legend()
 
 
-def draw_relaxation(axes: plt.Axes, groups: list) -> None:
+def draw_relaxation(axes: plt.Axes, groups: list, cool: bool) -> None:
     """a2 against collisions per disk, mean and standard error over the runs."""
     for (count, runs), colour in zip(groups, COLOURS, strict=False):
         tracks = [relaxation(run) for run in runs]
@@ -104,17 +151,24 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
     everyone = [run for _, runs in groups for run in runs]
-    if all(equal_disks(run) and relaxation(run, 0)[1][0] < -0.4 for run in everyone):
+    equal = all(equal_disks(run) and relaxation(run, 0)[1][0] < -0.4 for run in everyone)
+    if equal and not cool:
         dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
     axes.legend()
 
 
-def draw(groups: list, samples: list[np.ndarray], tests: list[dict]) -> plt.Figure:
+def cooling(row: dict) -> str:
+    """How far a gas has cooled; one that falls may become hotter."""
+    goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
+    return f"kT {goes} from {row['kT_first']:.4g} to {row['kT_last']:.4g}"
+
+
+def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.Figure:
     """Four panels: start, last frame, equilibrium, relaxation."""
     everyone = [run for _, runs in groups for run in runs]
-    figure, ((first, last), (pooled, way)) = plt.subplots(2, 2, figsize=(10, 7))
+    figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     draw_histogram(first, [reduced_speeds(largest, [0])], [f"first frame, N = {largest.count}"])
     first.set_title("Start")
@@ -128,21 +182,25 @@ def draw(groups: list, samples: list[np.ndarray], tests: list[dict]) -> plt.Figu
         size, free = row["speeds"], row["independent"]
         labels.append(
             f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
+            + (f"\n{cooling(row)}" if cool else "")
             + f"\nKS D = {row['KS_D']:.4f}, p = {row['KS_p']:.2g}"
             + f" (at fixed energy {row['KS_p_exact']:.2g})"
         )  # fmt: skip
-    draw_histogram(pooled, samples, labels)
-    pooled.set(title="Equilibrium, many frames", ylim=(0, 1.1 + 0.25 * len(groups)))
-    draw_relaxation(way, groups)
-    way.set_title("The way to equilibrium")
+    draw_histogram(late, [pool.speeds for pool in pools], labels)
+    late.set_title(
+        "No equilibrium: each frame at its own kT" if cool else "Equilibrium, many frames"
+    )
+    late.set_ylim(0, 1.1 + (0.5 if cool else 0.25) * len(groups))
+    draw_relaxation(way, groups, cool)
+    way.set_title("The way there" if cool else "The way to equilibrium")
     figure.suptitle(caption(everyone), fontsize=10)
     return figure
 
 
-def histograms(groups: list, samples: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """Densities in equilibrium, with the mean of the Maxwell density over each bin."""
+def histograms(groups: list, pools: list[Pool]) -> dict[str, np.ndarray]:
+    """Densities of the late frames, with the mean of the Maxwell density over each bin."""
     columns = {"u_low": BINS[:-1], "u_high": BINS[1:]}
-    for (count, _), u in zip(groups, samples, strict=True):
+    for (count, _), (u, *_) in zip(groups, pools, strict=True):
         columns[f"density_N{count}"] = np.histogram(u, BINS)[0] / (len(u) * np.diff(BINS))
     return {**columns, "maxwell": np.diff(maxwell_cdf(BINS)) / np.diff(BINS)}
 
@@ -150,16 +208,14 @@ def histograms(groups: list, samples: list[np.ndarray]) -> dict[str, np.ndarray]
 def main() -> None:
     args = command_line(__doc__, "speeds.png", frames=None, skip=None, apart=5.0).parse_args()
     runs = read_all(args.runs)
-    groups = grouped(runs, lambda run: run.count)
-    samples, independent = [], []
-    for count, members in groups:
-        picked = [(r, late_frames(r, args)) for r in members]
-        samples.append(np.concatenate([reduced_speeds(r, frames) for r, frames in picked]))
-        independent.append(int(count) * sum(independent_frames(*pick) for pick in picked))
-    tests = table(groups, samples, independent)
-    figure = draw(groups, samples, tests)
+    cool, groups = all_cool(runs), grouped(runs, lambda run: run.count)
+    pools = [pooled(members, args, cool) for _, members in groups]
+    tests = table(groups, pools)
+    figure = draw(groups, pools, tests, cool)
     title = "Speed distribution of hard disks"
-    report(args, runs, title, figure, tests, data=histograms(groups, samples))
+    data = histograms(groups, pools)
+    notes = [f"N = {row['N']}: loses energy, no equilibrium; {cooling(row)}" for row in tests]
+    report(args, runs, title, figure, tests, data=data, notes=notes if cool else ())
 
 
 if __name__ == "__main__":

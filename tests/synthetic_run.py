@@ -84,7 +84,7 @@ def add_element(group, name, time, value):
 def write_observables(file, time, observables):
     """All observables share one clock."""
     group = file.create_group("observables")
-    for name, value in (observables or {}).items():
+    for name, value in {"dissipated_energy": np.zeros(len(time)), **(observables or {})}.items():
         add_element(group, name, time, np.asarray(value))
     group["committed"] = np.int64(len(time))
 

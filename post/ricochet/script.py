@@ -20,7 +20,7 @@ from .drawing import LABELS, STYLE, plt, save, warn
 from .files import did_you_mean, destination
 from .reader import Run, RunError, read_run
 from .statistics import Estimate, SeriesMean
-from .thermodynamics import equilibrium_frames
+from .thermodynamics import frames_from, start_of_equilibrium
 
 matplotlib.use("Agg")
 plt.style.use(STYLE)
@@ -173,10 +173,14 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
     return [frames[k] for k in np.linspace(0, len(frames) - 1, count).round().astype(int)]
 
 
-def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Of --frames those after --skip and --apart; the last of them if none is that late."""
+def late_frames(
+    run: Run,
+    args: argparse.Namespace,
+    begin: Callable[[Run, float | None], float] = start_of_equilibrium,
+) -> list[int]:
+    """Of --frames those from `begin` on, --apart; the last of them if none is that late."""
     frames = chosen_frames(run, args.frames, None)
-    return equilibrium_frames(run, args.skip, args.apart, frames) or frames[-1:]
+    return frames_from(run, begin(run, args.skip), args.apart, frames) or frames[-1:]
 
 
 def film_frames(run: Run, args: argparse.Namespace, most: int | None = None) -> list[int]:

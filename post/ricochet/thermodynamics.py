@@ -13,7 +13,8 @@ from . import hard_disks
 from .reader import Run, RunError, Species
 from .statistics import FEWEST, SeriesMean, equilibration, series_mean
 
-SPEEDS_FORGET = 15.0  # collisions per disk after which any distribution of speeds is Maxwell's
+SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
+ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
 
 
 class Steps(NamedTuple):
@@ -26,35 +27,58 @@ class Steps(NamedTuple):
     impulse: np.ndarray  # (T, 4) by side
 
 
+def loses_energy(run: Run) -> bool:
+    """Whether disks or walls have taken energy in collisions: such a gas has no equilibrium."""
+    lost = run.observable("dissipated_energy").value[-1]
+    return bool(lost > ROUNDING * run.kinetic_energy([0, -1]).sum(axis=1).max())
+
+
+def after_start(run: Run, skip: float | None = None) -> float:
+    """The time after `skip` collisions per disk, or else when speeds have forgotten the start.
+
+    A run too short for that counts from its middle.
+    """
+    time, tau = run.collisions_per_disk
+    if skip is not None and tau[-1] < skip:
+        ends = f"ends after {tau[-1]:.4g} collisions per disk"
+        raise RunError(f"{run.path}: {ends}, before --skip {skip:g}")
+    if skip is not None:
+        return float(time[np.searchsorted(tau, skip)])
+    if not tau[-1] > 0:
+        return float(time[-1] / 2)
+    return float(np.interp(min(SPEEDS_FORGET, tau[-1] / 2), tau, time))
+
+
 def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
     """The time after `skip` collisions per disk, or else that from which nothing drifts.
 
     Looked at are the collision rate and the kinetic energy of each species.  Speeds get
     `SPEEDS_FORGET`, as those series say nothing of their distribution.  A run too short for all
-    that counts from its middle.
+    that counts from its middle.  Raises RunError if the run loses energy in collisions.
     """
-    time, tau = run.collisions_per_disk
+    if loses_energy(run):
+        raise RunError(
+            f"{run.path}: is not elastic: it loses energy in collisions and has no equilibrium"
+        )
     if skip is not None:
-        if tau[-1] < skip:
-            ends = f"ends after {tau[-1]:.4g} collisions per disk"
-            raise RunError(f"{run.path}: {ends}, before --skip {skip:g}")
-        return float(time[np.searchsorted(tau, skip)])
-    if len(time) < 2 * FEWEST or not tau[-1] > 0:
+        return after_start(run, skip)
+    time, tau = run.collisions_per_disk
+    if len(time) < 2 * FEWEST:
         return float(time[-1] / 2)
     apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
     series = [np.diff(tau) / apart]
-    if len(run.names) > 1:
+    if len(run.names) > 1 or run.gravity.any():
         series += [run.observable(f"{name}/kinetic_energy").value[1:] for name in run.names]
     first = max(equilibration(values) for values in series)
-    return float(max(time[first], np.interp(min(SPEEDS_FORGET, tau[-1] / 2), tau, time)))
+    return max(float(time[first]), after_start(run))
 
 
-def equilibrium_frames(
-    run: Run, skip: float | None, apart: float = 0.0, frames: list[int] | None = None
+def frames_from(
+    run: Run, start: float, apart: float = 0.0, frames: list[int] | None = None
 ) -> list[int]:
-    """Of the frames [all] those in equilibrium, each `apart` collisions per disk from the last."""
+    """Of the frames [all] those from a time on, each `apart` collisions per disk from the last."""
     chosen, last = [], -np.inf
-    tau, start = run.collisions_per_disk_at(run.time), start_of_equilibrium(run, skip)
+    tau = run.collisions_per_disk_at(run.time)
     for frame in range(run.frames) if frames is None else sorted(frames):
         if run.time[frame] >= start and tau[frame] >= last + apart * (1 - 1e-9):
             chosen.append(frame)

@@ -3,6 +3,7 @@
 import csv
 import warnings
 
+import h5py
 import numpy as np
 import pytest
 
@@ -133,10 +134,15 @@ def gas(path, rng, count=200, frames=41, mass=1.0, **more):
 
 def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
     run = read_run(gas(tmp_path / "gas.h5", rng))
-    assert thermodynamics.equilibrium_frames(run, skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
-    assert thermodynamics.equilibrium_frames(run, skip=39, apart=0) == [39, 40]
+
+    def frames(skip, apart):
+        start = thermodynamics.start_of_equilibrium(run, skip)
+        return thermodynamics.frames_from(run, start, apart)
+
+    assert frames(skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
+    assert frames(skip=39, apart=0) == [39, 40]
     with pytest.raises(RunError, match="ends after 40 collisions per disk, before --skip 50"):
-        thermodynamics.equilibrium_frames(run, skip=50, apart=5)
+        frames(skip=50, apart=5)
 
 
 def test_reduced_speeds_do_not_know_units(tmp_path, rng):
@@ -156,6 +162,54 @@ def test_relaxation_starts_at_minus_one_half(tmp_path, rng):
     tau, a2 = speeds.relaxation(read_run(gas(tmp_path / "gas.h5", rng)))
     assert a2[0] == pytest.approx(-0.5) and np.abs(a2[1:]).max() < 0.5
     np.testing.assert_allclose(tau, np.arange(17))
+
+
+def made_to_cool(path, rate=0.05):
+    """Lets the frames of a file lose energy by exp(-rate) from one to the next."""
+    with h5py.File(path, "r+") as file:
+        velocity, mass = file["particles/disks/velocity/value"], file["particles/disks/mass"][()]
+        energy = 0.5 * np.sum(mass[:, None] * velocity[0] ** 2)
+        left = np.exp(-rate * np.arange(len(velocity)))
+        velocity[...] = velocity[...] * np.sqrt(left)[:, None, None]
+        file["observables/dissipated_energy/value"][...] = energy * (1 - left)
+    return path
+
+
+def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monkeypatch):
+    """Its frames are each drawn at their own temperature, here Maxwell's."""
+    figures = []
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    calm = gas(tmp_path / "calm.h5", rng, count=2000)
+    cool = made_to_cool(gas(tmp_path / "cool.h5", rng, count=2000))
+    draw("speeds", calm, "--csv", tmp_path / "calm.csv")
+    assert "Equilibrium, many frames" in words_on(figures[0]) and capsys.readouterr().err == ""
+    draw("speeds", cool, "--csv", tmp_path / "cool.csv")
+    said = words_on(figures[1]).lower().count("equilibrium")
+    assert said == words_on(figures[1]).lower().count("no equilibrium") == 2
+    falls = "kT falls from 0.2362 to 0.06767"  # exp(-0.75) and exp(-2) halves
+    printed, said = capsys.readouterr()
+    assert falls in words_on(figures[1]) and falls in said and said.count("\n") == 1
+    header, row = (line.split() for line in printed.splitlines())
+    tests = dict(zip(header, row, strict=True))
+    assert float(tests["KS_p"]) > 0.001 and float(tests["kT_last"]) == 0.0676676
+    assert run_script("speeds", calm, cool, "-o", tmp_path / "no.png") == 2
+    assert "cool.h5: loses energy" in capsys.readouterr().err
+
+
+def words_on(figure):
+    """All texts of a figure, in one line."""
+    parts = [text.get_text() for text in figure.findobj(plt.Text)]
+    return " ".join(" ".join(parts).split())
+
+
+@pytest.mark.parametrize("script", ["mixture", "gravity", "equipartition", "missed"])
+def test_what_loses_energy_has_no_means_in_equilibrium(tmp_path, rng, capsys, script):
+    for path in runs_for(script, tmp_path, rng):
+        made_to_cool(path)
+    assert run_script(script, *sorted(tmp_path.glob("*.h5")), "-o", tmp_path / "no.png") == 2
+    said = capsys.readouterr().err
+    assert "it loses energy in collisions and has no equilibrium" in said
+    assert said.count("\n") == 1
 
 
 def test_mixture_table(tmp_path, rng):
@@ -496,7 +550,7 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
 
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng))
-    frames = thermodynamics.equilibrium_frames(run, 40)
+    frames = thermodynamics.frames_from(run, thermodynamics.start_of_equilibrium(run, 40))
     assert frames == list(range(80, 400))
     species = [gravity.samples(run, kind, frames) for kind in run.by_species]
     assert species[0].height.shape == (320, 30) and 0 <= species[0].height.min() < 0.01

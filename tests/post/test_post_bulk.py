@@ -13,7 +13,7 @@ import equation_of_state
 import haff
 import melting
 import rates
-from ricochet import Events, RunError, diffusion, read_run, statistics, structure, thermodynamics
+from ricochet import Events, diffusion, read_run, statistics, structure, thermodynamics
 from ricochet import hard_disks as hd
 from ricochet.drawing import values_of
 from synthetic_run import run_script, write_run
@@ -172,10 +172,30 @@ def test_what_speaks_against_an_error_is_said(rng):
     assert "independent samples; run longer" in " ".join(statistics.doubts("Z", [slow]))
 
 
-def test_inelastic_runs_have_no_equation_of_state(tmp_path):
-    run = steady(tmp_path / "run.h5", PERIODIC, contact={"restitution": 0.9})
-    with pytest.raises(RunError, match="not elastic"):
-        equation_of_state.pressures(run)
+@pytest.mark.parametrize(
+    ("script", "system"),
+    [
+        *((name, "walls") for name in ("rates", "correlations", "equation_of_state")),
+        *((name, "obstacle") for name in ("melting", "coverage")),
+    ],
+)
+def test_a_gas_that_walls_cool_has_no_equilibrium(ricochet, tmp_path, capsys, script, system):
+    """Its disks are elastic; the walls, or an obstacle in a periodic box, take energy."""
+    sides = {"walls": "wall", "obstacle": "periodic"}[system]
+    (tmp_path / "gas.nml").write_text(
+        f"""&box boundary = '{sides}', '{sides}' /
+        &species count = 64 radius = 0.02 temperature = 1 /
+        &contact restitution = 1 wall_restitution = 0.9 /
+        &stop collisions_per_disk = 40 /
+        &output frames_every_time = 0.05 observables_every_time = 0.05 /"""
+        + (system == "obstacle") * "&obstacle centre = 0.5, 0.5 radius = 0.1 /"
+    )
+    runs = [tmp_path / f"{seed}.h5" for seed in range(1, 11 if script == "coverage" else 2)]
+    for seed, path in enumerate(runs):
+        assert ricochet("gas.nml", "--set", f"run.seed={seed}", "-o", path).returncode == 0
+    assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+    said = capsys.readouterr().err
+    assert "1.h5: is not elastic: it loses energy in collisions" in said and said.count("\n") == 1
 
 
 # --- rates and free paths ---
@@ -412,7 +432,7 @@ def test_mixtures_are_not_drawn_on_the_curves_of_equal_disks(tmp_path):
     assert len(equation_of_state.draw(rows, [equal]).axes[0].lines) > 3
 
 
-def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
+def test_melting_has_a_curve_for_each_number_of_disks(tmp_path, capsys):
     """The pressure of 4 eta / pi Z; between walls, of mixtures, there is none."""
     run = steady(tmp_path / "equal.h5", PERIODIC)
     eta = thermodynamics.packing(run)
@@ -422,10 +442,12 @@ def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
     assert row["P"] == pytest.approx(expected, rel=1e-9)
     axes = melting.draw([row, {**row, "N": 400}], [run]).axes[0]
     assert {"N = 100", "N = 400"} < set(axes.get_legend_handles_labels()[1])
-    for kind, more in (("walls", {"periodic": (True, False)}), ("mixed", {})):
+    falling = {"box": {"gravity": [0.0, -1.0]}}
+    for kind, more in (("walls", {"periodic": (True, False)}), ("mixed", {}), ("falling", falling)):
         radius = np.repeat([0.01, 0.02], 50) if kind == "mixed" else 0.01
         other = steady(tmp_path / f"{kind}.h5", radius=radius, **{"periodic": PERIODIC, **more})
         assert run_script("melting", other.path, "-o", tmp_path / "no.png") == 2
+        assert "needs equal disks in a periodic box without gravity" in capsys.readouterr().err
 
 
 def test_published_pressures_near_melting_have_a_loop_that_flattens():
