@@ -2,7 +2,7 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean kinetic energy per disk in equilibrium, which is found or begins after --skip.  Laws,
+kT is that of the kinetic energy in equilibrium, which is found or begins after --skip.  Laws,
 drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of
 the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
 fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i is
@@ -16,12 +16,11 @@ their errors come from ten blocks of time.
 
 from typing import NamedTuple
 
-from ricochet import Run, RunError, read_run
+from ricochet import Run, RunError, read_run, thermodynamics
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import frames_from, kinds_of_disks, start_of_equilibrium
 
 import numpy as np
 import scipy
@@ -197,7 +196,7 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     for axes in panels[1]:
         axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
     figure.suptitle(
-        f"{caption([run])},  t = {start:.4g} to {run.time[-1]:g},  kT = ⟨K⟩ = {kt:.4f}", fontsize=10
+        f"{caption([run])},  t = {start:.4g} to {run.time[-1]:g},  kT = {kt:.4f}", fontsize=10
     )
     return figure
 
@@ -205,13 +204,12 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
     run = read_run(args.run)
-    frames = frames_from(run, start_of_equilibrium(run, args.skip))
+    start = thermodynamics.start_of_equilibrium(run, args.skip)
+    frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
-    species = [samples(run, kind, frames) for kind in kinds_of_disks(run)]
-    energy = [0.5 * s.mass * s.square for s in species]
-    temperature = float(np.sum([e.sum() for e in energy]) / np.sum([e.size for e in energy]))
-    result = table(run, species, temperature)
+    species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
+    result = table(run, species, thermodynamics.temperature(run, frames))
     figure = draw(run, species, result, run.time[frames[0]])
     report(args, [run], "Gas under gravity", figure, result)
 

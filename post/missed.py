@@ -28,7 +28,7 @@ from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import kinds_of_disks, start_of_equilibrium
+from ricochet.thermodynamics import free_disks, kinds_of_disks, start_of_equilibrium
 
 import numpy as np
 
@@ -84,7 +84,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
     if first >= len(time) - 1:
         raise RunError(f"{run.path}: needs two samples of the observables in equilibrium")
     energy = run.observable("all/kinetic_energy").value[first:]
-    return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(energy.mean())
+    kt = energy.mean() * run.count / free_disks(run)
+    return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(kt)
 
 
 def compare(runs: list[Run], skip: float | None) -> list[Missed]:

@@ -5,7 +5,8 @@
 Equilibrium is found, or begins after --skip; it takes the frames of --frames that are at least
 --apart collisions per disk from each other.  Errors are standard errors over the runs (of a single
 run: from the autocorrelation over its frames).
-Theory: each species has <K> = kT = E / N and <v> = sqrt(pi kT / 2 m).
+Theory: each species has <K> = kT and <v> = sqrt(pi kT / 2 m); in a periodic box <K> is smaller by
+the share of the disk in the mass of all.
 """
 
 from ricochet import Run, RunError
@@ -13,7 +14,7 @@ from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, hold_against, series_mean
 from ricochet.theory import maxwell_cdf, maxwell_pdf
-from ricochet.thermodynamics import kinds_of_disks
+from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
 import numpy as np
 
@@ -36,13 +37,13 @@ def over_members(members: list[np.ndarray]) -> Estimate:
 
 def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
     """Per species: mean speed and energy at the start and in equilibrium, and the theory."""
-    temperature = float(np.mean([run.kinetic_energy(0).mean() for run in runs]))
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
         start = np.mean([means(run, [0], name)[0] for run in runs], axis=0)
         late = over_members([means(r, f, name) for r, f in zip(runs, frames, strict=True)])
-        u = pooled_speeds(runs, frames, name) * np.sqrt(mass / (2 * temperature))
+        energy = float(np.mean([mean_energy(run, mass) for run in runs]))
+        u = pooled_speeds(runs, frames, name) * np.sqrt(mass / (2 * energy))
         test = hold_against(u, maxwell_cdf)
         rows.append(
             {
@@ -51,9 +52,9 @@ def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
                 "v_start": float(start[0]),
                 "K_start": float(start[1]),
                 **measured("v", Estimate(late.mean[0], late.error[0])),
-                "v_theory": float(np.sqrt(np.pi * temperature / (2 * mass))),
+                "v_theory": float(np.sqrt(np.pi * energy / (2 * mass))),
                 **measured("K", Estimate(late.mean[1], late.error[1])),
-                "K_theory": temperature,
+                "K_theory": energy,
                 "speeds": test.n,
                 "KS_D": test.ks,
                 "KS_p": test.ks_p,
@@ -103,7 +104,7 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
             maxwell_pdf(v / thermal) / thermal,
             color="black",
             lw=1.2,
-            label=f"Maxwell at $kT = E/N$: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}",
+            label=f"Maxwell: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}",
         )
         for when, axes in zip(("_start", ""), row, strict=True):
             axes.plot([], [], ls="", label=moments(found, when))
@@ -134,6 +135,8 @@ def main() -> None:
     for run in runs:
         if run.names != runs[0].names or len(run.names) < 2:
             raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
+        if run.gravity.any():
+            raise RunError(f"{run.path}: falls; see equipartition.py and gravity.py")
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames)
     report(args, runs, "Speeds of a mixture", draw(runs, frames, result), result)

@@ -25,6 +25,7 @@ from ricochet.statistics import estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import (
     after_start,
+    conserved,
     equal_disks,
     loses_energy,
     start_of_equilibrium,
@@ -96,7 +97,7 @@ def table(groups: list, pools: list[Pool]) -> list[dict]:
     rows = []
     for (count, runs), (u, n, kts) in zip(groups, pools, strict=True):
         maxwell = hold_against(u, maxwell_cdf, independent=n)
-        law = finite_n_cdf(count, bool(runs[0].periodic.all()))
+        law = finite_n_cdf(count, bool(conserved(runs[0]).all()))
         exact = hold_against(u, law, independent=n)
         rows.append(
             {

@@ -94,15 +94,15 @@ def contact_value(z: float, eta: float) -> float:
     return (z - 1) / (2 * eta)
 
 
-def finite_rate(free: int) -> float:
+def finite_rate(free: float) -> float:
     """c_N: mean relative speed for fixed energy over that of the Maxwell law.
 
-    `free` = N between walls, N - 1 in a periodic box at rest as a whole.
+    `free` = N between walls, N - 1 in a periodic box.
     """
     return math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
 
 
-def collision_rate(z: float, diameter: float, free: int, kt: float = 1.0, mass: float = 1.0):
+def collision_rate(z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0):
     """The w that follows from Z."""
     return 4 * (z - 1) * finite_rate(free) / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 

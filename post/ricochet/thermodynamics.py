@@ -5,6 +5,7 @@ disks), the force on the sides.  Z = P / (n kT); elastic runs.  `skip` is what i
 start, in collisions per disk; None finds it.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -103,14 +104,37 @@ def steps(run: Run, skip: float | None = None) -> Steps:
     return Steps(np.diff(time[first:]), collisions, virial, hits.sum(axis=1), impulse)
 
 
-def free_disks(run: Run) -> int:
-    """Disks whose momentum is free: one less if the total is always zero."""
-    return run.count - 1 if np.all(run.periodic) else run.count
+def conserved(run: Run) -> np.ndarray:
+    """(2,) along which axes nothing ever changes the total momentum."""
+    empty = not run.obstacles and not len(run.walls)
+    return run.periodic & (run.gravity == 0) & empty
 
 
-def temperature(run: Run) -> float:
-    """The kT of an elastic gas, from its fixed energy."""
-    return float(np.sum(run.kinetic_energy(0))) / free_disks(run)
+def free_disks(run: Run) -> float:
+    """N, less a half for each axis along which the total momentum is conserved."""
+    return run.count - conserved(run).sum() / 2
+
+
+def drift(run: Run, frames: Sequence[int] = (0,)) -> np.ndarray:
+    """(F, 2) conserved velocity of the centre of mass, which is no heat; 0 along other axes."""
+    centre = np.average(run.velocity[list(frames)], axis=1, weights=run.mass)
+    return np.where(conserved(run), centre, 0.0)
+
+
+def temperature(run: Run, frames: Sequence[int] = (0,)) -> float:
+    """kT, from the kinetic energy of some frames; of a gas without gravity any will do.
+
+    Where to divide by N and where by N - 1 is in docs/theory.md.
+    """
+    energy = run.kinetic_energy(list(frames)).sum(axis=1)
+    heat = energy - 0.5 * run.mass.sum() * np.sum(drift(run, frames) ** 2, axis=1)
+    return float(np.mean(heat)) / free_disks(run)
+
+
+def mean_energy(run: Run, mass: float) -> float:
+    """What <K> of a disk of this mass is in equilibrium, without gravity."""
+    bound = (run.count - free_disks(run)) * mass / run.mass.sum()
+    return temperature(run) * (1 - bound) + 0.5 * mass * float(np.sum(drift(run) ** 2))
 
 
 def packing(run: Run) -> float:

@@ -116,6 +116,26 @@ def test_three_pressures_of_a_steady_run(tmp_path):
     assert set(equation_of_state.pressures(bulk)) == {"virial", "rate"}
 
 
+@pytest.mark.parametrize("periodic", [(False, False), (True, False), PERIODIC])
+def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
+    """A few disks share what the conserved motion of them all does not have."""
+    kept, mass, heat = np.array(periodic), np.array([9.0, 1.0, 1.0, 1.0]), 3.0
+    v = rng.normal(size=(20000, 4, 2)) / np.sqrt(mass)[:, None]
+    v -= kept * np.average(v, axis=1, weights=mass, keepdims=True)
+    v *= np.sqrt(heat / np.sum(0.5 * mass[:, None] * v**2, axis=(1, 2)))[:, None, None]
+    v += kept * np.array([0.2, -0.1])
+    parts = {"species": [1, 2, 2, 2], "names": ("big", "small"), "mass": mass}
+    run = written(tmp_path / "run.h5", 0 * v, v, periodic=periodic, **parts)
+    assert thermodynamics.temperature(run) == pytest.approx(heat / (4 - kept.sum() / 2))
+    for kind in run.by_species:
+        energy = run.kinetic_energy(slice(None))[:, kind.disks].mean()
+        assert thermodynamics.mean_energy(run, kind.mass) == pytest.approx(energy, rel=0.02)
+    inside = {"obstacles": [((0.5, 0.5), 0.1, 0)], "periodic": periodic}
+    stopped = written(tmp_path / "stopped.h5", 0 * v[:1], v[:1], mass=mass, **inside)
+    expected = stopped.kinetic_energy(0).mean()
+    assert thermodynamics.temperature(stopped) == pytest.approx(expected), "an obstacle takes all"
+
+
 def test_pressures_in_time_are_those_at_the_mean_temperature(tmp_path):
     runs = [steady(tmp_path / f"{k}.h5", (False, False), speed=k) for k in (1, 2)]  # kT = 2, 8
     found = rates.pressures_in_time(runs, np.linspace(0, 200, 5))
