@@ -434,8 +434,10 @@ def test_a_scan_of_one_parameter_is_one_column_that_says_what_varies(tmp_path):
     paths = [impact(tmp_path / f"{m}.h5", mass=m, moved=m) for m in (5, 10, 15)]
     runs = [read_run(path) for path in paths]
     keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
-    points = crater_scan.scan_points(keys, runs, sizes, 0)
-    figure = crater_scan.draw({"mass": points}, crater_scan.base_of(keys), runs)
+    scans = crater_scan.scanned(keys, runs, sizes)
+    figure = crater_scan.draw(scans, runs)
+    assert figure.axes[0].get_title("left") == "speed 5,  radius 5,  restitution 0.5"
+    assert crater_scan.unused(keys, scans) == []
     assert len(figure.axes) == 2 and figure.axes[1].get_xlabel() == crater_scan.AXES["mass"]
 
 
@@ -463,28 +465,71 @@ def test_packing_field_holds_the_area_of_the_bed(tmp_path):
     assert np.all(field[y > 0.6] < 1e-6)
 
 
-def test_scan_finds_its_base_and_its_points(tmp_path):
+def test_scans_share_their_base(tmp_path):
     paths = [
         impact(tmp_path / f"m{m}_{s}.h5", mass=m, seed=s, moved=m // 5 + s, walls=(m == 5) * s)
         for m in (5, 10, 15, 20, 25)
         for s in (1, 2)
     ]
     paths += [
-        impact(tmp_path / f"x{xi}_{s}.h5", xi=xi, seed=s, left=0.1 + (xi > 0.8) * 0.3)
+        impact(tmp_path / f"x{xi}_{s}.h5", xi=xi, seed=s, moved=5 + s, left=0.1 + (xi > 0.8) * 0.3)
         for xi in (0.5, 0.7, 0.9)
         for s in (1, 2)
     ]
     runs = crater_scan.distinct([read_run(path) for path in paths])
     assert len(runs) == len(paths) - 2, "mass 25 and xi 0.5 is the base, once per seed"
     keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
-    assert crater_scan.base_of(keys) == (25, 5, 5, 0.5)
-    mass, speed, _, xi = (crater_scan.scan_points(keys, runs, sizes, k) for k in range(4))
-    assert [p.x for p in mass] == [5, 10, 15, 20, 25] and [p.x for p in speed] == [5]
+    scans = crater_scan.scanned(keys, runs, sizes)
+    assert list(scans) == ["mass", "restitution"] and crater_scan.unused(keys, scans) == []
+    ((others, mass),), ((_, xi),) = scans.values()
+    assert others == {"speed": 5, "radius": 5, "restitution": 0.5}
+    assert [p.x for p in mass] == [5, 10, 15, 20, 25]
     assert mass[1].sizes["displaced"] == (3.5, 0.5) and mass[1].runs == 2
     assert [p.by_time for p in xi] == [False, False, True] == [not p.free for p in xi]
     assert [p.wall_collisions for p in mass] == [1.5, 0, 0, 0, 0]
     assert [p.free for p in mass] == [False, True, True, True, True]
     assert crater_scan.fits_of("mass", mass[:3])["displaced"] is None, "two free points"
+
+
+def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
+    """Three masses, two speeds, two seeds; and two runs that stand alone, one of them twice."""
+    grid = [
+        impact(tmp_path / f"{m}_{v}_{s}.h5", mass=m, speed=v, seed=s, moved=m + s)
+        for m in (5, 10, 15)
+        for v in (2, 5)
+        for s in (1, 2)
+    ]
+    alone = [impact(tmp_path / f"{m}_7.h5", mass=m, speed=7, xi=0.9 - m / 100) for m in (30, 40)]
+    again = impact(tmp_path / "again.h5", mass=30, speed=7, xi=0.6, seed=2)
+    runs = [read_run(path) for path in (*grid, *alone, again)]
+    keys, sizes = [crater_scan.key_of(r) for r in runs], [crater.crater(r) for r in runs]
+    scans = crater_scan.scanned(keys, runs, sizes)
+    assert [c.others["speed"] for c in scans["mass"]] == [2, 5]
+    assert [c.others["mass"] for c in scans["speed"]] == [5, 10, 15]
+    for own in scans.values():
+        assert sum(p.runs for curve in own for p in curve.points) == len(grid)
+    figure = crater_scan.draw(scans, runs)
+    assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(words_in(figure))
+    assert figure.axes[0].get_title("left") == "radius 5,  restitution 0.5"
+    paths = [run.path for run in runs]
+    draw("crater_scan", *paths, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    rows = list(csv.DictReader((tmp_path / "a.csv").open()))
+    assert len(rows) == 6 + 6 and {row["speed"] for row in rows} == {"2.0", "5.0"}
+    said = capsys.readouterr().err.splitlines()
+    for line, mass, xi, count in zip(said, (30, 40), (0.6, 0.5), (2, 1), strict=True):
+        assert f"mass {mass},  speed 7,  radius 5,  restitution {xi} (runs: {count})" in line
+
+
+def words_in(figure):
+    """The labels in the legends of a figure."""
+    return [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
+
+
+def test_runs_that_differ_in_what_is_no_parameter_all_count(tmp_path):
+    """Two beds with the same seed are two runs; the same run twice is one."""
+    runs = [read_run(impact(tmp_path / f"{k}.h5", moved=k)) for k in (3, 4)]
+    again = read_run(impact(tmp_path / "again.h5", moved=4))
+    assert crater_scan.distinct([*runs, again]) == [runs[0], again]
 
 
 # --- gravity ---
