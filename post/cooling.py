@@ -11,7 +11,7 @@ curves, against collisions per disk in the same units, against time in those of 
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.drawing import COLOURS, band, caption, dilute_limit, plt
+from ricochet.drawing import band, caption, colours, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.theory import EQUIPARTITION
@@ -54,7 +54,7 @@ def cooling(runs: list[Run], points: int = 201) -> Cooling:
 
 def draw_ratio(axes: plt.Axes, groups: list, results: list[Cooling]) -> None:
     """The temperature ratio against collisions, beside the dilute limit."""
-    for (xi, _), result, colour in zip(groups, results, COLOURS[2:], strict=False):
+    for (xi, _), result, colour in zip(groups, results, colours(len(groups), 2), strict=True):
         if result.ratio is not None:
             band(axes, result.by_collisions[0], *result.ratio, color=colour, label=f"ξ = {xi:g}")
     kinds = sorted((kind.mass, kind.disks.sum()) for kind in groups[0][1][0].by_species)
@@ -72,11 +72,12 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.F
     grid = figure.add_gridspec(rows, len(groups))
     upper = grid[:2, :].subgridspec(2, len(groups))
     panels = upper.subplots(sharex="row", sharey=True, squeeze=False)
-    colours, floor = ("black", *COLOURS), min(r.by_time[1].mean.min() for r in results)
+    floor = min(r.by_time[1].mean.min() for r in results)
     for column, (xi, runs), result in zip(panels.T, groups, results, strict=True):
         labels = ("all", *runs[0].names)
+        shades = ("black", *colours(len(runs[0].names)))
         for axes, (x, y) in zip(column, (result.by_time, result.by_collisions), strict=True):
-            for label, mean, error, colour in zip(labels, y.mean, y.error, colours, strict=False):
+            for label, mean, error, colour in zip(labels, y.mean, y.error, shades, strict=True):
                 band(axes, x, mean, error, color=colour, label=label)
             axes.set(yscale="log", xlim=(0, None), ylim=(0.8 * floor, 2))
         column[0].set(title=f"ξ = {xi:g}", xlabel="time (reduced units)")

@@ -32,7 +32,7 @@ from ricochet.diffusion import (
     integrated_memory,
     velocity_memory,
 )
-from ricochet.drawing import COLOURS, caption, dilute_limit, plt
+from ricochet.drawing import caption, colours, dilute_limit, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import SeriesMean, combined, doubts, estimate, excess_kurtosis, series_mean
 from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
@@ -270,7 +270,7 @@ def draw(groups: list[tuple[float, list[Run]]], results: list[Found], rows: list
     """Eight panels: motion above, structure below."""
     figure, axes = plt.subplots(2, 4, figsize=(18, 8.5))
     panels = dict(zip(AXES, axes.flat, strict=True))
-    for found, row, colour in zip(results, rows, COLOURS, strict=False):
+    for found, row, colour in zip(results, rows, colours(len(rows)), strict=True):
         draw_group(panels, found, row, colour)
     for name, style in AXES.items():
         panels[name].set(**{"xlabel": "$w\\,t$", **style})

@@ -24,7 +24,7 @@ from ricochet.crater import (
     energy_fraction,
     projectile,
 )
-from ricochet.drawing import COLOURS, caption, panel_grid, plt
+from ricochet.drawing import COLOURS, caption, colours, panel_grid, plt
 from ricochet.script import command_line, launch, measured, read_all, report
 from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law
 
@@ -180,13 +180,12 @@ def draw_size(
     axes.errorbar(x[~free], y[~free], error[~free], ls="", **{**style, "label": ""}, mfc="white")
 
 
-def draw_sizes(axes: plt.Axes, axis: str, scan: list[Curve], names: dict, colours: list) -> None:
+def draw_sizes(axes: plt.Axes, axis: str, scan: list[Curve], names: dict, own: list) -> None:
     """Some of the sizes: of a single curve each has a colour, of a family each curve."""
     varying = [name for name in scan[0].others if len({c.others[name] for c in scan}) > 1]
-    family = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(scan)))
-    for curve, shade in zip(scan, family, strict=True):
+    for curve, shade in zip(scan, colours(len(scan)), strict=True):
         fits = fits_of(axis, curve.points)
-        for (name, title), colour, marker in zip(names.items(), colours, "os", strict=True):
+        for (name, title), colour, marker in zip(names.items(), own, "os", strict=True):
             label = "" if varying else title + power(axis, fits[name])
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
             draw_size(axes, axis, curve, name, fits[name], **style)

@@ -9,7 +9,7 @@ the standard deviation from that line; and the largest change.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import COLOURS, caption, colours, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import windows
 
@@ -61,7 +61,7 @@ def draw(runs: list[Run]) -> plt.Figure:
     """Two rows with one time axis."""
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 7.5))
     draw_species(top, runs[0])
-    for run, colour in zip(runs, COLOURS[2:] + COLOURS[:2], strict=False):
+    for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, change = total_change(run)
         size = np.maximum(np.abs(change), EPSILON / 2)
         bottom.semilogy(time, size, color=colour, lw=1, label=method(run))

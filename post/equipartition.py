@@ -12,7 +12,7 @@ means in equilibrium, which is found or begins after --skip.
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import caption, colours, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, windows
 from ricochet.thermodynamics import lightest_and_heaviest, start_of_equilibrium
@@ -94,11 +94,11 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
     )
     names = groups[0][1][0].names
-    order = lightest_and_heaviest(groups[0][1][0])
+    order, shades = lightest_and_heaviest(groups[0][1][0]), colours(len(names))
     for axes, (v0, runs), result in zip(panels.flat, groups, results, strict=True):
         for k, energy in zip(order, (result.light, result.heavy), strict=True):
             axes.errorbar(
-                result.time, energy.mean, energy.error, color=COLOURS[k], marker=".", label=names[k]
+                result.time, energy.mean, energy.error, color=shades[k], marker=".", label=names[k]
             )
         if np.isfinite(result.thermalisation):
             axes.axvline(

@@ -17,7 +17,7 @@ their errors come from ten blocks of time.
 from typing import NamedTuple
 
 from ricochet import Run, RunError, read_run, thermodynamics
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import caption, colours, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
@@ -172,8 +172,8 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     grid, crowded = heights(run, species, kt)
     v_labels = slopes(run, result, "speed", "shared")
     h_labels = slopes(run, result, "height", "crowded")
-    for k, s in enumerate(species):
-        colour, v_law, h_law = COLOURS[k], s.mass / (2 * kt), s.mass * g / kt
+    for k, (s, colour) in enumerate(zip(species, colours(len(species)), strict=True)):
+        v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
         draw_histogram(panels[0], s.square.ravel(), squares[-1], colour, v_labels[k])
         shared = sharing(0.5 * s.mass * squares, kt, run.count) * v_law * (1 - 0.5 / run.count)
         draw_laws(panels[0], squares, v_law * np.exp(-v_law * squares), shared, colour)

@@ -9,7 +9,7 @@ energy and it falls more slowly.  Periodic boxes at rest as a whole.
 """
 
 from ricochet import Run, RunError, hard_disks
-from ricochet.drawing import COLOURS, band, caption, plt
+from ricochet.drawing import band, caption, colours, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.thermodynamics import free_disks, packing, temperature
@@ -51,7 +51,7 @@ def means(runs: list[Run]) -> dict[str, np.ndarray | Estimate]:
 def draw(groups: list[tuple[float, list[Run]]], results: list[dict]) -> plt.Figure:
     """K against time, double logarithmic, and against collisions, logarithmic."""
     figure, (left, right) = plt.subplots(1, 2, sharey=True, figsize=(10, 5))
-    for (xi, _), found, colour in zip(groups, results, COLOURS, strict=False):
+    for (xi, _), found, colour in zip(groups, results, colours(len(groups)), strict=True):
         panels = (
             (left, found["time"], found["by_time"], hard_disks.haff_by_time),
             (right, found["tau"], found["by_collisions"], hard_disks.haff_by_collisions),

@@ -11,7 +11,7 @@ warnings.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import caption, colours, plt
 from ricochet.hard_disks import MELTING
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import combined, doubts
@@ -37,7 +37,8 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     figure, axes = plt.subplots(figsize=(8, 5.5))
     for (name, points), style in zip(MELTING.items(), (":", "--", "-"), strict=True):
         axes.plot(*np.transpose(points), ls=style, color="0.4", lw=1, label=name)
-    for (count, own), colour in zip(grouped(rows, lambda row: row["N"]), COLOURS, strict=False):
+    sizes = grouped(rows, lambda row: row["N"])
+    for (count, own), colour in zip(sizes, colours(len(sizes)), strict=True):
         x, y, error = ([row[name] for row in own] for name in ("packing", "P", "P_error"))
         axes.errorbar(x, y, error, marker="o", lw=0.8, color=colour, label=f"N = {count}")
     axes.set(

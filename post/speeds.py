@@ -19,7 +19,7 @@ from argparse import Namespace
 from typing import NamedTuple
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, dilute_limit, plt
+from ricochet.drawing import caption, colours, dilute_limit, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
 from ricochet.statistics import estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
@@ -123,7 +123,7 @@ def table(groups: list, pools: list[Pool]) -> list[dict]:
 
 def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str]) -> None:
     """Step histograms over the Maxwell curve."""
-    for u, label, colour in zip(samples, labels, COLOURS, strict=False):
+    for u, label, colour in zip(samples, labels, colours(len(labels)), strict=True):
         density, _ = np.histogram(u, BINS)
         axes.stairs(
             density / (len(u) * np.diff(BINS)),
@@ -144,7 +144,7 @@ def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str])
 
 def draw_relaxation(axes: plt.Axes, groups: list, cool: bool) -> None:
     """a2 against collisions per disk, mean and standard error over the runs."""
-    for (count, runs), colour in zip(groups, COLOURS, strict=False):
+    for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]
         common = min(len(tau) for tau, _ in tracks)
         tau = np.mean([track[:common] for track, _ in tracks], axis=0)

@@ -11,6 +11,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import EllipseCollection
+from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
 from .files import destination
@@ -76,6 +77,13 @@ def numbers_of(run: Run) -> dict[str, float]:
         for name, value in found.items()
         if isinstance(value, int | float) and name.split()[-1] not in ("count", "restitution")
     }
+
+
+def colours(count: int, first: int = 0) -> list[str]:
+    """A colour for each of so many things, from the `first` of COLOURS on; of many from a scale."""
+    if first + count <= len(COLOURS):
+        return COLOURS[first : first + count]
+    return [to_hex(colour) for colour in plt.get_cmap()(np.linspace(0, 0.9, count))]
 
 
 def panel_grid(count: int, aspect: float) -> tuple[int, int]:

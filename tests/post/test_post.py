@@ -312,6 +312,20 @@ def test_what_compares_species_wants_several(tmp_path, rng, capsys, script):
     assert said.startswith(f"{script}.py: {path}: needs ") and said.count("\n") == 1
 
 
+def test_nine_groups_of_runs_are_nine_curves(tmp_path, rng, monkeypatch):
+    """More than there are colours in the style."""
+    figures, counts = [], range(10, 100, 10)
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    draw("speeds", *(gas(tmp_path / f"{n}.h5", rng, count=n) for n in counts))
+    relaxation = figures[-1].axes[3].get_legend_handles_labels()[1]
+    assert {f"N = {n}" for n in counts} <= set(relaxation)
+    draw("cooling", *(cooled(tmp_path / f"{k}.h5", 1 - k / 100, 1.0).path for k in counts))
+    ratios = figures[-1].axes[-1].get_legend_handles_labels()[1]
+    assert {f"ξ = {k / 100:g}" for k in counts} <= set(ratios)
+    draw("energy", *(falling(tmp_path / f"f{k}.h5", rng, seed=k, frames=9) for k in counts))
+    assert len({line.get_color() for line in figures[-1].axes[1].lines}) == len(counts)
+
+
 def test_energies_are_in_units_of_the_first_mean(tmp_path):
     kinetic = cooling.energies(cooled(tmp_path / "run.h5", 0.9, decay=5.0, points=3))
     np.testing.assert_allclose(kinetic[0], np.exp([0, -1.25, -5]))
