@@ -6,20 +6,23 @@ of other hosts read along under a name that points here (DNS rebinding).
 """
 
 import json
+import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import unquote
 
 from .files import RunError
 from .reader import Run, read_run
 
 ADDRESS = "127.0.0.1"
 LOOK = 0.5  # seconds between looks whether the run has ended
+DIED = "was killed or has crashed"
 PATIENCE = 10.0  # seconds since a page last asked, after which none is left to be told the end
 
 
@@ -30,7 +33,7 @@ class Live:
         """Take the unfinished run, and what makes a film of a run."""
         self.part, self.filmed = run.path, filmed
         self.final = run.path.with_suffix("")
-        self.claim = Path(f"{self.final}.lock")  # there while the program writes; never opened here
+        self.claim = Path(f"{self.final}.lock")  # there, and locked, while the program writes
         self.lock = threading.Lock()
         self.stamp, self.news = "", b""
         self.asked = -PATIENCE  # when a page asked last
@@ -41,6 +44,8 @@ class Live:
         """Empty while the run goes on.  The final name means that it has finished."""
         if not self.part.exists():
             return "has ended" if self.final.exists() else ""
+        if abandoned(self.claim):
+            return DIED
         return "" if self.claim.exists() else "has stopped"
 
     def answer(self, known: str) -> bytes:
@@ -59,6 +64,39 @@ class Live:
             return b"" if known == self.stamp else self.news
 
 
+def abandoned(lock: Path) -> bool:
+    """Whether a lock file is there that nobody holds: the kernel has dropped the lock of a run.
+
+    A lock that is held is left alone, and one that is not for a moment only.  Where there are no
+    locks nobody knows.
+    """
+    import fcntl  # not on Windows, where files can be read nevertheless
+
+    try:
+        descriptor = os.open(lock, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        return os.path.samestat(os.fstat(descriptor), lock.stat())  # not one just removed
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+
+
+class Server(ThreadingHTTPServer):
+    """A thread for each connection."""
+
+    daemon_threads = True
+
+    def handle_error(self, *_) -> None:
+        """A connection that breaks is of no interest; anything else is one line."""
+        problem = sys.exception()
+        if not isinstance(problem, ConnectionError):
+            print(f"a request was not answered: {problem!r}", file=sys.stderr)
+
+
 def handler(live: Live, page: bytes) -> type[BaseHTTPRequestHandler]:
     """What answers the requests: the page at /, what is new at /film."""
 
@@ -66,18 +104,24 @@ def handler(live: Live, page: bytes) -> type[BaseHTTPRequestHandler]:
         server_version, sys_version = "ricochet", ""
 
         def do_GET(self) -> None:
-            port, url = self.server.server_address[1], urlsplit(self.path)
+            port, (path, _, query) = self.server.server_address[1], self.path.partition("?")
             if self.headers.get_all("Host") not in ([f"{ADDRESS}:{port}"], [f"localhost:{port}"]):
                 self.reply(403, "text/plain", b"only for pages of this computer\n")
-            elif url.path == "/":
+            elif path == "/":
                 self.reply(200, "text/html; charset=utf-8", page)
-            elif url.path == "/film":
-                known = parse_qs(url.query).get("known", [""])[0]
+            elif path == "/film":
+                known = unquote(query.removeprefix("known="))
                 self.reply(200, "application/json", live.answer(known))
             else:
                 self.reply(404, "text/plain", b"no such page\n")
 
+        def send_error(self, code: int, *_) -> None:
+            """Whatever it is that http.server does not understand, it is the request."""
+            self.close_connection = True
+            self.reply(code if code < 500 else 400, "text/plain", b"not understood\n")
+
         def reply(self, code: int, kind: str, body: bytes) -> None:
+            self.request_version = "HTTP/1.0"  # else some answers would have no status
             self.send_response(code)
             for name, value in (
                 ("Content-Type", kind),
@@ -89,8 +133,7 @@ def handler(live: Live, page: bytes) -> type[BaseHTTPRequestHandler]:
             ):
                 self.send_header(name, value)
             self.end_headers()
-            with suppress(ConnectionError):  # the page was closed meanwhile
-                self.wfile.write(body)
+            self.wfile.write(body)
 
         def log_message(self, *_) -> None:
             """Nothing: requests are of no interest."""
@@ -99,15 +142,17 @@ def handler(live: Live, page: bytes) -> type[BaseHTTPRequestHandler]:
 
 
 def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
-    """Show the run until it has ended, or until Ctrl-C or TERM; returns what happened."""
+    """Show the run until it has ended, or until Ctrl-C or TERM; returns what happened.
+
+    Raises RunError if there is nothing to show or the run has died.
+    """
     if run.path.suffix != ".part":
         raise RunError(f"{run.path}: has finished; leave out --live")
     live = Live(run, filmed)
     if live.end:
         raise RunError(f"{run.path}: the run {live.end}; leave out --live")
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with ThreadingHTTPServer((ADDRESS, 0), handler(live, page.encode())) as server:
-        server.daemon_threads = True
+    with Server((ADDRESS, 0), handler(live, page.encode())) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         try:
             print(f"http://{ADDRESS}:{server.server_address[1]}/  (Ctrl-C ends)", flush=True)
@@ -119,6 +164,7 @@ def serve(run: Run, page: str, filmed: Callable[[Run], dict]) -> str:
             pass
         finally:
             server.shutdown()
-    if not live.end:
-        return "stopped; the run goes on"
-    return f"the run {live.end}: {live.part if live.part.exists() else live.final}"
+    end, left = live.end, live.part if live.part.exists() else live.final
+    if end == DIED:
+        raise RunError(f"{left}: the run {end}")
+    return f"the run {end}: {left}" if end else "stopped; the run goes on"

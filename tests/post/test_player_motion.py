@@ -1,9 +1,15 @@
 """The player between frames: true time and paths, camera, events to come, a run that goes on."""
 
+import contextlib
 import http.client
+import json
+import random
 import signal
+import socket
+import struct
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 
@@ -11,7 +17,7 @@ import numpy as np
 import pytest
 
 from ricochet import read_run
-from ricochet.live import PATIENCE
+from ricochet.live import LOOK, PATIENCE, Live, Server, handler
 from synthetic_run import ROOT, run_script, write_run
 from whole_runs import FINISHED, frames_in, wait_for, write_input
 
@@ -384,7 +390,7 @@ def test_requests_under_another_name_are_refused(live):
         assert ask(address, host=host) == ask(address, "/film", host) == 403, host
     assert ask(address, host=["localhost:PORT", "evil.example"]) == 403
     assert ask(address, "/../gas.nml") == 404
-    assert ask(address, method="POST") == 501
+    assert ask(address, method="POST") == 400
 
 
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
@@ -435,6 +441,90 @@ def test_a_show_without_a_page_ends_at_once(live, tmp_path, capsys):
     assert out.strip() == f"the run has stopped: {part}"
     assert run_script("player", part, "--live") == 2
     assert "gas.h5.part: the run has stopped; leave out --live" in capsys.readouterr().err
+
+
+def test_the_show_of_a_run_that_is_killed_ends_and_says_so(live, tmp_path, capsys):
+    """A stopped one goes on; the kernel drops the lock of a killed one."""
+    run, show, address = live
+    part = tmp_path / "gas.h5.part"
+    run.send_signal(signal.SIGSTOP)
+    time.sleep(4 * LOOK)
+    assert show.poll() is None
+    run.kill()
+    with urllib.request.urlopen(address + "film", timeout=60) as reply:
+        run.wait()
+        assert reply.status == 200
+    with urllib.request.urlopen(address + "film", timeout=60) as reply:
+        assert json.load(reply)["end"] == "was killed or has crashed"
+    out, err = show.communicate(timeout=PATIENCE)
+    assert (show.returncode, out) == (2, "")
+    assert err == f"player.py: {part}: the run was killed or has crashed\n"
+    assert (tmp_path / "gas.h5.lock").exists()
+    assert run_script("player", part, "--live") == 2
+    assert "gas.h5.part: the run was killed or has crashed; leave" in capsys.readouterr().err
+
+
+@pytest.fixture
+def server(tmp_path):
+    """The server of a film, in this process; gives its port."""
+    x = np.full((2, 3, 2), 0.5)
+    run = read_run(write_run(tmp_path / "a.h5.part", x, x))
+    one = Server(("127.0.0.1", 0), handler(Live(run, lambda run: {}), b"the page"))
+    threading.Thread(target=one.serve_forever, daemon=True).start()
+    yield one.server_address[1]
+    one.shutdown()
+    one.server_close()
+
+
+def status_of(port, request, reset=False):
+    """The status that the server answers to these bytes; 0 without an answer."""
+    answer = b""
+    with (
+        socket.create_connection(("127.0.0.1", port), timeout=20) as connection,
+        contextlib.suppress(ConnectionError),  # the server has not read all that was sent
+    ):
+        connection.sendall(request)
+        if reset:  # the connection breaks off
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            return 0
+        with contextlib.suppress(OSError):  # it has hung up already
+            connection.shutdown(socket.SHUT_WR)
+        while part := connection.recv(65536):
+            answer += part
+    assert answer == b"" or answer.startswith(b"HTTP/1.0 "), answer
+    return int(answer[9:12] or 0)
+
+
+#: What requests are made of, good and bad.
+METHODS = b"GET GET GET get POST HEAD TRACE PRI \x16\x03\x01 G\0ET *".split()
+PATHS = rb"""/ /film /film?known=%ff% //film /../gas.nml * film ? http://[::1/film http://[/ //[::1
+    http://a:b:c/ http://127.0.0.1:PORT/film /LONG""".split()
+VERSIONS = rb"HTTP/1.0 HTTP/1.1 HTTP/0.9 HTTP/2.0 HTTP/1. HTTP/x.1 HTTP/-1.1 HTTP/9LONG.1 x".split()
+HEADERS = rb"Host: 127.0.0.1:PORT|Host: [::1|Host:|host|: a| folded|Expect: 100-continue|a: LONG|"
+PIECES = ([*METHODS, b"\xff"], [*PATHS, b"/\xff\0", b""], [*VERSIONS, b"\xff/1.1", b""])
+
+
+@pytest.mark.parametrize("requests", [300, pytest.param(5000, marks=pytest.mark.check)])
+def test_hostile_requests_are_refused_without_a_word(server, capfd, requests):
+    host = f"Host: 127.0.0.1:{server}\r\n\r\n".encode()
+    for path, status in {"/": 200, "/film": 200, "http://[::1/film": 404, "*": 404}.items():
+        assert status_of(server, f"GET {path} HTTP/1.1\r\n".encode() + host) == status, path
+    assert status_of(server, b"GET / HTTP/2.0\r\n" + host) == 400
+    assert status_of(server, b"GET /\r\n\r\n") == 403
+    rng = random.Random(31)
+    for _ in range(requests):
+        line = b" ".join(rng.choice(words) for words in PIECES)
+        lines = [line, *rng.choices(HEADERS.split(b"|"), k=rng.choice((0, 1, 2, 150)))]
+        request = rng.choice((b"\r\n", b"\n", b"\r")).join(lines) + b"\r\n\r\n"
+        if rng.random() < 0.3:  # damaged
+            place = rng.randrange(len(request))
+            request = request[:place] + rng.randbytes(rng.randrange(9)) + request[place + 1 :]
+        request = request.replace(b"PORT", str(server).encode())
+        request = request.replace(b"LONG", rng.choice((b"", b"9" * 70000)))
+        status = status_of(server, request, reset=rng.random() < 0.1)
+        assert status in (0, 200) or 400 <= status < 500, request
+        assert status != 200 or (request.startswith(b"GET /") and host[:-4] in request), request
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_finished_run_is_not_live(tmp_path, capsys):
