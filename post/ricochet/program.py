@@ -54,9 +54,9 @@ def run(
         text, system = namelist(system), work / "input.nml"
         system.write_text(text, encoding="utf-8")
     output = work / "run.h5" if output is None else Path(output)
-    settings = [f"{name}={value_text(value)}" for name, value in (overrides or {}).items()]
-    command = [program, system, "-o", output, *(w for pair in settings for w in ("--set", pair))]
-    command += ["--force"] * force + ["--resume"] * resume
+    settings = [f"{name}={value_text(name, value)}" for name, value in (overrides or {}).items()]
+    command = [program, "-o", output, *(word for pair in settings for word in ("--set", pair))]
+    command += ["--force"] * force + ["--resume"] * resume + ["--", system]
     code, lines = watched(list(map(str, command)))
     message = "\n".join(lines).replace(f"{work}{os.sep}", "")
     if code != 0:
@@ -135,32 +135,34 @@ def namelist(groups: Mapping[str, object]) -> str:
     """The text of an input file; whether it makes sense is for the program to say."""
     text = []
     for name, content in groups.items():
-        for group in [content] if isinstance(content, Mapping) else content:
+        for group in content if isinstance(content, list | tuple) else [content]:
             if not isinstance(group, Mapping):
-                raise TypeError(f"{name}: a group is a dictionary, or a list of them")
-            lines = [f"  {variable} = {value_text(value)}\n" for variable, value in group.items()]
+                kind = type(group).__name__
+                raise TypeError(f"{name}: a group is a dictionary, or a list of them, not {kind}")
+            lines = [
+                f"  {variable} = {value_text(f'{name}.{variable}', value)}\n"
+                for variable, value in group.items()
+            ]
             text += [f"&{name}\n", *lines, "/\n"]
     return "".join(text)
 
 
-def value_text(value: object) -> str:
+def value_text(name: str, value: object) -> str:
     """A value as a namelist writes it; an array as the list of its numbers, row by row."""
+    if isinstance(value, np.floating):
+        value = float(value)
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()  # Python's own kinds: of a single value, too
     match value:
-        case bool() | np.bool_():
+        case bool():
             return ".true." if value else ".false."
         case str() | Path():
             return "'" + str(value).replace("'", "''") + "'"
-        case int() | float() | np.number():
-            return repr(value.item() if isinstance(value, np.number) else value)
-        case list() | tuple() | np.ndarray():
-            return ", ".join(value_text(part) for part in flat(value))
-    raise TypeError(f"{value!r} is not a number, text, logical, or a list of these")
-
-
-def flat(values) -> Iterator[object]:
-    """The single values in nested lists."""
-    for value in values:
-        if isinstance(value, list | tuple | np.ndarray):
-            yield from flat(value)
-        else:
-            yield value
+        case int() | float():
+            return repr(value)
+        case list() | tuple() if len(value) > 0:
+            return ", ".join(value_text(name, part) for part in value)
+        case list() | tuple():
+            raise TypeError(f"{name}: the list is empty; leave the variable out for its default")
+    kind = type(value).__name__
+    raise TypeError(f"{name}: a value is a number, text, logical, or a list of these, not {kind}")

@@ -1,6 +1,7 @@
 """The program started from Python: `ricochet.run`."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -103,10 +104,54 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch,
     assert "collisions" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("groups", [{"run": 3}, {"run": [3]}, {"run": {"seed": None}}])
-def test_what_is_no_input_is_refused(groups):
-    with pytest.raises(TypeError, match=r"is not|is a"):
+NO_GROUP = "run: a group is a dictionary, or a list of them, not "
+NO_VALUE = "run.seed: a value is a number, text, logical, or a list of these, not "
+
+
+@pytest.mark.parametrize(
+    ("groups", "words"),
+    [
+        ({"run": 3}, NO_GROUP + "int"),
+        ({"run": [{}, 3]}, NO_GROUP + "int"),
+        ({"run": "seed"}, NO_GROUP + "str"),
+        ({"run": np.array(5)}, NO_GROUP + "ndarray"),
+        ({"run": {"seed": None}}, NO_VALUE + "NoneType"),
+        ({"run": {"seed": [1, {}]}}, NO_VALUE + "dict"),
+        ({"run": {"seed": np.array(1j)}}, NO_VALUE + "complex"),
+        ({"run": {"seed": np.zeros(0)}}, "run.seed: the list is empty; leave the variable out"),
+    ],
+)
+def test_what_is_no_input_is_refused(groups, words):
+    with pytest.raises(TypeError, match=re.escape(words)) as refused:
         package.run(groups)
+    assert "\n" not in str(refused.value)
+    if isinstance(value := next(iter(groups.values())), dict):
+        with pytest.raises(TypeError, match=re.escape(words.partition(".")[2])):
+            package.run(GROUPS, {f"run.{name}": one for name, one in value.items()})
+
+
+def test_values_of_numpy_are_numbers():
+    """Of any number of dimensions; the last digit counts."""
+    third = 1 / np.float64(3)
+    groups = {
+        "run": {"seed": np.array(7), "title": np.str_("it's")},
+        "box": {"lower": np.zeros(2, np.int8), "upper": [np.float32(2), np.array(third + 1)]},
+        "species": ({"position": np.full((2, 1, 2), [[[0.3, 0.4]], [[1.2, 1.1]]]), "radius": 0.1},),
+        "stop": {"events": np.array(50), "time": np.longdouble(0)},
+        "output": {"event_log": np.bool_(True)},
+    }
+    run = package.run(groups, {"run.title": np.array("no"), "output.event_log": np.array(False)})
+    assert run.seed == 7 and run.parameter("run", "title") == "no"
+    np.testing.assert_array_equal(run.edges, [2, third + 1])
+    np.testing.assert_array_equal(run.position[0], [[0.3, 0.4], [1.2, 1.1]])
+    assert run.parameter("stop", "events") == 50 and not run.parameter("output", "event_log")
+
+
+def test_file_names_may_begin_with_a_dash(tmp_path):
+    Path("-i.nml").write_text(TEXT)
+    run = package.run("-i.nml", output="-o.h5")
+    assert run.seed == 5 and (tmp_path / "-o.h5").exists()
+    assert package.run(Path("-i.nml"), {"run.seed": 3}).seed == 3
 
 
 def test_a_missing_program_is_named(monkeypatch):
