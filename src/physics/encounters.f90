@@ -31,7 +31,7 @@ contains
     first = i
     if (code > 0) then
       if (are_together(sim, i, code, t)) then
-        call keep_apart(sim, i, code, t)
+        call keep_apart(sim, i, code)
         return
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
@@ -106,6 +106,8 @@ contains
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
+    dv = sim%disk(j)%v - sim%disk(i)%v
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! by rounding
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
@@ -117,7 +119,7 @@ contains
   end subroutine collide_pair
 
   !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
-  !> between them: only rounding can have made them approach again.
+  !> between them: only rounding can have made them approach again, when one of them passed a periodic side.
   pure function are_together(sim, i, j, t) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, j
@@ -135,22 +137,19 @@ contains
     end associate
   end function are_together
 
-  !> Takes from two disks that are together the approach that is left by rounding, in the very expression by which a
-  !> contact is predicted: then none is. This is no collision.
-  pure subroutine keep_apart(sim, i, j, t)
+  !> Takes from two disks of the same clock, which have collided, the approach that is left by rounding, in the very
+  !> expression by which a contact is predicted: then none is. This is no collision, and the clocks stay.
+  pure subroutine keep_apart(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: t
     real(real64) :: dx(2), dv(2), step, mass_i, mass_j
 
     associate (p => sim%disk(i), q => sim%disk(j))
-      call land(p, sim%box%gravity, t)
-      call land(q, sim%box%gravity, t)
       dx = q%x - p%x
       dx = dx - nearest_image(dx, sim%box%periods())
       mass_i = sim%mass_of(i)
       mass_j = sim%mass_of(j)
-      step = epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j))
+      step = max(epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j)), tiny(step))
       do
         dv = q%v - p%v
         if (dx(1)*dv(1) + dx(2)*dv(2) >= 0) exit
@@ -158,6 +157,8 @@ contains
         q%v = q%v + (step/mass_j)*dx
         step = 2*step
       end do
+      p%stamp = p%stamp + 1
+      q%stamp = q%stamp + 1
     end associate
   end subroutine keep_apart
 

@@ -148,7 +148,7 @@ contains
       in_time = (from - (2 + margin_of_times)*latest)*b - c
       in_time = merge(in_time, disc, in_time < disc)
       if (in_time > 0 .and. b < 0) then
-        t_j = late + max(c, 0.0_real64)/(sqrt(disc) - b)
+        t_j = late + max(c, 0.0_real64)/(sqrt(min(disc, b*b)) - b)
         if (t_j < now .and. .not. fresh) then ! by rounding: the contact is over, or else it is now
           t_j = merge(2*never, now, b + (du*du + dv*dv)*(now - late) >= 0)
         end if
