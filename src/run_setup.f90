@@ -100,7 +100,7 @@ contains
       if (cuts_space) then
         allocate (parallel)
         parallel%plain = events
-        parallel%threads = settings%run%threads
+        parallel%parts%threads = settings%run%threads
         call move_alloc(parallel, evolution)
       else
         call move_alloc(events, evolution)

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-FINISHED, USAGE, FILES, STOPPED = 0, 2, 3, 75
+FINISHED, USAGE, FILES, BROKEN, STOPPED = 0, 2, 3, 4, 75
 
 #: A little of everything: two species, walls that take energy, frames and observables apart.
 MIXTURE = """&run title = 'mixture' seed = 5 /

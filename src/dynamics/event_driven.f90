@@ -28,6 +28,7 @@ module event_driven
     class(neighbour_search_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not the heap alone
+    integer(int64) :: turns_left = 0               !! of those that the last advance was allowed
   contains
     procedure :: start
     procedure :: advance
@@ -74,6 +75,7 @@ contains
     integer(int64) :: turns, pause_at, events
 
     turns = limits%turns
+    self%turns_left = turns
     do while (turns > 0)
       if (limits%reached(sim) .or. self%log%is_full()) return
       if (stop_requested()) return
@@ -82,6 +84,7 @@ contains
       if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
       events = sim%events
       call self%run_events(sim, t_limit, pause_at, turns, event)
+      self%turns_left = turns
       if (self%search%everyone .and. sim%events > events) call self%predict_all(sim)
       if (.not. event%time <= t_limit) then
         if (event%time /= event%time) &

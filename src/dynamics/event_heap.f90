@@ -5,7 +5,7 @@ module event_heap
   use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: event_t, event_heap_t, event_of, need_order, precedes
+  public :: event_t, event_heap_t, event_of, ids_of, need_order, precedes
 
   integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
 

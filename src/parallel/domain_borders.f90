@@ -51,7 +51,8 @@ contains
         if (s > 0) then
           found = found + 1
           associate (track => grid%track(grid%track_of(s)))
-            same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t)
+            same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t) &
+              .and. self%patch%holds(self%sim%tag(s)%cell)   ! one that left the patch was missing, wherever it is now
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
             near = came_near(self, grid, theirs%track(r), shift, met)
             if (.not. met) met = grid%could_have_met(int(track%low, int32), int(track%high, int32))

@@ -83,7 +83,6 @@ contains
     integer(int32), intent(in) :: i
     type(track_t), allocatable :: more(:)
 
-    if (.not. allocated(self%track)) allocate (self%track(1024))
     if (self%n_tracks == size(self%track)) then
       allocate (more(2*self%n_tracks))
       more(:self%n_tracks) = self%track

@@ -8,15 +8,21 @@ module domains
   use domain_grid, only: domain_grid_t, forever
   use errors, only: error_t
   use event_driven, only: event_driven_t
+  use event_heap, only: event_of, ids_of
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use partners, only: nothing
+  use signals, only: stop_requested
   use simulation_state, only: simulation_t
+  use system, only: seconds
   implicit none
   private
-  public :: clear_sums, copy_of, domain_t, gather, keep_log, list_copies, load, merge_logs, move_on, next_time, news_t
+  public :: clear_sums, copy_of, domain_t, due_t, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
+  public :: next_due, news_t
 
   integer, parameter :: log_capacity = 1024
+  real(real64), parameter :: longest_window = 5.0_real64   !! of one domain, after which it is given up [s]
+  integer(int64), parameter :: turns_to_look = 100000      !! between two looks at signals and clock
   integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
 
   !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
@@ -39,6 +45,7 @@ module domains
     integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation; or next vacant slot
     integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
     type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
+    integer(int64) :: turns = 0                    !! of the engine, in this window
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
     integer(int32) :: n_news = 0
@@ -46,6 +53,15 @@ module domains
     integer(int32), allocatable, private :: key(:), slot(:)  !! (0:) the copies by their ids: a hash table
     integer(int32), private :: last_key = 0        !! one less than a power of two
   end type domain_t
+
+  !> An event by what it is in all domains.
+  type :: due_t
+    real(real64) :: time = forever                 !! since the epoch [time]
+    integer(int32) :: ids(2) = 0                   !! of the disks concerned, as in `event_heap`
+    integer(int32) :: code = 0                     !! what a single disk meets; of a pair 0
+  contains
+    procedure :: precedes
+  end type due_t
 
 contains
 
@@ -142,6 +158,7 @@ contains
     end associate
     if (allocated(grid%track_of)) deallocate (grid%track_of)
     allocate (grid%track_of(self%sim%n_disks()), source=0)
+    if (.not. allocated(grid%track)) allocate (grid%track(1024))
     call self%engine%start(self%sim)
     call grid%begin_window()
     grid%n_tracks = 0
@@ -223,36 +240,76 @@ contains
     end select
   end subroutine clear_sums
 
-  !> Follows the domain, copies and all, to the end of a window; gives up after so many turns of the engine.
+  !> Follows the domain, copies and all, to the end of a window; gives up after so many turns of the engine, or too long
+  !> a time.
   subroutine move_on(self, t_end, turns)
     type(domain_t), intent(inout) :: self
     real(real64), intent(in) :: t_end              !! since the epoch [time]
     integer(int64), intent(in) :: turns
     type(limits_t) :: limits
     type(error_t), allocatable :: error
+    real(real64) :: began                          ! [s]
+    integer(int64) :: left
 
     self%done = .false.
     if (.not. self%good) return                    ! there was no room for all copies
+    began = seconds()
     limits%time = t_end
-    limits%turns = turns
-    do
+    left = turns
+    do while (left > 0)
+      limits%turns = min(left, turns_to_look)
       call self%engine%advance(self%sim, limits, error)
-      if (.not. self%engine%log%is_full() .or. allocated(error)) exit
+      left = left - (limits%turns - self%engine%turns_left)
       call take_log(self)
+      if (allocated(error)) exit
+      self%done = self%sim%now >= t_end
+      if (self%done) exit
+      if (stop_requested()) exit
+      if (seconds() - began > longest_window) exit
     end do
-    call take_log(self)
-    self%done = self%sim%now >= t_end .and. .not. allocated(error)
+    self%turns = self%turns + turns - left
   end subroutine move_on
 
-  !> When the next event is due.
-  function next_time(self) result(t)
+  !> The next event.
+  function next_due(self) result(due)
     type(domain_t), intent(inout) :: self
-    real(real64) :: t                              !! since the epoch [time]
+    type(due_t) :: due
     integer(int32) :: i
 
     call self%engine%queue%first(self%sim%disk, self%sim%tag, i)
-    t = self%sim%disk(i)%event_time
-  end function next_time
+    associate (disk => self%sim%disk(i))
+      due = due_t(disk%event_time, ids_of(event_of(self%sim%disk, i), self%sim%tag), min(disk%partner, 0))
+    end associate
+  end function next_due
+
+  !> Whether an event comes before another, as in a queue.
+  pure function precedes(self, other) result(yes)
+    class(due_t), intent(in) :: self
+    type(due_t), intent(in) :: other
+    logical :: yes
+    integer(int32) :: mine(3), theirs(3)
+    integer :: k
+
+    yes = self%time < other%time
+    if (yes .or. self%time > other%time) return
+    mine = [self%ids, self%code]
+    theirs = [other%ids, other%code]
+    do k = 1, 3
+      yes = mine(k) < theirs(k)
+      if (mine(k) /= theirs(k)) return
+    end do
+  end function precedes
+
+  !> Executes the next event, whatever the limits.
+  subroutine follow_event(self)
+    type(domain_t), intent(inout) :: self
+    type(error_t), allocatable :: error
+
+    call self%engine%advance(self%sim, limits_t(turns=1_int64), error)
+    call take_log(self)
+    self%turns = self%turns + 1
+    self%done = .not. allocated(error)
+  end subroutine follow_event
 
   !> Switches the list of collisions on or off.
   subroutine keep_log(self, on)

@@ -18,6 +18,7 @@ module event_log
     procedure :: is_full
     procedure :: append
     procedure :: append_record
+    procedure :: take
     procedure :: clear
   end type event_log_t
 
@@ -76,6 +77,17 @@ contains
     self%n = self%n + 1
     self%record(:, self%n) = record
   end subroutine append_record
+
+  !> Takes over another log, which is off from then on.
+  pure subroutine take(self, other)
+    class(event_log_t), intent(inout) :: self
+    type(event_log_t), intent(inout) :: other
+
+    self%n = other%n
+    other%n = 0
+    if (allocated(self%record)) deallocate (self%record)
+    if (allocated(other%record)) call move_alloc(other%record, self%record)
+  end subroutine take
 
   !> Empties the list.
   pure subroutine clear(self)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from whole_runs import FINISHED, STOPPED, differences, write_input
+from whole_runs import BROKEN, FINISHED, STOPPED, differences, write_input
 
 CHECK = pytest.mark.check
 INPUTS = Path(__file__).resolve().parents[2] / "input"
@@ -130,3 +130,30 @@ def test_every_input_gives_the_same_with_threads(program, tmp_path, name):
         assert done.returncode == FINISHED, done.stderr
     assert differences(tmp_path / "1.h5", tmp_path / "2.h5") == []
     assert differences(tmp_path / "1.h5", tmp_path / "3.h5") == []
+
+
+COLLAPSE = """&species count = 5000 packing_fraction = 0.3 temperature = 1 /
+&contact restitution = 0.3 / &stop collisions_per_disk = 200 /
+"""
+
+
+@pytest.mark.parametrize("log", ["", "&output event_log = .true. /\n"], ids=["plain", "log"])
+def test_a_collapse_ends_a_run_on_several_cores_as_on_one(program, tmp_path, log):
+    """However long a window should be, it is bounded; the run breaks off in the same state."""
+    write_input(tmp_path, COLLAPSE + log)
+    ends = [
+        (end.returncode, end.stderr)
+        for end in (run(program, tmp_path, f"{n}.h5", f"--set=run.threads={n}") for n in (1, 2))
+    ]
+    assert ends[0] == ends[1]
+    assert ends[0][0] == BROKEN
+    assert differences(tmp_path / "1.h5.part", tmp_path / "2.h5.part") == []
+
+
+def test_domains_without_disks_are_no_matter(program, tmp_path):
+    cloud = "&species count = 8000 radius = 0.0002 region = 0, 0.1, 0, 0.1 temperature = 1 /"
+    write_input(tmp_path, cloud + " &stop events = 20000 /\n")
+    for threads in 1, 8:
+        done = run(program, tmp_path, f"{threads}.h5", f"--set=run.threads={threads}")
+        assert done.returncode == FINISHED, done.stderr
+    assert differences(tmp_path / "1.h5", tmp_path / "8.h5") == []
