@@ -3,15 +3,17 @@
 import base64
 import contextlib
 import json
+import re
 import shutil
-import socket
 import subprocess
-import time
 import urllib.request
 from pathlib import Path
 
 import pytest
 
+from whole_runs import PATIENCE, wait_for
+
+PORT = r"started successfully on port (\d+)"
 FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -33,6 +35,7 @@ class Browser:
         self.root = f"http://127.0.0.1:{port}"
         arguments = [*FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
         wanted = {
+            "timeouts": {"script": 1000 * PATIENCE, "pageLoad": 1000 * PATIENCE},
             "goog:chromeOptions": {"args": arguments, "binary": shutil.which("chromium")},
             "goog:loggingPrefs": {"browser": "ALL"},
         }
@@ -43,7 +46,7 @@ class Browser:
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.root + path, data, method=method)
         request.add_header("Content-Type", "application/json")
-        with urllib.request.urlopen(request, timeout=60) as reply:
+        with urllib.request.urlopen(request, timeout=PATIENCE) as reply:
             return json.load(reply)["value"]
 
     def open(self, page: Path | str) -> None:
@@ -61,6 +64,16 @@ class Browser:
 
     def complaints(self) -> list[dict]:
         return self.call("POST", "/se/log", {"type": "browser"})
+
+    def draw(self, count: int) -> None:
+        """Wait until so many pictures have been drawn."""
+        self.run(
+            """let left = arguments[0];
+            return new Promise(done => requestAnimationFrame(function again() {
+              if (left-- > 0) requestAnimationFrame(again); else done(true);
+            }));""",
+            count,
+        )
 
     def click(self, name: str) -> None:
         found = self.call("POST", "/element", {"using": "css selector", "value": f"#{name}"})
@@ -126,33 +139,23 @@ class Browser:
         self.call("DELETE", "")
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 @contextlib.contextmanager
 def browsing(folder: Path, size: tuple[int, int] = (1300, 860)):
     """A browser with an empty profile, ended with its driver."""
     missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
     if missing:
         pytest.skip(f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)")
-    port = free_port()
-    with (folder / "chromedriver.log").open("w") as log:
-        driver = subprocess.Popen(
-            ["chromedriver", f"--port={port}", "--allowed-ips=127.0.0.1"], stdout=log, stderr=log
-        )
+    log = folder / "chromedriver.log"
+    with log.open("w") as file:  # the driver takes a free port, and says which
+        command = ["chromedriver", "--port=0", "--allowed-ips=127.0.0.1"]
+        driver = subprocess.Popen(command, stdout=file, stderr=file)
     try:
-        for _ in range(100):
-            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
-                break
-            time.sleep(0.1)
-        browser = Browser(port, folder / "profile", size)
+        wait_for(lambda: re.search(PORT, log.read_text()) or driver.poll() is not None)
+        browser = Browser(int(re.search(PORT, log.read_text())[1]), folder / "profile", size)
         try:
             yield browser
         finally:
             browser.close()
     finally:
         driver.terminate()
-        driver.wait(20)
+        driver.wait(PATIENCE)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from whole_runs import PATIENCE, within
+
 # A shell that starts the tests in the background has them, and all they start, ignore these.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -26,12 +28,15 @@ def program() -> Path:
 
 @pytest.fixture
 def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
-    """`ricochet(*arguments)` runs the program in `tmp_path`; returns its status and output."""
+    """`ricochet(*arguments)` runs the program in `tmp_path`; returns its status and output.
 
-    def run(*arguments, timeout=60, **options) -> subprocess.CompletedProcess:
-        command = [program, *map(str, arguments)]
+    With `seconds` it is killed when it has used so much processor time.
+    """
+
+    def run(*arguments, seconds=None, **options) -> subprocess.CompletedProcess:
+        command = [*within(seconds), program, *map(str, arguments)]
         options = {"cwd": tmp_path, "capture_output": True, "text": True, **options}
-        return subprocess.run(command, check=False, timeout=timeout, **options)
+        return subprocess.run(command, check=False, timeout=PATIENCE, **options)
 
     return run
 

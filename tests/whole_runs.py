@@ -1,5 +1,9 @@
 """What the tests of whole runs share: inputs, and ways to look at and compare output files."""
 
+import contextlib
+import os
+import re
+import signal
 import time
 import zlib
 from pathlib import Path
@@ -86,12 +90,89 @@ def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
     return path
 
 
-def wait_for(condition, limit=20.0):
+#: When a wait is given up [s]. It ends what hangs, and is no measure of anything: what takes a busy
+#: machine minutes passes, too.
+PATIENCE = 900
+
+
+def wait_for(condition):
     """Returns when the condition holds."""
-    end = time.monotonic() + limit
+    end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, "nothing happened"
         time.sleep(0.005)
+
+
+# --- Processes: what they do is known from the system, not from the time that has passed ---
+
+
+def facts_of(pid) -> list[str]:
+    """What the system knows of a process, from its state on (proc(5), /proc/PID/stat, field 3)."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
+def processor_time(pid) -> float:
+    """What a process has used so far, with the children that it has waited for [s]."""
+    return sum(map(int, facts_of(pid)[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def within(seconds) -> list[str]:
+    """The beginning of a command that is killed when it has used so much processor time, if any."""
+    return ["prlimit", f"--cpu={seconds}"] if seconds else []
+
+
+def is_asleep(pid) -> bool:
+    """Whether a process waits for something; not for a disk, nor for a processor."""
+    return facts_of(pid)[0] == "S"
+
+
+def heeds(pid, number) -> bool:
+    """Whether a process has a handler for a signal."""
+    caught = re.search(r"^SigCgt:\s+(\w+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    return bool(int(caught[1], 16) >> (number - 1) & 1)
+
+
+def has_ended(process) -> bool:
+    """Whether a process has ended; the system still knows it until somebody waits for it."""
+    how = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    return process.returncode is not None or os.waitid(os.P_PID, process.pid, how) is not None
+
+
+def let_work(process, seconds=0.0):
+    """Returns when a run can be stopped and has used so much processor time, or has ended."""
+    wait_for(
+        lambda: has_ended(process)
+        or (heeds(process.pid, signal.SIGTERM) and processor_time(process.pid) >= seconds)
+    )
+
+
+@contextlib.contextmanager
+def held(process):
+    """A process stands still meanwhile, so that it is where it was found."""
+    process.send_signal(signal.SIGSTOP)
+    yield
+    process.send_signal(signal.SIGCONT)
+
+
+def processor_time_of(process) -> float:
+    """What a process has used at its end, for which this waits [s]."""
+    wait_for(lambda: has_ended(process))
+    used = processor_time(process.pid)
+    process.wait()
+    return used
+
+
+def ended_soon(process, number, seconds=1.0, members=()) -> str:
+    """Sends a signal; what the process says until its end, which takes less than so long.
+
+    By processor time, with what the `members` use that the process waits for: by the clock it is
+    as long as other programs make it.
+    """
+    before = sum(map(processor_time, [process.pid, *members]))
+    process.send_signal(number)
+    wait_for(lambda: has_ended(process))
+    assert processor_time(process.pid) - before < seconds
+    return process.communicate()[1]
 
 
 def frames_in(path, group="particles/disks") -> int:

@@ -9,6 +9,7 @@ import pytest
 import player
 from ricochet import read_run
 from synthetic_run import maxwell_velocities, run_script, write_run
+from whole_runs import wait_for
 
 
 @pytest.fixture
@@ -258,19 +259,16 @@ def test_buttons_and_keys_step_through_the_frames_and_the_picture_follows(opened
 def test_play_plays_to_the_end_and_pause_pauses(opened):
     opened.run("$('pace').value = 2")
     opened.click("play")
-    for _ in range(100):
-        if frame(opened) == 39:
-            break
-        time.sleep(0.05)
-    assert frame(opened) == 39
-    assert opened.run("return [state.playing, $('play').ariaPressed]") == [False, "false"]
-    opened.run("$('pace').value = 0; pace = 2")
+    wait_for(lambda: frame(opened) == 39)
+    wait_for(lambda: not opened.run("return state.playing"))
+    assert opened.run("return $('play').ariaPressed") == "false"
+    opened.run("$('pace').value = 0; pace = 0.01")
     opened.click("play")
-    time.sleep(0.5)
+    wait_for(lambda: opened.run("return moment.time") > 0)
     opened.press(" ")
     stopped = opened.run("return moment.time")
     assert 0 < stopped < 39
-    time.sleep(0.4)
+    opened.draw(5)
     assert opened.run("return moment.time") == stopped
 
 

@@ -1,11 +1,11 @@
 """The program started from Python: `ricochet.run`."""
 
+import io
 import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ import pytest
 import ricochet as package
 from ricochet import ProgramError
 from synthetic_run import ROOT
-from whole_runs import STOPPED, USAGE, differences
+from whole_runs import STOPPED, USAGE, differences, is_asleep, wait_for
 
 #: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays.
 GROUPS = {
@@ -76,7 +76,19 @@ def test_nothing_is_left_of_a_run_without_output(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
 
 
-def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, capsys):
+class Notebook(io.StringIO):
+    """A terminal whose user interrupts Python as soon as the progress of a run is shown."""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text) -> int:
+        if "collisions" in text:
+            raise KeyboardInterrupt
+        return super().write(text)
+
+
+def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch):
     (tmp_path / "gas.nml").write_text(TEXT)
     code = "import ricochet; ricochet.run('gas.nml', {'stop.collisions': 10**12}, 'long.h5')"
     paths = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
@@ -84,24 +96,21 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch,
         [sys.executable, "-c", code], env=paths, stderr=subprocess.PIPE, text=True
     )
     try:
-        end = time.monotonic() + 30
-        while not (tmp_path / "long.h5.part").exists():
-            assert time.monotonic() < end and python.poll() is None
-            time.sleep(0.05)
-        time.sleep(0.5)
+        wait_for(lambda: (tmp_path / "long.h5.part").exists() and is_asleep(python.pid))
         python.send_signal(signal.SIGINT)  # as a notebook does, to Python alone
-        assert "KeyboardInterrupt" in python.communicate(timeout=30)[1]
+        assert "KeyboardInterrupt" in python.communicate()[1]
     finally:
         python.kill()
     assert (tmp_path / "long.chk.h5").exists()
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys, "stderr", Notebook())
+    with pytest.raises(KeyboardInterrupt):
+        package.run("gas.nml", {"stop.collisions": 10**12}, "long.h5", resume=True)
     with pytest.raises(ProgramError, match="--resume") as stopped:
         package.run(
-            *("gas.nml", {"stop.collisions": 10**12, "stop.wall_clock": 1.5}, "long.h5"),
+            *("gas.nml", {"stop.collisions": 10**12, "stop.wall_clock": 1e-9}, "long.h5"),
             resume=True,
         )
     assert stopped.value.code == STOPPED
-    assert "collisions" in capsys.readouterr().err
 
 
 NO_GROUP = "run: a group is a dictionary, or a list of them, not "

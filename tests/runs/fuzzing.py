@@ -1,7 +1,9 @@
-"""What the fuzzers share: many cases judged side by side, and their command line."""
+"""What the fuzzers share: runs with a limit, many cases judged side by side, their command line."""
 
 import argparse
 import os
+import signal
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -9,6 +11,15 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests"))
+from whole_runs import PATIENCE, within  # noqa: E402
+
+
+def limited(command: list, seconds: int, **options) -> subprocess.CompletedProcess | None:
+    """A run; None if so much processor time was not enough."""
+    options |= {"capture_output": True, "timeout": PATIENCE}
+    run = subprocess.run([*within(seconds), *command], check=False, **options)
+    return None if run.returncode == -signal.SIGKILL else run
 
 
 def tally(judge: Callable, cases: Iterable, harmless: set[str]) -> Counter:

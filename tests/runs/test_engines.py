@@ -17,6 +17,7 @@ import h5py
 import pytest
 
 from synthetic_run import ROOT
+from whole_runs import PATIENCE
 
 # Daemons, ports and signals across hosts: a minute that `.ci/run` and `make check` have.
 pytestmark = pytest.mark.check
@@ -49,7 +50,7 @@ def daemon(folder: Path, *command, ready, **options):
     log = (folder / f"{name}.out").open("w")
     process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, **options)
     try:
-        wait_for(ready, 30, f"{name} is up", lambda: process.poll() is None)
+        wait_for(ready, f"{name} is up", lambda: process.poll() is None)
         yield process
     finally:
         process.terminate()
@@ -60,15 +61,15 @@ def daemon(folder: Path, *command, ready, **options):
         log.close()
 
 
-def wait_for(condition, seconds: float, what: str, alive=lambda: True):
+def wait_for(condition, what: str, alive=lambda: True):
     """Poll until `condition()`; its value."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         if value := condition():
             return value
         assert alive(), f"ended before: {what}"
         time.sleep(0.1)
-    pytest.fail(f"not within {seconds} s: {what}")
+    pytest.fail(f"not within {PATIENCE} s: {what}")
     return None
 
 
@@ -88,7 +89,7 @@ def ensemble(program, tmp_path):
         options = {"cwd": tmp_path, "env": settings, "text": True}
         if start:
             return subprocess.Popen(command, stderr=subprocess.PIPE, **options)
-        return subprocess.run(command, capture_output=True, timeout=120, check=False, **options)
+        return subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False, **options)
 
     return run
 
@@ -210,10 +211,10 @@ def test_parallel_reports_a_member_that_fails(ensemble):
 def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
     """A signal while members run; then the same command ends well."""
     running = ensemble(*arguments, *LONG, start=True)
-    wait_for(lambda: len(list(folder.glob("*.part"))) == 2, 60, "two members run")
+    wait_for(lambda: len(list(folder.glob("*.part"))) == 2, "two members run")
     time.sleep(0.5)
     running.send_signal(by)
-    _, errors = running.communicate(timeout=60)
+    _, errors = running.communicate(timeout=PATIENCE)
     assert running.returncode == 75, errors
     assert len(list(folder.glob("*.chk.h5"))) == 2
     assert not list(folder.glob("seed_?.h5"))
@@ -305,7 +306,7 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
         )
         yield slurm
         slurm("scancel", "--quiet", "--user", getpass.getuser())
-        wait_for(lambda: not slurm("squeue", "--noheader").strip(), 60, "the queue is empty")
+        wait_for(lambda: not slurm("squeue", "--noheader").strip(), "the queue is empty")
 
 
 def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
@@ -314,8 +315,8 @@ def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
     first = ensemble(*arguments, **settings)
     assert first.returncode == 75 and "submitted" in first.stderr, first.stderr
     folder = tmp_path / "members"
-    wait_for(lambda: len(list(folder.glob("seed_*.h5"))) == 4, 120, "four members finish")
-    wait_for(lambda: not cluster("squeue", "--noheader").strip(), 60, "the queue is empty")
+    wait_for(lambda: len(list(folder.glob("seed_*.h5"))) == 4, "four members finish")
+    wait_for(lambda: not cluster("squeue", "--noheader").strip(), "the queue is empty")
     last = ensemble(*arguments, **settings)
     assert last.returncode == 0 and "4 of 4 members finished" in last.stderr
 
@@ -325,7 +326,7 @@ def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cl
     settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
     ensemble(*arguments, **settings)
     folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
     again = ensemble(*arguments, **settings)
     assert again.returncode == 75 and "goes on: 0 of 2 members finished" in again.stderr
     assert len(list(folder.glob("*.part"))) == 1  # %1, though there are two processors
@@ -338,12 +339,12 @@ def test_a_member_that_slurm_puts_back_goes_on(ensemble, cluster, tmp_path):
     settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
     ensemble(*arguments, **settings)
     folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
     job = (folder / "slurm.job").read_text().strip()
     cluster("scontrol", "requeue", f"{job}_1")
-    wait_for(lambda: list(folder.glob("*.chk.h5")), 60, "a checkpoint")
+    wait_for(lambda: list(folder.glob("*.chk.h5")), "a checkpoint")
     assert not list(folder.glob("seed_?.h5"))
-    wait_for(lambda: list(folder.glob("seed_1.h5")), 240, "the member goes on and ends")
+    wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")
 
 
 def test_a_member_whose_time_in_slurm_is_over_is_put_back(ensemble, cluster, tmp_path):
@@ -351,10 +352,10 @@ def test_a_member_whose_time_in_slurm_is_over_is_put_back(ensemble, cluster, tmp
     settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
     ensemble(*arguments, **settings)
     folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), 60, "a member runs")
+    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
     job = (folder / "slurm.job").read_text().strip()
     cluster("scancel", "--batch", "--signal=TERM", f"{job}_1")  # as --signal=B:TERM@60 does
-    wait_for(lambda: list(folder.glob("*.chk.h5")), 60, "a checkpoint")
+    wait_for(lambda: list(folder.glob("*.chk.h5")), "a checkpoint")
     state = ("squeue", "--noheader", "--format=%T")
-    wait_for(lambda: cluster(*state).strip() == "PENDING", 60, "the job waits again")
-    wait_for(lambda: list(folder.glob("seed_1.h5")), 120, "the member goes on and ends")
+    wait_for(lambda: cluster(*state).strip() == "PENDING", "the job waits again")
+    wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")

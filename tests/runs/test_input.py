@@ -29,7 +29,7 @@ def checked(ricochet, tmp_path):
     def run(content, *options, **more):
         data = content.encode() if isinstance(content, str) else content
         (tmp_path / "gas.nml").write_bytes(data)
-        return ricochet("gas.nml", "--check", *options, timeout=5, errors="replace", **more)
+        return ricochet("gas.nml", "--check", *options, seconds=5, errors="replace", **more)
 
     return run
 
@@ -148,7 +148,7 @@ def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
         path = Path("/dev/zero")
     elif kind == "link to nothing":
         path.symlink_to(tmp_path / "nothing")
-    run = ricochet(path, "--check", timeout=5)
+    run = ricochet(path, "--check")
     assert run.returncode in (USAGE, FILES)
     assert [str(path) in line for line in lines_of(run)] == [True]
 

@@ -8,7 +8,9 @@ import random
 import re
 import shutil
 import signal
+import struct
 import subprocess
+import termios
 import time
 from pathlib import Path
 
@@ -22,8 +24,14 @@ from whole_runs import (
     STOPPED,
     committed,
     differences,
+    ended_soon,
     frames_in,
+    has_ended,
+    heeds,
+    held,
+    is_asleep,
     is_beginning,
+    let_work,
     one_line,
     wait_for,
     write_input,
@@ -66,15 +74,16 @@ def frames_by_h5dump(path) -> int:
 @pytest.mark.parametrize("tries", [20, pytest.param(200, marks=pytest.mark.check)])
 def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
     write_input(tmp_path, text)
-    begin = time.monotonic()
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
-    duration = time.monotonic() - begin
     whole = committed(tmp_path / "whole.h5")
+    frames = len(whole["particles/disks/position/time"])
     part, rng, killed = tmp_path / "gas.h5.part", random.Random(tries), 0
     for _ in range(tries):
         again = "--resume" if (tmp_path / "gas.chk.h5").exists() else "--force"
+        goal = frames_in(part) + rng.randrange(frames // 3)
         process = started("gas.nml", "-o", "gas.h5", "--quiet", again)
-        time.sleep(rng.uniform(0, 0.7 * duration))
+        let_write(process, part, goal)
+        time.sleep(rng.uniform(0, 0.05))  # so much until samples are committed
         process.kill()
         message = process.communicate()[1]
         assert process.returncode in (FINISHED, -signal.SIGKILL), message
@@ -94,6 +103,12 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
     assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
 
 
+def let_write(process, part, frames):
+    """Returns when a run has committed so many frames, or has ended."""
+    let_work(process)
+    wait_for(lambda: has_ended(process) or frames_in(part) >= frames)
+
+
 @pytest.mark.parametrize("tries", [15, pytest.param(200, marks=pytest.mark.check)])
 def test_a_kill_while_checkpoints_are_written_leaves_a_whole_one(
     ricochet, started, tmp_path, tries
@@ -102,14 +117,24 @@ def test_a_kill_while_checkpoints_are_written_leaves_a_whole_one(
     always = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "output.checkpoint_every=1e-6"]
     checkpoint, rng = tmp_path / "gas.chk.h5", random.Random(tries)
     for _ in range(tries):
-        resume = ["--resume"] if checkpoint.exists() else []
-        process = started(*always, "--quiet", *resume)
-        wait_for(checkpoint.exists)
-        time.sleep(rng.uniform(0, 0.15))
+        before = identity(checkpoint)
+        process = started(*always, "--quiet", *["--resume"] * checkpoint.exists())
+        wait_for_another(checkpoint, before)
+        time.sleep(rng.uniform(0, 0.05))
         process.kill()
         assert process.communicate()[1] == ""
     run = ricochet(*always, "--resume", "--set", "stop.wall_clock=1e-3")
     assert run.returncode == STOPPED
+
+
+def identity(path) -> int | None:
+    """What tells a file from one that has replaced it; None if there is none."""
+    return path.stat().st_mtime_ns if path.exists() else None
+
+
+def wait_for_another(path, before):
+    """Returns when there is another file than before."""
+    wait_for(lambda: identity(path) not in (before, None))
 
 
 def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
@@ -135,39 +160,60 @@ def test_a_slow_reader_behind_a_non_blocking_pipe_gets_all_of_a_text(program):
     assert len(expected) > 4096
     process = subprocess.Popen([program, "--print-defaults"], stdout=inlet, stderr=subprocess.PIPE)
     os.close(inlet)
-    time.sleep(0.1)
+    wait_for(lambda: is_full(outlet, 4096))
     with os.fdopen(outlet, "rb") as reader:
         assert reader.read() == expected
-    assert process.wait(timeout=10) == FINISHED, process.stderr.read()
+    assert process.wait() == FINISHED, process.stderr.read()
+
+
+def is_full(pipe, size) -> bool:
+    """Whether a pipe holds so many bytes."""
+    return struct.unpack("i", fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)))[0] == size
 
 
 def test_progress_stays_on_one_line_of_a_narrow_terminal(program, tmp_path):
     """It is cut, not wrapped; the share done is also that of the wall clock."""
-    text = BUSY.replace("collisions = 20000", "wall_clock = 1")
-    write_input(tmp_path, text)
+    write_input(tmp_path, BUSY.replace("collisions = 20000", "wall_clock = 100"))
+    shares = []
+    for line in shown_until_stopped(program, tmp_path, lambda: len({*shares}) >= 3):
+        if text := re.search(r"\r\x1b\[\?7l([^\r]*)\x1b\[K\x1b\[\?7h", line):
+            shares.append(float(re.search(r"([\d.]+) %", text[1])[1]))
+    assert shares == sorted(shares) and 0 < shares[0] < shares[-1] < 100
+
+
+def shown_until_stopped(program, folder, enough):
+    """What a run writes to its terminal, line by line; TERM stops it when there is enough."""
     screen, keyboard = pty.openpty()
-    run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
-    assert run.wait(timeout=20) == STOPPED
+    run = subprocess.Popen([program, "gas.nml"], cwd=folder, stdout=keyboard, stderr=keyboard)
     os.close(keyboard)
-    shown = all_of(screen).decode()
-    os.close(screen)
-    lines = re.findall(r"\r\x1b\[\?7l(.*?)\x1b\[K\x1b\[\?7h", shown)
-    shares = [float(re.search(r"([\d.]+) %", line)[1]) for line in lines]
-    assert len(shares) >= 2 and 0 < shares[0] < shares[-1] <= 100
+    rest = ""
+    try:
+        with contextlib.suppress(OSError):  # how Linux says that nobody writes any more
+            while data := os.read(screen, 65536):
+                *lines, rest = re.split(r"(?=\r\x1b)", rest + data.decode())
+                yield from lines
+                if enough():
+                    run.send_signal(signal.SIGTERM)
+        yield rest
+        assert run.wait() == STOPPED
+    finally:
+        run.kill()
+        os.close(screen)
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT", "SIGHUP", "SIGXCPU"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times):
-    """Also when it comes twice within a moment, as launchers send it."""
-    process = start_long(started, tmp_path)
-    for _ in range(times):
-        process.send_signal(getattr(signal, name))
-        time.sleep(0.001)
-    begin = time.monotonic()
-    message = process.communicate(timeout=5)[1]
+    """Also when another one comes within a moment, as launchers send them."""
+    process, number = start_long(started, tmp_path), getattr(signal, name)
+    if times == 1:
+        message = ended_soon(process, number)
+    else:
+        with held(process):  # both wait for it
+            process.send_signal(signal.SIGTERM if name != "SIGTERM" else signal.SIGINT)
+            process.send_signal(number)
+        message = ended_soon(process, 0)
     assert process.returncode == STOPPED and "--resume" in message.splitlines()[-1]
-    assert time.monotonic() - begin < 1
     assert (tmp_path / "gas.chk.h5").exists() and not (tmp_path / "gas.h5.lock").exists()
 
 
@@ -192,19 +238,24 @@ def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
     try:
         wait_for((tmp_path / "gas.h5.part").exists)
         process.send_signal(signal.SIGTERM)
-        time.sleep(0.6)
+        wait_for(lambda: not is_pending(process.pid, signal.SIGTERM))
+        time.sleep(0.6)  # those that follow within half a second do not count
         process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=1) == -signal.SIGTERM
+        assert process.wait() == -signal.SIGTERM
     finally:
         process.kill()
 
 
+def is_pending(pid, number) -> bool:
+    """Whether a process has still to take notice of a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    masks = re.findall(r"^(?:Sig|Shd)Pnd:\s+(\w+)", status, re.MULTILINE)
+    return any(int(mask, 16) >> (number - 1) & 1 for mask in masks)
+
+
 def stopped_in_time(process, *codes):
     """TERM ends the process within a second, as stopped or with one of the codes; what it said."""
-    process.send_signal(signal.SIGTERM)
-    begin = time.monotonic()
-    message = process.communicate(timeout=20)[1]
-    assert time.monotonic() - begin < 1
+    message = ended_soon(process, signal.SIGTERM)
     assert process.returncode in {STOPPED, *codes}, message
     return message
 
@@ -221,7 +272,7 @@ def test_a_signal_ends_a_run_that_is_still_being_set_up(
     &stop collisions = 1 /"""
     write_input(tmp_path, text)
     process = started("gas.nml", "-o", "gas.h5", *options)
-    time.sleep(1)
+    let_work(process, 0.5)  # of more than five seconds
     message = stopped_in_time(process)
     assert message == "stopped before the run began; nothing is lost: repeat the command\n"
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
@@ -230,34 +281,12 @@ def test_a_signal_ends_a_run_that_is_still_being_set_up(
 def test_the_terminal_shows_how_far_the_disks_are_placed(program, tmp_path):
     """And what a signal has to say stands on a line of its own."""
     write_input(tmp_path, "&species count = 3000000 packing_fraction = .5 / &stop events = 1 /")
-    screen, keyboard = pty.openpty()
-    run = subprocess.Popen([program, "gas.nml"], cwd=tmp_path, stdout=keyboard, stderr=keyboard)
-    time.sleep(3)
-    run.send_signal(signal.SIGTERM)
-    try:
-        assert run.wait(timeout=5) == STOPPED
-    finally:
-        run.kill()
-    os.close(keyboard)
-    shown = all_of(screen).decode()
-    os.close(screen)
-    shares = [float(share) for share in re.findall(r"\rplacing disks: ([\d.]+) %", plain(shown))]
-    assert len(shares) >= 2 and 0 <= shares[0] < shares[-1] < 100
-    assert shown.split("\r\x1b[K")[-1].startswith("stopped before the run began")
-
-
-def all_of(screen) -> bytes:
-    """What a terminal got from a program that has ended; it may arrive in several pieces."""
-    pieces = []
-    with contextlib.suppress(OSError):  # at the end, on Linux
-        while pieces[-1:] != [b""]:
-            pieces.append(os.read(screen, 65536))
-    return b"".join(pieces)
-
-
-def plain(shown) -> str:
-    """What a terminal gets, without the sequences that it acts on."""
-    return re.sub(r"\x1b\[\??\d*[A-Za-z]", "", shown)
+    shares = []
+    for line in shown_until_stopped(program, tmp_path, lambda: len({*shares}) >= 2):
+        if share := re.match(r"\r\x1b\[\?7lplacing disks: ([\d.]+) %", line):
+            shares.append(float(share[1]))
+    assert shares == sorted(shares) and shares[0] < shares[-1] < 100
+    assert line.startswith("\r\x1b[Kstopped before the run began")
 
 
 @pytest.mark.parametrize(
@@ -325,8 +354,7 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
         command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True
     )
     try:
-        wait_for((tmp_path / "gas.h5").exists)
-        time.sleep(0.2)
+        wait_for(lambda: (tmp_path / "gas.h5").exists() and is_asleep(process.pid))
         assert "finished" in stopped_in_time(process)
     finally:
         process.kill()
@@ -343,9 +371,10 @@ def test_ignored_signals_stay_ignored(program, tmp_path):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 2)
+    let_work(process)
+    assert not heeds(process.pid, signal.SIGHUP)
     process.send_signal(signal.SIGHUP)
-    assert process.wait(timeout=30) == FINISHED
+    assert process.wait() == FINISHED
 
 
 @pytest.mark.parametrize("text", [PLANNED, BUSY], ids=["planned", "growing"])
@@ -386,9 +415,10 @@ def test_a_twin_is_refused_and_harms_nobody(ricochet, started, tmp_path, option)
     process.send_signal(signal.SIGUSR1)
     wait_for((tmp_path / "gas.chk.h5").exists)
     command = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "stop.collisions=100000"]
-    run = ricochet(*command, option)
+    with held(process):
+        run = ricochet(*command, option)
     assert run.returncode == FILES and "another run" in one_line(run)
-    assert process.wait(timeout=60) == FINISHED
+    assert process.wait() == FINISHED
     command[2] = "alone.h5"
     assert ricochet(*command).returncode == FINISHED
     assert differences(tmp_path / "alone.h5", tmp_path / "gas.h5") == []
@@ -397,7 +427,7 @@ def test_a_twin_is_refused_and_harms_nobody(ricochet, started, tmp_path, option)
 def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
     write_input(tmp_path, BUSY)
     twins = [started("gas.nml", "-o", "gas.h5", "--force") for _ in range(6)]
-    codes = [(twin.wait(timeout=60), twin.stderr.read()) for twin in twins]
+    codes = [(twin.wait(), twin.stderr.read()) for twin in twins]
     assert {code for code, _ in codes} <= {FINISHED, FILES}
     assert any(code == FINISHED for code, _ in codes)
     assert all("another run" in message for code, message in codes if code == FILES)
@@ -444,10 +474,9 @@ def test_a_disk_that_others_fill_costs_no_earlier_sample(ricochet, started, tmp_
     part = small_disk(200_000) / "gas.h5.part"
     process = started("gas.nml", "-o", "disk/gas.h5")
     wait_for(lambda: frames_in(part) > 1000)
-    process.send_signal(signal.SIGSTOP)  # else it may be done before the disk is full
-    fill = ["dd", "if=/dev/zero", "of=disk/other", "bs=1M"]
-    subprocess.run(fill, cwd=tmp_path, stderr=subprocess.DEVNULL)
-    process.send_signal(signal.SIGCONT)
+    with held(process):  # else it may be done before the disk is full
+        fill = ["dd", "if=/dev/zero", "of=disk/other", "bs=1M"]
+        subprocess.run(fill, cwd=tmp_path, stderr=subprocess.DEVNULL)
     message = process.communicate()[1]
     assert process.returncode == FILES and re.search(GO_ON, message)
     assert is_beginning(committed(part), committed(tmp_path / "whole.h5")) == []

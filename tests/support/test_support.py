@@ -15,6 +15,8 @@ sys.path.insert(0, str(SUPPORT))
 from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
 
+from whole_runs import PATIENCE  # noqa: E402
+
 RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
 FILE = """module test_it
   use funit
@@ -120,7 +122,8 @@ def judged(tmp_path: Path, script: str, suite: str, **variables) -> subprocess.C
     (tmp_path / "test_it.pf").write_text(suite)
     command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, tmp_path / "test_it.pf"]
     environment = {**os.environ, **variables}
-    return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    options = {"capture_output": True, "text": True, "timeout": PATIENCE}
+    return subprocess.run(command, env=environment, **options)
 
 
 @pytest.mark.parametrize(
