@@ -128,7 +128,7 @@ $(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
 
 $(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags
 	@echo "compile $(<:$(T)/%.F90=$(suites)/%.pf)"
-	$(Q)$(FC) $(CHECKS) -O1 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -c -o $@ $<
+	$(Q)$(FC) $(CHECKS) -O0 -g $(test_flags) -ffree-line-length-none $(hdf5_flags) -c -o $@ $<
 
 $(shared_objects): $(T)/%.o: tests/support/%.f90 $(BUILD)/flags
 	@echo "compile $<"
@@ -177,12 +177,16 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
 
+# The unit tests take one core; meanwhile the others build the program.
 test:  ## sets up, then unit tests and whole runs (two minutes)
 	@.ci/set-up demo test
-	@$(MAKE) $(jobs) $(unit_build) unit-tests
-	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/four_disks
-	@$(MAKE) $(jobs) all
-	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q tests
+	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
+	@$(MAKE) $(jobs) checked all
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto --dist worksteal tests
+
+.PHONY: checked
+checked:
+	@$(MAKE) $(unit_build) unit-tests
 
 check:  ## validates the physics and provokes faults (minutes)
 	@.ci/set-up demo test check

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,23 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 ROOT = Path(__file__).resolve().parents[1]
+ROOM = 4e9  #: for the files of the tests [bytes]
+
+
+def pytest_configure():
+    """Keep the files of the tests in memory if it has room: calls count, not the disk behind."""
+    memory = Path("/dev/shm")
+    if os.access(memory, os.W_OK):
+        disk = os.statvfs(memory)
+        if disk.f_bavail * disk.f_frsize > ROOM and not disk.f_flag & os.ST_NOEXEC:
+            os.environ.setdefault("TMPDIR", str(memory))
+            tempfile.tempdir = None  # it is asked anew
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Say how to repeat the order of the tests, also where pytest is quiet."""
+    if seed := config.getoption("randomly_seed", None):
+        terminalreporter.write_line(f"the same order again: --randomly-seed={seed}")
 
 
 @pytest.fixture(scope="session")

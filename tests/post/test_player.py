@@ -152,7 +152,6 @@ def opened(browser, tmp_path, rng):
     """The player of a small gas, paused at its first frame."""
     path = bouncing_gas(tmp_path / "gas.h5", rng)
     assert run_script("player", path, "-o", tmp_path / "gas.html") == 0
-    browser.resize(1280, 800)
     browser.open(tmp_path / "gas.html")
     browser.run("step(0)")
     return browser
@@ -414,7 +413,6 @@ def test_ten_thousand_disks_are_drawn_thirty_times_a_second(browser, tmp_path, r
     position = rng.uniform(0, 1, (10, 10000, 2))
     path = still_run(tmp_path / "big.h5", position, radius=0.003)
     assert run_script("player", path, "-o", tmp_path / "big.html") == 0
-    browser.resize(1280, 800)
     browser.open(tmp_path / "big.html")
     browser.run(
         """window.drawn = 0; play(false);

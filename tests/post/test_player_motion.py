@@ -48,7 +48,6 @@ def shown(ricochet, browser, tmp_path):
         assert done.returncode == FINISHED, done.stderr
         path = tmp_path / f"{name}.html"
         assert run_script("player", tmp_path / f"{name}.h5", "-o", path) == 0
-        browser.resize(1280, 800)
         browser.open(path)
         browser.run("go(first())")
         return read_run(tmp_path / f"{name}.h5")
@@ -366,7 +365,6 @@ def live(started, tmp_path):
 def test_a_run_is_watched_while_it_goes_on(live, browser, tmp_path):
     run, _, address = live
     assert address.startswith("http://127.0.0.1:")
-    browser.resize(1280, 800)
     browser.open(address)
     wait_for(lambda: browser.run("return live.stamp !== ''"))
     first = browser.run("return last()")

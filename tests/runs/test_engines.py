@@ -89,7 +89,8 @@ def ensemble(program, tmp_path):
         options = {"cwd": tmp_path, "env": settings, "text": True}
         if start:
             return subprocess.Popen(command, stderr=subprocess.PIPE, **options)
-        return subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False, **options)
+        options |= {"capture_output": True, "timeout": PATIENCE}
+        return subprocess.run(command, check=False, **options)
 
     return run
 

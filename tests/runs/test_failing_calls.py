@@ -4,9 +4,7 @@ import os
 import re
 import shutil
 import subprocess
-import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import h5py
 import pytest
@@ -14,6 +12,7 @@ import pytest
 from whole_runs import (
     FILES,
     FINISHED,
+    PATIENCE,
     STOPPED,
     USAGE,
     committed,
@@ -54,14 +53,11 @@ WAYS = {
 def stage(program, tmp_path_factory):
     """A folder with what must come of the run, folders to copy for each option, and their traces.
 
-    With --force an earlier result is there, with --resume a stopped run. In memory, where there is
-    a file system in memory: it is the calls that count, not the disk.
+    With --force an earlier result is there, with --resume a stopped run.
     """
     if not shutil.which("strace"):
         pytest.skip("strace is not installed")
-    memory = Path("/dev/shm")
-    place = tempfile.mkdtemp(dir=memory) if os.access(memory, os.W_OK) else None
-    stage = Path(place or tmp_path_factory.mktemp("stage"))
+    stage = tmp_path_factory.mktemp("stage")
     for option, change, code in (
         ("whole", [], FINISHED),
         ("--force", ["--set", "run.seed=2"], FINISHED),
@@ -72,17 +68,14 @@ def stage(program, tmp_path_factory):
         write_input(folder, SMALL)
         run = started(program, *COMMAND, *change, folder=folder)
         assert run.returncode == code, run.stderr
-    try:
-        for option in OPTIONS:
-            copy_folder(stage / option, stage / "count")
-            run = traced(program, stage / "count", option, "-e", f"trace={','.join(WAYS)}")
-            if run.returncode != FINISHED:
-                pytest.skip("strace cannot trace here: " + run.stderr.strip()[-80:])
-            (stage / "count" / "trace").rename(stage / f"trace{option}")
-            shutil.rmtree(stage / "count")
-        yield stage
-    finally:
-        shutil.rmtree(stage)
+    for option in OPTIONS:
+        copy_folder(stage / option, stage / "count")
+        run = traced(program, stage / "count", option, "-e", f"trace={','.join(WAYS)}")
+        if run.returncode != FINISHED:
+            pytest.skip("strace cannot trace here: " + run.stderr.strip()[-80:])
+        (stage / "count" / "trace").rename(stage / f"trace{option}")
+        shutil.rmtree(stage / "count")
+    return stage
 
 
 def copy_folder(source, target):
@@ -92,7 +85,7 @@ def copy_folder(source, target):
 
 def started(*command, folder):
     """The run, in a folder; killed with all that it has started if it hangs."""
-    limit = ["timeout", "-s", "KILL", "30"]
+    limit = ["timeout", "-s", "KILL", str(PATIENCE)]
     options = {"capture_output": True, "text": True, "check": False}
     return subprocess.run([*limit, *command], cwd=folder, **options)
 

@@ -104,7 +104,7 @@ def stopped_and_whole(program, most, folder, system):
     return stops, other
 
 
-@pytest.mark.parametrize(("stride", "most"), [(41, 8), pytest.param(1, 20, marks=CHECK)])
+@pytest.mark.parametrize(("stride", "most"), [(41, 4), pytest.param(1, 20, marks=CHECK)])
 def test_one_run_is_the_same_run_stopped_and_resumed(program, tmp_path, stride, most):
     """For every combination of the choices; fast: for some, in which every choice occurs."""
     systems = SYSTEMS[::stride]
