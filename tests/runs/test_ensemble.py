@@ -500,18 +500,18 @@ def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
 
 
 def test_a_member_killed_without_a_checkpoint_is_made_anew(real, tmp_path):
-    def start():
-        changes = ("--set", "output.checkpoint_every=", "--set", "stop.time=400")
+    def start(end):
+        changes = ("--set", "output.checkpoint_every=", "--set", f"stop.time={end}")
         return real("rough", *changes, members=("--seeds", "1"))
 
     part = tmp_path / "rough" / "seed_1.h5.part"
-    launcher = start()
+    launcher = start(1e6)
     wait_for(lambda: frames_in(part) > 5)
     for process in members_in(tmp_path / "rough"):
         os.kill(process, signal.SIGKILL)
     assert finish(launcher) == 1
     assert part.exists() and not list(tmp_path.glob("rough/*.chk.h5"))
-    assert finish(start()) == 0
+    assert finish(start(4)) == 0
 
 
 def test_members_depend_neither_on_order_nor_on_jobs_nor_on_company(real, ricochet, tmp_path):
