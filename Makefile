@@ -178,7 +178,7 @@ figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@runs/figures.sh
 
 # The unit tests take one core; meanwhile the others build the program.
-test:  ## sets up, then unit tests and whole runs (two minutes)
+test:  ## sets up, then unit tests and whole runs (three minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked all
