@@ -64,10 +64,10 @@ def started(program, tmp_path):
     """`started(*arguments)` starts the program in `tmp_path`; whatever still runs is ended."""
     processes = []
 
-    def start(*arguments):
+    def start(*arguments, **options):
         command = [program, *map(str, arguments)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes))
+        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes, **options))
         return processes[-1]
 
     yield start

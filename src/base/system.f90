@@ -11,12 +11,12 @@ module system
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
   public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
-  public :: file_size, read_start, write_start
+  public :: file_size, read_bytes, write_start
   public :: fill_standard_streams, print_text
 
   !> What a path can name.
-  character(len=18), parameter :: kinds_of_files(*) = [character(len=18) :: "nothing", "a file", "a folder", &
-    "a symbolic link", "a pipe or a device"]
+  character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
+    "a symbolic link", "a pipe or a device", "hidden by the system"]
 
   !> Answers of `c_lock` other than a descriptor.
   integer(c_int), parameter :: taken = -1, foreign = -3, failed = -4     ! -2: there are no locks here
@@ -96,13 +96,13 @@ module system
       integer(c_int64_t) :: bytes
     end function c_file_size
 
-    function c_read_start(path, bytes, count) bind(C, name="system_read_start") result(n)
+    function c_read_bytes(path, position, bytes, count) bind(C, name="system_read_bytes") result(n)
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
       character(kind=c_char), intent(out) :: bytes(*)
-      integer(c_int64_t), value :: count
+      integer(c_int64_t), value :: position, count
       integer(c_int64_t) :: n
-    end function c_read_start
+    end function c_read_bytes
 
     function c_write_start(path, bytes, count) bind(C, name="system_write_start") result(status)
       import :: c_char, c_int, c_int64_t
@@ -265,14 +265,15 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads the first bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
-  subroutine read_start(path, bytes, n)
+  !> Reads bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
+  subroutine read_bytes(path, first, bytes, n)
     character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: first                !! position of the first one, from 1
     character(len=*), intent(out) :: bytes
     integer(int64), intent(out) :: n                   !! how many there are, at most len(bytes); -1: it cannot be read
 
-    n = c_read_start(path//c_null_char, bytes, len(bytes, int64))
-  end subroutine read_start
+    n = c_read_bytes(path//c_null_char, first - 1, bytes, len(bytes, int64))
+  end subroutine read_bytes
 
   !> Writes over the first bytes of a regular file that has no other name.
   subroutine write_start(path, bytes, done)

@@ -172,15 +172,15 @@ void system_opening_problem(const char *path, bool writable, char *text, size_t 
     text[size - 1] = '\0';
 }
 
-/* Reads the first bytes of a file; returns how many there are, at most `count`. */
-int64_t system_read_start(const char *path, char *bytes, int64_t count)
+/* Reads bytes of a file, from a position that counts from 0; returns how many there are, at most `count`. */
+int64_t system_read_bytes(const char *path, int64_t position, char *bytes, int64_t count)
 {
     const char *problem;
     const int descriptor = open_regular(path, O_RDONLY, &problem);
     int64_t total = 0, more = 1;
     if (descriptor < 0) return -1;
     while (more > 0 && total < count) {
-        do more = read(descriptor, bytes + total, (size_t)(count - total));
+        do more = pread(descriptor, bytes + total, (size_t)(count - total), (off_t)(position + total));
         while (more < 0 && errno == EINTR);
         total += more;
     }
@@ -203,12 +203,13 @@ int system_find_folder(const char *path)
     return stat(path, &found) == 0 && S_ISDIR(found.st_mode) ? 0 : -1;
 }
 
-/* What a path names, as numbered in system.f90. Links are not followed. */
+/* What a path names, as numbered in system.f90. Links are not followed. Only what certainly is not there is nothing. */
 int system_what_is(const char *path)
 {
-    enum { nothing = 1, file, folder, symbolic_link, pipe_or_device };
+    enum { nothing = 1, file, folder, symbolic_link, pipe_or_device, hidden };
     struct stat found;
-    if (lstat(path, &found) != 0) return nothing;
+    if (lstat(path, &found) != 0)
+        return errno == ENOENT || errno == ENOTDIR || errno == ENAMETOOLONG ? nothing : hidden;
     return S_ISREG(found.st_mode) ? file : S_ISDIR(found.st_mode) ? folder
          : S_ISLNK(found.st_mode) ? symbolic_link : pipe_or_device;
 }

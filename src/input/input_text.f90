@@ -2,7 +2,7 @@
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
-  use system, only: file_size, is_folder, opening_problem, read_start
+  use system, only: file_size, is_folder, opening_problem, read_bytes
   use texts, only: written
   implicit none
   private
@@ -34,7 +34,7 @@ contains
     end if
     if (allocated(error)) return
     allocate (character(len=bytes) :: text)
-    call read_start(path, text, n)
+    call read_bytes(path, 1_int64, text, n)
     if (n < 0) then
       call fail(error, exit_files, path//": cannot be read: "//opening_problem(path, writable=.false.))
       return

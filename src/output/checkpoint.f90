@@ -10,9 +10,11 @@ module checkpoint
   use disk_room, only: checkpoint_room
   use errors, only: error_t, exit_files, exit_usage, fail
   use h5md_layout, only: checkpoint_group
+  use kinds, only: int64
   use output, only: output_t
   use progress, only: progress_t
-  use run_files, only: check_places, current_checkpoint, is_file, new_checkpoint, previous_checkpoint, run_file, unfinished
+  use run_files, only: check_places, current_checkpoint, identify, is_file, new_checkpoint, previous_checkpoint, run_file, &
+    unfinished
   use run_input, only: run_input_t
   use sealed_file, only: flaw_of, seal
   use settings, only: settings_t
@@ -24,7 +26,7 @@ module checkpoint
   public :: write_checkpoint, read_checkpoint
 
   integer, parameter :: reserved = 512          !! bytes before the HDF5 part, for the checksum
-  character(len=*), parameter :: title = "ricochet checkpoint 4"
+  character(len=*), parameter :: title = "ricochet checkpoint 5"
 
 contains
 
@@ -81,6 +83,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: current, flaw
     type(component_file_t) :: file
+    integer(int64) :: identity(2)
     logical :: there(3)
 
     current = run_file(path, current_checkpoint)
@@ -88,6 +91,8 @@ contains
     finished = there(1) .and. .not. all(there(2:))
     if (finished) then
       current = path
+      call identify(path, identity, flaw)         ! first: what is read below is to be that file
+      if (flaw /= "") call fail(error, exit_files, path//": "//flaw)
     else if (.not. there(2)) then
       call fail(error, exit_files, current//": there is no checkpoint to go on from; "//advice(path))
     else
@@ -100,6 +105,7 @@ contains
     if (.not. allocated(error)) call check_origin(file, input%groups, error)
     if (.not. allocated(error)) then
       progress = progress_t(input%settings%output)
+      if (finished) progress%replaced = identity
       if (finished) call exchange_final_state(file, sim, progress, finished)
       if (.not. finished) call exchange_contents(file, sim, progress)
       call complete(file, input%settings, sim, progress, flaw)

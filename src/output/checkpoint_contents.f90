@@ -141,6 +141,7 @@ contains
     call exchange_state(file, sim)
     call exchange_progress(file, progress)
     call file%exchange("progress/spent", progress%spent, not_negative)
+    call file%exchange("progress/replaced", progress%replaced, [-1_int64, counts(2)])
     do k = 1, size(progress%unwritten)
       call exchange_samples(file, "unwritten/"//written(k), progress%unwritten(k))
     end do

@@ -13,14 +13,14 @@ module output
   use observables, only: observed
   use progress, only: progress_t
   use run_description, only: describe_end, describe_run, describes
-  use run_files, only: check_places, check_start, is_file, lock, remove_checkpoints, remove_temporaries, run_file, &
-    unfinished, unfinished_new
+  use run_files, only: check_places, check_replaced, check_start, identify, is_file, lock, remove_checkpoints, &
+    remove_temporaries, run_file, take_final_name, unfinished, unfinished_new
   use run_input, only: run_input_t
   use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use signals, only: record_signals
-  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, move_file, remove_file, reserve_t, &
+  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, remove_file, reserve_t, &
     seconds, synchronize
   implicit none
   private
@@ -32,7 +32,6 @@ module output
     type(progress_t) :: progress
     real(real64), private :: opened = 0.0_real64  !! by the clock of `seconds` [s]
     character(len=:), allocatable :: path         !! of the finished file
-    logical, private :: replaces = .false.        !! a finished file that was there at the start
     type(run_input_t) :: input                    !! described in the file
     type(h5md_file_t), private :: h5md
     type(lock_t), private :: lock
@@ -60,13 +59,19 @@ contains
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: force                  !! replace, at the end, a finished file
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
     integer(int64) :: capacities(n_tracks), kept
 
     call self%claim(path, error)
     if (allocated(error)) return
-    if (.not. force) call check_start(path, error)
+    self%progress = progress_t(input%settings%output)
+    if (force) then
+      call identify(path, self%progress%replaced, problem)
+      if (problem /= "") call fail(error, exit_files, path//": "//problem)
+    else
+      call check_start(path, error)
+    end if
     if (.not. allocated(error)) then
-      self%progress = progress_t(input%settings%output)
       call self%plan(input, sim, capacities)
       kept = last_room(self%h5md%track, capacities, sim%n_disks())
       call check_room(planned_bytes(input, sim), kept, path, error)
@@ -109,7 +114,9 @@ contains
     if (allocated(error)) return
     self%progress = progress
     call self%plan(input, sim, capacities)
-    call keep_room(self%reserve, last_room(self%h5md%track, capacities, sim%n_disks()), path, error)
+    call check_replaced(path, progress%replaced, error)
+    if (.not. allocated(error)) &
+      call keep_room(self%reserve, last_room(self%h5md%track, capacities, sim%n_disks()), path, error)
     if (.not. allocated(error)) then
       if (finished) call remove_checkpoints(path)
       call self%h5md%file%open(source, writable=.not. finished)
@@ -151,7 +158,6 @@ contains
     call check_places(path, error)
     if (.not. allocated(error)) call remove_temporaries(path)
     if (allocated(error)) call self%release()
-    self%replaces = is_file(path)
   end subroutine claim
 
   !> Sets up the tracks, and says how many samples of each are planned.
@@ -319,12 +325,9 @@ contains
     real(real64), intent(in) :: cost(2)           !! see `write_end`
     character(len=*), intent(in) :: note          !! why it ended if no stop rule was met
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: part
     type(progress_t) :: before
-    logical :: moved
 
     before = self%progress
-    part = run_file(self%path, unfinished)
     call self%write_end(sim, cost, note, finished=.true.)
     call self%h5md%file%report(error)
     if (.not. allocated(error)) then
@@ -332,15 +335,7 @@ contains
       call self%h5md%file%report(error)
     end if
     if (.not. allocated(error)) call self%h5md%verify(error)
-    if (.not. (allocated(error) .or. self%replaces)) then
-      if (is_file(self%path)) call fail(error, exit_files, self%path//": has been made by another program during the " &
-        //"run; it is left as it is, and the results are in "//part)
-    end if
-    if (.not. allocated(error)) then
-      call synchronize(part, moved)
-      if (moved) call move_file(part, self%path, moved)
-      if (.not. moved) call fail(error, exit_files, part//": cannot be renamed to "//self%path//": "//last_problem())
-    end if
+    if (.not. allocated(error)) call take_final_name(self%path, self%progress%replaced, error)
     if (allocated(error)) then
       self%progress = before
     else
