@@ -251,8 +251,11 @@ docs:  ## pages of the source, with FORD: build/docs/index.html
 
 install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## for all users, PREFIX=/usr/local, DESTDIR=; or uninstall
 dist:  ## a release, build/ricochet-VERSION.tar.gz
+install uninstall dist: export BUILD := $(BUILD)
+install uninstall dist: export DESTDIR := $(DESTDIR)
+install uninstall dist: export PREFIX := $(PREFIX)
 install uninstall dist:
-	@BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' .ci/install $@ '$(PREFIX)'
+	@.ci/install $@
 
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 	@.ci/set-up demo test

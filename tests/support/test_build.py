@@ -140,6 +140,80 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
     assert files_in(tmp_path / "root") == []
 
 
+def test_only_what_was_installed_goes(tmp_path):
+    """Runs, notes and folders of users stay, and so does what a user puts where a file was."""
+    prefix = tmp_path / "it's a folder"
+    shared, place = prefix / "share/ricochet", f"PREFIX={prefix}"
+    mine = [shared / name for name in ("runs/gas.h5", "input/mine.nml", "post/page/notes.txt")]
+
+    def mine_are_there():
+        return [path.read_text() for path in mine] == ["mine"] * len(mine)
+
+    assert make("install", place).returncode == 0
+    installed = set(files_in(prefix))
+    for path in mine:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("mine")
+    (prefix / "bin/other").touch()
+    ran(sys.executable, shared / "post/energy.py", "--help")  # leaves __pycache__
+    old = shared / "post/old/thing.py"
+    old.parent.mkdir()
+    old.write_text("of an earlier version")
+    with (shared / "installed").open("a") as names:
+        names.write("share/ricochet/post/old/thing.py\n")
+    (shared / "input/gas.nml").unlink()
+    assert make("install", place).returncode == 0
+    assert installed < set(files_in(prefix)) and mine_are_there()
+    assert not old.parent.exists()
+    assert make("uninstall", place).returncode == 0
+    assert set(files_in(prefix)) == {*mine, prefix / "bin/other"} and mine_are_there()
+    assert not (shared / "post/ricochet").exists()
+
+
+def test_a_file_that_no_install_has_listed_is_not_replaced(tmp_path):
+    place = f"PREFIX={tmp_path}"
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin/ricochet"
+    program.write_text("another program")
+    for action in ("install", "uninstall"):
+        done = make(action, place)
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 2, done.stderr
+        assert files_in(tmp_path) == [program] and program.read_text() == "another program"
+
+
+def test_an_install_without_a_list_is_replaced_and_its_other_files_stay(tmp_path):
+    """As earlier versions made them."""
+    place, shared = f"PREFIX={tmp_path}", tmp_path / "share/ricochet"
+    assert make("install", place).returncode == 0
+    (shared / "installed").unlink()
+    (shared / "input/gas.nml").write_text("of an earlier version")
+    (shared / "runs").mkdir()
+    (shared / "runs/gas.h5").write_text("mine")
+    done = make("uninstall", place)
+    assert done.returncode == 2 and str(shared / "installed") in done.stderr.splitlines()[0]
+    done = make("install", place)
+    assert done.returncode == 0 and "has left no list" in done.stdout
+    assert "of an earlier version" not in (shared / "input/gas.nml").read_text()
+    assert make("uninstall", place).returncode == 0
+    assert files_in(tmp_path) == [shared / "runs/gas.h5"]
+
+
+def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_path):
+    """Nor is another one built, perhaps with other options, in a folder of somebody else."""
+    build, prefix = tmp_path / "build", tmp_path / "usr"
+    build.mkdir()
+    copy = shutil.copy(program, build)
+    place = [f"BUILD={build}", f"PREFIX={prefix}"]
+    os.utime(copy, (0, 0))
+    done = make("install", *place)
+    assert done.returncode == 2 and "is older than src/" in done.stderr.splitlines()[0]
+    assert len(done.stderr.splitlines()) == 2 and not prefix.exists()
+    os.utime(copy)
+    assert make("install", *place).returncode == 0
+    assert (prefix / "bin/ricochet").read_bytes() == program.read_bytes()
+    assert files_in(build) == [Path(copy)]
+
+
 def test_the_manual_page_explains_every_variable(tmp_path):
     assert make("install", f"PREFIX={tmp_path}").returncode == 0
     page = (tmp_path / "share/man/man1/ricochet.1").read_text().replace("\\-", "-")
