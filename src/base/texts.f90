@@ -4,13 +4,23 @@ module texts
   use kinds, only: int64, real64
   implicit none
   private
-  public :: text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
+  public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
   public :: counted, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
     character(len=:), allocatable :: text
   end type text_t
+
+  !> A text that is put together piece by piece, in a time that grows with its length, not with the square of that.
+  type :: growing_text_t
+    private
+    character(len=:), allocatable :: buffer
+    integer :: length = 0
+  contains
+    procedure :: add
+    procedure :: text => text_so_far
+  end type growing_text_t
 
   !> A number as a person would write it.
   interface written
@@ -21,6 +31,33 @@ module texts
   character(len=*), parameter :: lower_letters = "abcdefghijklmnopqrstuvwxyz"
 
 contains
+
+  !> Adds a piece at the end.
+  pure subroutine add(self, piece)
+    class(growing_text_t), intent(inout) :: self
+    character(len=*), intent(in) :: piece
+    character(len=:), allocatable :: longer
+    integer :: needed
+
+    needed = self%length + len(piece)
+    if (.not. allocated(self%buffer)) self%buffer = ""
+    if (needed > len(self%buffer)) then
+      allocate (character(len=2*needed) :: longer)
+      longer(:self%length) = self%buffer(:self%length)
+      call move_alloc(longer, self%buffer)
+    end if
+    self%buffer(self%length + 1:needed) = piece
+    self%length = needed
+  end subroutine add
+
+  !> All pieces.
+  pure function text_so_far(self) result(text)
+    class(growing_text_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (allocated(self%buffer)) text = self%buffer(:self%length)
+  end function text_so_far
 
   !> A default integer in digits.
   pure function written_integer(number) result(text)
@@ -121,13 +158,14 @@ contains
     character(len=*), intent(in) :: words(:)
     character(len=*), intent(in) :: glue
     character(len=:), allocatable :: line
+    type(growing_text_t) :: growing
     integer :: i
 
-    line = ""
     do i = 1, size(words)
-      if (i > 1) line = line//glue
-      line = line//trim(words(i))
+      if (i > 1) call growing%add(glue)
+      call growing%add(trim(words(i)))
     end do
+    line = growing%text()
   end function joined
 
   !> The position of a word in a list; 0 if it is not there.

@@ -183,11 +183,12 @@ contains
   subroutine put_text(self, name, text)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, text
-    character(len=max(len(text), 1)), target :: padded
+    character(len=:), allocatable, target :: padded     ! not on the stack, as it may be long
     integer(hid_t) :: string
     integer :: closed
 
-    padded = text
+    allocate (character(len=max(len(text), 1)) :: padded)
+    padded(:) = text
     string = string_of(len(padded))
     call self%put_values(name, scalar, string, string, c_loc(padded))
     call h5tclose_f(string, closed)

@@ -58,7 +58,7 @@ contains
     command%question = ""
     command%input = ""
     command%output = ""
-    allocate (command%overrides(0))
+    allocate (command%overrides(size(arguments)))   ! each in the place of its argument, for the time being
     only_files = .false.
     k = 1
     do while (k <= size(arguments))
@@ -78,6 +78,7 @@ contains
       if (allocated(error) .or. command%question /= "") return
       k = k + 1
     end do
+    call close_ranks(command%overrides)
     if (command%input == "") then
       call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
     end if
@@ -106,7 +107,7 @@ contains
       call take_value(arguments, k, name, command%output, error)
     case ("--set")
       call take_value(arguments, k, name, value, error)
-      call append(command%overrides, value)
+      command%overrides(k)%text = value
     case ("--explain")
       command%question = "explain"
       call take_value(arguments, k, name, command%topic, error)
@@ -127,17 +128,21 @@ contains
     end select
   end subroutine take_option
 
-  !> Adds a text to a list. (The compiler loses memory when an array is built of texts.)
-  pure subroutine append(list, text)
+  !> Leaves out the places of a list that have no text. (The compiler loses memory when an array is built of texts.)
+  pure subroutine close_ranks(list)
     type(text_t), allocatable, intent(inout) :: list(:)
-    character(len=*), intent(in) :: text
-    type(text_t), allocatable :: longer(:)
+    type(text_t), allocatable :: shorter(:)
+    integer :: k, n
 
-    allocate (longer(size(list) + 1))
-    longer(:size(list)) = list
-    longer(size(longer))%text = text
-    call move_alloc(longer, list)
-  end subroutine append
+    allocate (shorter(count([(allocated(list(k)%text), k=1, size(list))])))
+    n = 0
+    do k = 1, size(list)
+      if (.not. allocated(list(k)%text)) cycle
+      n = n + 1
+      call move_alloc(list(k)%text, shorter(n)%text)
+    end do
+    call move_alloc(shorter, list)
+  end subroutine close_ranks
 
   !> The value after `=` or in the next argument.
   pure subroutine take_value(arguments, k, name, value, error)

@@ -4,11 +4,12 @@ module input_species
   use box_geometry, only: box_t
   use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
+  use name_index, only: name_index_t
   use observables, only: own_names
   use parameter_values, only: parameter_group_t
   use parameters, only: either, largest, row_of, smallest, table, words_of
   use settings, only: species_settings_t
-  use texts, only: counted, place_of, shown, suggestion, written
+  use texts, only: counted, shown, suggestion, written
   implicit none
   private
   public :: take_species, check_name
@@ -25,19 +26,21 @@ contains
     type(box_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
+    type(name_index_t) :: names
     integer(int64) :: total
     integer :: k
 
+    names = name_index_t(groups%instance)
     allocate (species(size(groups)))
     if (size(groups) == 0) call problems%add(0, "species", "there is none; give at least one")
     do k = 1, size(groups)
-      call check_name(groups, k, problems)
+      call check_name(groups, k, names, problems)
       call infer_choices(groups(k))
       call check_choices(groups(k), problems)
       call take_placement(groups(k), box, species(k), problems)
       call take_velocities(groups(k), species(k), problems)
     end do
-    call resolve_sizes(groups, species, problems)
+    call resolve_sizes(groups, names, species, problems)
     total = sum(int(species%count, int64))
     if (total > most_disks) call problems%add(0, "species.count", counted(total, "disk")//"; allowed: up to "// &
       written(most_disks))
@@ -55,9 +58,10 @@ contains
   end subroutine take_species
 
   !> A name must fit into file paths, override paths and messages, and be unique among its kind.
-  subroutine check_name(groups, k, problems)
+  subroutine check_name(groups, k, names, problems)
     type(parameter_group_t), intent(in) :: groups(:)   !! all obstacles, or all species
     integer, intent(in) :: k
+    type(name_index_t), intent(in) :: names            !! of the groups
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
     integer :: j
@@ -69,9 +73,7 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    do j = 1, k - 1                                    ! a copy of all names would be long
-      if (groups(j)%instance == name) exit
-    end do
+    j = names%place_of(name)
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
@@ -203,8 +205,9 @@ contains
   end subroutine take_count
 
   !> Masses and radii, multiplied along the chain of `relative_to`.
-  subroutine resolve_sizes(groups, species, problems)
+  subroutine resolve_sizes(groups, names, species, problems)
     type(parameter_group_t), intent(in) :: groups(:)
+    type(name_index_t), intent(in) :: names               !! of the groups
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
@@ -212,7 +215,7 @@ contains
     logical :: fits
 
     do k = 1, size(species)
-      call find_base(groups, k, base(k), problems)
+      call find_base(groups, k, names, base(k), problems)
       mass(k) = groups(k)%real_of("mass", 1.0_real64)
       call own_radius(groups(k), species(k), radius(k), problems)
       if (groups(k)%given("relative_to") .and. base(k) == 0) radius(k) = 0
@@ -239,21 +242,20 @@ contains
   end subroutine resolve_sizes
 
   !> Finds the species that `relative_to` names; 0 if there is none.
-  subroutine find_base(groups, k, base, problems)
+  subroutine find_base(groups, k, names, base, problems)
     type(parameter_group_t), intent(in) :: groups(:)
     integer, intent(in) :: k
+    type(name_index_t), intent(in) :: names               !! of the groups
     integer, intent(out) :: base
     type(problem_list_t), intent(inout) :: problems
-    character(len=longest_name) :: names(size(groups))
     character(len=:), allocatable :: wanted
 
     base = 0
     wanted = groups(k)%text_of("relative_to")
     if (wanted == "") return
-    names = groups%instance(:longest_name)
-    base = place_of(wanted, groups%instance)
+    base = names%place_of(wanted)
     if (base == 0) call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
-      suggestion(wanted, names), problems)
+      suggestion(wanted, groups%instance), problems)
   end subroutine find_base
 
   !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.

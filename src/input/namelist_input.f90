@@ -6,7 +6,7 @@ module namelist_input
   use input_text, only: unix_lines
   use input_values, only: store_values
   use namelist_scanner, only: group_start, plain, scanner_t, setting, statement_t, token_t
-  use parameter_values, only: parameter_group_t, parameter_value_t, text_length
+  use parameter_values, only: parameter_group_t, parameter_value_t
   use parameters, only: full_names, group_names, is_repeated, row_of, table, variables_of
   use settings, only: settings_t
   use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
@@ -20,6 +20,7 @@ module namelist_input
   !> The groups while they are being read; those that cannot be repeated exist from the start.
   type :: reading_t
     integer :: count = 0
+    integer :: instances(size(group_names)) = 0  !! of each group
     logical :: complete = .true.                 !! .false.: parts of the text were skipped
     type(parameter_group_t), allocatable :: groups(:)
     type(problem_list_t) :: problems
@@ -40,10 +41,11 @@ contains
 
     call open_reading(reading, count([(text(k:k) == "&", k=1, len(text))]))
     call read_statements(reading, unix_lines(text))
-    call name_instances(reading)
+    do k = 1, reading%count
+      call name_instance(reading%groups(k))
+    end do
     do k = 1, size(overrides)
       call override(reading, overrides(k)%text, -k)
-      call name_instances(reading)
     end do
     call put_in_order(reading, groups)
     problems = reading%problems
@@ -89,8 +91,10 @@ contains
 
     reading%count = reading%count + 1
     rows = pack([(k, k=1, size(table))], table%group == name)
-    associate (group => reading%groups(reading%count))
+    associate (group => reading%groups(reading%count), instances => reading%instances(place_of(name, group_names)))
+      instances = instances + 1
       group%name = name
+      group%number = instances
       group%line = line
       allocate (group%values(size(rows)))
       do k = 1, size(rows)
@@ -176,7 +180,7 @@ contains
         if (groups(group)%line > 0) call reading%problems%add(line, name, &
           "a second group of this name; the first is in line "//written(groups(group)%line))
         if (groups(group)%line == 0) groups(group)%line = line
-      else if (count(groups%name == name) == most_instances) then
+      else if (reading%instances(place_of(name, group_names)) == most_instances) then
         call reading%problems%add(line, name, "more than "//written(most_instances)//" groups of this name")
       else
         call add_group(reading, name, line)
@@ -222,22 +226,14 @@ contains
     call problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)
   end subroutine report_unknown
 
-  !> Gives a name to every obstacle and species that has none.
-  subroutine name_instances(reading)
-    type(reading_t), intent(inout) :: reading
-    integer :: k, number
+  !> Gives a name to an obstacle or species that has none.
+  subroutine name_instance(group)
+    type(parameter_group_t), intent(inout) :: group
 
-    do k = 1, reading%count
-      associate (group => reading%groups(k))
-        if (.not. is_repeated(group%name)) cycle
-        if (group%text_of("name") == "") then
-          number = count(reading%groups(:k)%name == group%name)
-          call group%put_text("name", trim(group%name)//written(number))
-        end if
-        group%instance = group%text_of("name")
-      end associate
-    end do
-  end subroutine name_instances
+    if (.not. is_repeated(group%name)) return
+    if (group%text_of("name") == "") call group%put_text("name", trim(group%name)//written(group%number))
+    group%instance = group%text_of("name")
+  end subroutine name_instance
 
   !> Applies one `GROUP.VARIABLE=VALUE` or `GROUP.NAME.VARIABLE=VALUE`. Without a value the variable
   !> gets its default back.
@@ -267,6 +263,7 @@ contains
       else
         call assign_text(reading%groups(k)%values(row), text(equals + 1:), line, reading%problems)
       end if
+      call name_instance(reading%groups(k))
     end if
   end subroutine override
 
@@ -291,22 +288,24 @@ contains
     integer, intent(in) :: line
     integer, intent(out) :: found
     logical, dimension(reading%count) :: of_group, matches
-    character(len=text_length), allocatable :: names(:)
 
     of_group = reading%groups(:reading%count)%name == group
     matches = of_group .and. (instance == "" .or. reading%groups(:reading%count)%instance == instance)
     found = 0
-    allocate (names, source=pack(reading%groups(:reading%count)%instance, of_group))
     if (count(matches) == 1) then
       found = findloc(matches, .true., dim=1)
-    else if (size(names) == 0) then
-      call reading%problems%add(line, group, "the input has no &"//group)
-    else if (instance == "") then
-      call reading%problems%add(line, group, "which one? write "//group//"."//trim(names(1))// &
-        ".VARIABLE; known: "//joined(names, ", "))
-    else
-      call reading%problems%add(line, group//"."//instance, "unknown or not unique; "//suggestion(instance, names))
+      return
     end if
+    associate (names => pack(reading%groups(:reading%count)%instance, of_group))
+      if (size(names) == 0) then
+        call reading%problems%add(line, group, "the input has no &"//group)
+      else if (instance == "") then
+        call reading%problems%add(line, group, "which one? write "//group//"."//trim(names(1))// &
+          ".VARIABLE; known: "//joined(names, ", "))
+      else
+        call reading%problems%add(line, group//"."//instance, "unknown or not unique; "//suggestion(instance, names))
+      end if
+    end associate
   end subroutine find_group
 
 end module namelist_input

@@ -4,7 +4,7 @@ module parameter_values
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
   use parameters, only: allowed, name_length, row_of, table
-  use texts, only: written, written_exactly
+  use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
   public :: parameter_value_t, parameter_group_t, text_length, range_of, values_text
@@ -34,6 +34,7 @@ module parameter_values
   type :: parameter_group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; else blank
+    integer :: number = 0                      !! among the groups of its name, from 1
     integer :: line = 0                        !! of its first line in the file; 0: not in the file
     type(parameter_value_t), allocatable :: values(:)
   contains
@@ -215,18 +216,19 @@ contains
     type(parameter_group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
     character(len=:), allocatable :: prefix
+    type(growing_text_t) :: growing
     integer :: g, v
 
-    text = ""
     do g = 1, size(groups)
       prefix = trim(groups(g)%name)//"."
       if (groups(g)%instance /= "") prefix = prefix//trim(groups(g)%instance)//"."
       do v = 1, size(groups(g)%values)
         associate (value => groups(g)%values(v))
-          if (value%is_set()) text = text//prefix//trim(value%name)//" = "//value_text(value)//new_line("a")
+          if (value%is_set()) call growing%add(prefix//trim(value%name)//" = "//value_text(value)//new_line("a"))
         end associate
       end do
     end do
+    text = growing%text()
   end function values_text
 
   !> The values of a variable as they would be written in a file.

@@ -17,7 +17,7 @@ module checkpoint_contents
   use sample_track, only: samples_t
   use sealed_file, only: checksum
   use simulation_state, only: simulation_t
-  use texts, only: legible, written
+  use texts, only: growing_text_t, legible, written
   use version, only: program_version
   implicit none
   private
@@ -55,30 +55,25 @@ contains
   pure function fixed_input(groups) result(text)
     type(parameter_group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text, all
-    integer :: k, g, first, last, length
+    type(growing_text_t) :: growing
+    integer :: k, g, first, last
 
     all = values_text(groups)
-    text = all
-    length = 0
     first = 1
     do while (first <= len(all))
       last = first + index(all(first:), eol) - 1
-      if (.not. is_free(all(first:last))) then
-        text(length + 1:length + last - first + 1) = all(first:last)
-        length = length + last - first + 1
-      end if
+      if (.not. is_free(all(first:last))) call growing%add(all(first:last))
       first = last + 1
     end do
-    text = text(:length)
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
         if (size(groups(g)%values(k)%reals) <= 100) cycle      ! in the text with all digits
-        text = text//"checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
-          //trim(groups(g)%values(k)%name)//" = " &
-          //checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol
+        call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
+          //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
       end do
     end do
+    text = growing%text()
   end function fixed_input
 
   !> Whether a line `variable = value` is of a variable that may change.
@@ -107,7 +102,8 @@ contains
     type(component_file_t), intent(inout) :: file
     type(parameter_group_t), intent(in) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: there, here, variable
+    character(len=:), allocatable :: there, here
+    integer :: k
 
     call file%hdf5%fetch_text(file%name_of("program"), there)
     if (there /= program() .and. .not. allocated(file%hdf5%failure)) then
@@ -116,20 +112,24 @@ contains
     end if
     call file%hdf5%fetch_text(file%name_of("input"), there)
     if (allocated(file%hdf5%failure)) return
-    there = there//eol
     here = fixed_input(groups)
-    do while (there /= "" .or. here /= "")
-      variable = legible(there(:index(there//eol, eol) - 1))
-      if (here(:index(here//eol, eol) - 1) /= variable) then
-        call fail(error, exit_usage, file%hdf5%path//": belongs to another input: there " &
-          //variable//", here "//here(:index(here//eol, eol) - 1)//"; --resume needs the input as it was there, --force " &
-          //"instead starts over")
-        return
-      end if
-      there = there(min(index(there//eol, eol), len(there)) + 1:)
-      here = here(min(index(here//eol, eol), len(here)) + 1:)
+    if (there == here) return
+    do k = 1, min(len(there), len(here))
+      if (there(k:k) /= here(k:k)) exit
     end do
+    call fail(error, exit_usage, file%hdf5%path//": belongs to another input: there "//legible(line_at(there, k)) &
+      //", here "//legible(line_at(here, k))//"; --resume needs the input as it was there, --force instead starts over")
   end subroutine check_origin
+
+  !> The line of a text in which a character stands, or would stand behind the end.
+  pure function line_at(text, k) result(line)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: k                      !! place of the character
+    character(len=:), allocatable :: line
+
+    line = text(index(text(:k - 1), eol, back=.true.) + 1:)
+    line = line(:index(line//eol, eol) - 1)
+  end function line_at
 
   !> Writes or reads all of a checkpoint in a file of its own. When read the simulation must know its box and species.
   subroutine exchange_contents(file, sim, progress)

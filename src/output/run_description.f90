@@ -13,6 +13,7 @@ module run_description
   use run_input, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: host_name
+  use texts, only: growing_text_t
   use version, only: program_version
   implicit none
   private
@@ -142,12 +143,13 @@ contains
   pure function overrides_text(input) result(text)
     type(run_input_t), intent(in) :: input
     character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
     integer :: k
 
-    text = ""
     do k = 1, size(input%overrides)
-      if (.not. changes_nothing(input%overrides(k)%text)) text = text//input%overrides(k)%text//new_line("a")
+      if (.not. changes_nothing(input%overrides(k)%text)) call growing%add(input%overrides(k)%text//new_line("a"))
     end do
+    text = growing%text()
   end function overrides_text
 
   !> Whether a file describes this input.

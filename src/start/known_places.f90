@@ -38,22 +38,24 @@ contains
     real(real64), intent(in) :: x(:, :)                     !! (2,count) [length]
     real(real64), intent(in) :: radius(:)                   !! (count) [length]
     type(misfit_t), allocatable, intent(out) :: misfits(:)
-    real(real64) :: lower(2), upper(2), slack
-    integer(int32) :: k, blocker
+    real(real64) :: lower(2), upper(2), slack, largest
+    integer(int32) :: k, blocker, before
     logical :: outside
 
     allocate (misfits(0))
+    largest = maxval(species%radius)
+    before = offset(species, s)
     call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
     call packing%open_species(int(s, int32), maxval(radius), size(radius), &
       min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
     do k = 1, species(s)%count
-      slack = rounding*(radius(k) + maxval(species%radius))
+      slack = rounding*(radius(k) + largest)
       call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
       blocker = 0
       outside = any(x(:, k) < lower - slack .or. x(:, k) > upper + slack)
       if (.not. outside) then
         call packing%find_blocker(x(:, k), [0.0_real64, 0.0_real64], radius(k) - slack, blocker)
-        call packing%add(offset(species, s) + k, int(s, int32), x(:, k), radius(k))
+        call packing%add(before + k, int(s, int32), x(:, k), radius(k))
       end if
       if (.not. outside .and. blocker == 0) cycle
       if (count((misfits%blocker > 0) .eqv. (blocker > 0)) == most_reports) cycle

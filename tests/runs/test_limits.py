@@ -212,6 +212,15 @@ def test_a_million_disks_need_no_stack(limited, words):
     assert resumed.returncode == 0, resumed.stderr
 
 
+def test_a_long_input_needs_no_stack(limited, monkeypatch):
+    """Three megabytes, of comments and of walls."""
+    walls = "".join(f"&wall from = 0.1, {k}e-4 to = 0.9, {k}e-4 /\n" for k in range(1, 5000))
+    text = GAS.replace("count = {count}", "count = {count} region = 0, 1, 0.6, 1")
+    monkeypatch.setitem(globals(), "GAS", text + walls + "! and so on\n" * 230_000)
+    run = limited(10, stack=256 * 1024, collisions=5)
+    assert run.returncode == 0, run.stderr
+
+
 @pytest.mark.parametrize(("search", "queue"), [("cells", "calendar"), ("pairs", "heap")])
 @pytest.mark.parametrize("rule", ["collisions=10", "time=50"])
 def test_a_run_in_which_nothing_moves_any_more_ends(ricochet, tmp_path, rule, search, queue):
