@@ -20,6 +20,7 @@ module run
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use texts, only: counted, legible, size_text, written
+  use threads, only: start_threads
   implicit none
   private
   public :: perform_run
@@ -48,6 +49,7 @@ contains
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
     type(run_t) :: run
+    character(len=:), allocatable :: warning
 
     run%started = seconds()
     run%command = command
@@ -57,7 +59,9 @@ contains
     call read_input(command%input, command%overrides, run%input, error)
     if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
+    call start_threads(run%input%settings, warning)
     call choose_evolution(run%input%settings, run%evolution)
+    if (warning /= "" .and. .not. command%quiet) write (error_unit, "(a)") "warning: "//warning
     if (command%resume) then
       call go_on(run, error)
     else

@@ -15,10 +15,9 @@ module run_setup
   use namelist_input, only: read_settings
   use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
-  use parameters, only: most_threads
   use renumbering, only: renumber
   use run_input, only: run_input_t
-  use settings, only: run_settings_t, settings_t
+  use settings, only: settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: text_t
@@ -40,7 +39,6 @@ contains
     call read_text(path, input%text, error)
     if (.not. allocated(error)) &
       call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
-    if (.not. allocated(error)) input%settings%run%threads = threads_for(input%settings%run)
   end subroutine read_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
@@ -108,19 +106,5 @@ contains
     end if
     if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution
-
-  !> How many threads a run may use: as the input says, or the environment, or one.
-  function threads_for(run) result(n)
-    type(run_settings_t), intent(in) :: run
-    integer :: n, status
-    character(len=16) :: value
-
-    n = run%threads
-    if (n > 0) return
-    call get_environment_variable("OMP_NUM_THREADS", value)
-    read (value, *, iostat=status) n
-    if (status /= 0 .or. n < 1) n = 1
-    n = min(n, most_threads)
-  end function threads_for
 
 end module run_setup

@@ -12,7 +12,7 @@ module system
   public :: move_file, link_file, remove_file, make_folders_of, synchronize
   public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
   public :: file_size, read_bytes, write_start
-  public :: fill_standard_streams, print_text
+  public :: fill_standard_streams, print_text, cores_of_process, startable_threads
 
   !> What a path can name.
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
@@ -72,6 +72,18 @@ module system
     end function seconds
 
     ! The calls of system_calls.c, which says more.
+    function cores_of_process() result(n) bind(C, name="system_cores")
+      import :: c_int
+      integer(c_int) :: n
+    end function cores_of_process
+
+    function startable_threads(wanted, bytes) result(n) bind(C, name="system_startable_threads")
+      import :: c_int, c_int64_t
+      integer(c_int), value :: wanted
+      integer(c_int64_t), value :: bytes
+      integer(c_int) :: n
+    end function startable_threads
+
     subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
       import :: c_char, c_size_t
       character(kind=c_char), intent(out) :: text(*)

@@ -19,7 +19,7 @@ module settings
     real(real64) :: dt                                !! [time], of 'steps'
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
-    integer :: threads                                !! 0: as the environment says
+    integer :: threads                                !! 0: as the environment says; then those of the run
   end type run_settings_t
 
   !> A species, and how its disks start.

@@ -364,7 +364,7 @@ contains
     call self%reserve%give_up()            ! for the copy; if that fails its room is free for a checkpoint
     if (any(self%h5md%track%appended /= self%h5md%track%capacity)) call self%rebuild(self%h5md%track%appended, sim)
     call put_final_state(self%h5md%file, self%input%groups, sim, before, finished)
-    call describe_end(self%h5md%file, before%spent, cost(2), note)
+    call describe_end(self%h5md%file, self%input%settings%run%threads, before%spent, cost(2), note)
   end subroutine write_end
 
   !> Leaves the output of a run that broke off under the name of an unfinished one, with its last state.

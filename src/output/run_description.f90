@@ -1,7 +1,7 @@
 !> What an output file holds once: its format and author, the box, the disks, every parameter, its provenance.
 module run_description
   use, intrinsic :: iso_fortran_env, only: compiler_version
-  use kinds, only: int32, real64
+  use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
@@ -43,7 +43,7 @@ contains
       call describe_table(file, input%groups(range(1):range(2)))
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
-    call describe_end(file, 0.0_real64, 0.0_real64, "")
+    call describe_end(file, input%settings%run%threads, 0.0_real64, 0.0_real64, "")
   end subroutine describe_run
 
   !> Format, author and creator, as H5MD requires.
@@ -118,11 +118,7 @@ contains
         if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
         call file%make_group(group)
         do k = 1, size(own%values)
-          if (changes_nothing(trim(own%name)//"."//own%values(k)%name)) then
-            call describe_value(file, provenance, own%values(k))
-          else
-            call describe_value(file, group, own%values(k))
-          end if
+          if (.not. changes_nothing(trim(own%name)//"."//own%values(k)%name)) call describe_value(file, group, own%values(k))
         end do
       end associate
     end do
@@ -130,8 +126,8 @@ contains
     call file%put(parameters_group//"overrides", overrides_text(input))
   end subroutine describe_input
 
-  !> Whether a run gives the same bits with any value of a variable (`run.threads`): then it is told apart from those
-  !> that describe the run.
+  !> Whether a run gives the same bits with any value of a variable (`run.threads`): then it is not among those that
+  !> describe the run.
   pure function changes_nothing(variable) result(yes)
     character(len=*), intent(in) :: variable      !! may go on with its value
     logical :: yes
@@ -272,14 +268,16 @@ contains
   end subroutine describe_origin
 
   !> Writes, or overwrites, what is known only at the end.
-  subroutine describe_end(file, wall_seconds, rate, note)
+  subroutine describe_end(file, threads, wall_seconds, rate, note)
     type(hdf5_file_t), intent(inout) :: file
+    integer, intent(in) :: threads                    !! that the last part of the run had
     real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
     real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
     character(len=*), intent(in) :: note              !! why it ended if no stop rule was met
     character(len=longest_note) :: padded
 
     padded = note
+    call file%put(provenance//"@threads", scalar, [int(threads, int64)])
     call file%put(provenance//"@wall_time", scalar, [wall_seconds])
     call file%put(provenance//"@collisions_per_second", scalar, [rate])
     call file%put(provenance//"@note", padded)

@@ -7,7 +7,7 @@ module memory
   use texts, only: size_text, written
   implicit none
   private
-  public :: check_memory, room_for_domains, available_memory, number_after
+  public :: check_memory, room_for_domains, bytes_needed, available_memory, find_groups, number_after
 
   ! Measured with 100 000 to a million disks; a test compares them with real runs. [bytes]
   integer(int64), parameter :: per_disk = 290, per_growing_disk = 400, per_stepped_disk = 410, per_shared_disk = 430, &
@@ -16,6 +16,7 @@ module memory
   integer(int64), parameter :: unlimited = huge(1_int64)
   ! When reading a file fails, the Fortran library begins it anew, for ever: so nobody reads on beyond this.
   integer, parameter :: most_lines = 1000
+  integer, parameter, public :: path_length = 1200         !! of the folder of a control group
 
 contains
 
@@ -94,43 +95,24 @@ contains
     end function process_limit
   end subroutine available_memory
 
-  !> What the tightest of the control groups around this process leaves, version 1 or 2.
+  !> What the tightest of the control groups around this process leaves.
   function group_limit(root) result(bytes)
     character(len=*), intent(in) :: root
     integer(int64) :: bytes
-    character(len=1024) :: line                           !! NUMBER:CONTROLLERS:PATH
-    character(len=:), allocatable :: folder, group
-    logical :: old
-    integer :: unit, status, first, last, length, k
+    character(len=path_length), allocatable :: folders(:)
+    integer :: k
 
+    call find_groups(root, "memory", folders)
     bytes = unlimited
-    open (newunit=unit, file=root//"/proc/self/cgroup", status="old", action="read", iostat=status)
-    if (status /= 0) return
-    do k = 1, most_lines
-      read (unit, "(a)", iostat=status) line
-      if (status /= 0) exit
-      first = index(line, ":")
-      last = first + index(line(first + 1:), ":")
-      old = index(","//line(first + 1:last - 1)//",", ",memory,") > 0
-      if (last > first + 1 .and. .not. old) cycle
-      folder = root//"/sys/fs/cgroup"//trim(merge("/memory", "       ", old))
-      length = len_trim(line)
-      do while (length >= last)
-        group = folder//line(last + 1:length)
-        if (old) then
-          bytes = min(bytes, left("/memory.limit_in_bytes", "/memory.usage_in_bytes", "total_inactive_file"))
-        else
-          bytes = min(bytes, left("/memory.max", "/memory.current", "inactive_file"))
-        end if
-        length = last - 1 + index(line(last + 1:length), "/", back=.true.)
-      end do
+    do k = 1, size(folders)
+      bytes = min(bytes, left(trim(folders(k)), "/memory.max", "/memory.current", "inactive_file"), &
+        left(trim(folders(k)), "/memory.limit_in_bytes", "/memory.usage_in_bytes", "total_inactive_file"))
     end do
-    close (unit)
   contains
     !> What a group leaves, by the names of its limit, of what is in use, and of the files held in memory among it,
     !> which give way.
-    function left(most, used, files) result(rest)
-      character(len=*), intent(in) :: most, used, files
+    function left(group, most, used, files) result(rest)
+      character(len=*), intent(in) :: group, most, used, files
       integer(int64) :: rest, in_use, held
 
       rest = number_after("", group//most)
@@ -141,6 +123,36 @@ contains
       rest = rest - max(in_use - held, 0_int64)
     end function left
   end function group_limit
+
+  !> Lists the folders of the control groups around this process that can limit what a controller controls. Those of
+  !> version 1 and 2 have files of different names.
+  subroutine find_groups(root, controller, folders)
+    character(len=*), intent(in) :: root                  !! empty except in tests
+    character(len=*), intent(in) :: controller            !! "memory" or "cpu"
+    character(len=path_length), allocatable, intent(out) :: folders(:)
+    character(len=1024) :: line                           !! NUMBER:CONTROLLERS:PATH
+    logical :: old
+    integer :: unit, status, first, last, length, k
+
+    allocate (folders(0))
+    open (newunit=unit, file=root//"/proc/self/cgroup", status="old", action="read", iostat=status)
+    if (status /= 0) return
+    do k = 1, most_lines
+      read (unit, "(a)", iostat=status) line
+      if (status /= 0) exit
+      first = index(line, ":")
+      last = first + index(line(first + 1:), ":")
+      old = index(","//line(first + 1:last - 1)//",", ","//controller//",") > 0
+      if (last > first + 1 .and. .not. old) cycle
+      length = len_trim(line)
+      do while (length >= last)
+        folders = [character(len=path_length) :: folders, &
+          root//"/sys/fs/cgroup"//trim(merge("/"//controller, repeat(" ", len(controller) + 1), old))//line(last + 1:length)]
+        length = last - 1 + index(line(last + 1:length), "/", back=.true.)
+      end do
+    end do
+    close (unit)
+  end subroutine find_groups
 
   !> The number that follows a label at the beginning of a line of a file; huge if there is none.
   function number_after(label, path) result(number)

@@ -1,17 +1,24 @@
 """One run on several cores: the bits of one core, whatever is written and however it is stopped."""
 
+import os
 import random
 import re
+import resource
+import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
+import h5py
 import pytest
 
 from whole_runs import (
     BROKEN,
+    FILES,
     FINISHED,
     PATIENCE,
     STOPPED,
+    USAGE,
     differences,
     let_work,
     write_input,
@@ -164,3 +171,130 @@ def test_domains_without_disks_are_no_matter(program, tmp_path):
         done = run(program, tmp_path, f"{threads}.h5", f"--set=run.threads={threads}")
         assert done.returncode == FINISHED, done.stderr
     assert differences(tmp_path / "1.h5", tmp_path / "8.h5") == []
+
+
+def alone(*, cores=None, user=None, **limits):
+    """What a process does before it becomes a run: keeps to some cores, limits and another user."""
+
+    def prepare():
+        if cores:
+            os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+        for name, most in limits.items():
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (most, most))
+        if user:
+            os.setgroups([])
+            os.setgid(user)
+            os.setuid(user)
+
+    return prepare
+
+
+def output_of(whole, *options, program, threads=4, **preparation):
+    """A run of a system on several threads, and how many it says that it had."""
+    command = [program, "gas.nml", "-o", "many.h5", "--force", *options]
+    command += [f"--set=run.threads={threads}"] if threads else []
+    done = subprocess.run(
+        command,
+        cwd=whole,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        preexec_fn=alone(**preparation),
+    )
+    if done.returncode != FINISHED:
+        return done, 0
+    assert differences(whole / "one.h5", whole / "many.h5") == []
+    with h5py.File(whole / "many.h5") as file:
+        return done, file["provenance"].attrs["threads"]
+
+
+FALLS_BACK = re.compile(
+    r"warning: run.threads: a limit on processes, threads or address space lets only (\d) of 4 "
+    r"threads start; the run goes on with \1\n"
+)
+
+
+@pytest.fixture
+def gas(program, tmp_path):
+    """A folder with a short run of 10 000 disks on one core."""
+    write_input(tmp_path, GAS.format(0.3, "random") + "&stop events = 30000 /")
+    assert run(program, tmp_path, "one.h5").returncode == FINISHED
+    return tmp_path
+
+
+def test_too_little_address_space_for_stacks_leaves_fewer_threads(program, gas, monkeypatch):
+    """Whatever the limit: the right result with the threads that there are, or one line."""
+    monkeypatch.setenv("OMP_STACKSIZE", "16M")
+    had = set()
+    for most in range(40_000_000, 130_000_000, 5_000_000):
+        done, threads = output_of(gas, program=program, AS=most, cores=1)
+        if done.returncode == 127:
+            continue  # no room for the libraries
+        assert done.returncode in (FINISHED, USAGE, FILES), done.stderr
+        assert len(done.stderr.splitlines()) == 1
+        if found := FALLS_BACK.fullmatch(done.stderr):
+            assert threads == int(found[1])
+            had.add(threads)
+    assert had & {1, 2, 3}
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_a_limit_of_processes_leaves_fewer_threads(program, gas, most):
+    """The limit counts the processes of a user: one that has no other."""
+    if os.geteuid() != 0:
+        pytest.skip("needs root, to be another user")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for path in (program, *gas.iterdir()):
+            shutil.copy(path, folder)
+        for path in (folder, *folder.iterdir()):
+            path.chmod(0o777)
+        try:
+            done, threads = output_of(folder, program=folder / program.name, NPROC=most, user=54321)
+        except PermissionError:
+            pytest.skip("no other user may enter the folders above this one")
+    assert done.returncode == FINISHED and threads == most, done.stderr
+    assert FALLS_BACK.fullmatch(done.stderr)
+
+
+def test_too_little_memory_for_domains_is_said(program, tmp_path):
+    """Some limit is enough for one core, and not for several."""
+    write_input(
+        tmp_path, GAS.replace("10000", "60000").format(0.3, "random") + "&stop events = 5 /"
+    )
+    assert run(program, tmp_path, "one.h5").returncode == FINISHED
+    said = (
+        "warning: run.threads: there is not enough memory for 4 threads; the run goes on with one\n"
+    )
+    for most in range(44_000_000, 64_000_000, 2_000_000):
+        done, threads = output_of(tmp_path, program=program, DATA=most, cores=1)
+        if done.returncode == FINISHED and done.stderr == said:
+            assert threads == 1
+            return
+    pytest.fail("no run dropped its threads")
+
+
+def test_more_threads_than_cores_are_warned_of(program, gas, monkeypatch):
+    said = "warning: {}: 4 threads are more than the 1 core that the run may use, and slower\n"
+    done, threads = output_of(gas, program=program, cores=1)
+    assert (done.stderr, threads) == (said.format("run.threads"), 4)
+    done, threads = output_of(gas, "--quiet", program=program, cores=1)
+    assert (done.stderr, threads) == ("", 4)
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    done, threads = output_of(gas, program=program, threads=None, cores=1)
+    assert (done.stderr, threads) == (said.format("OMP_NUM_THREADS"), 4)
+    done, threads = output_of(gas, program=program, threads=1, cores=1)
+    assert (done.stderr, threads) == ("", 1)
+
+
+def test_the_threads_are_those_of_the_last_part(program, gas):
+    """One where a run is too small, or of a kind, that one core does alone."""
+    command = ["--set", "stop.wall_clock=1e-9", "--set", "run.threads=3"]
+    assert run(program, gas, "many.h5", *command).returncode == STOPPED
+    options = {"--resume": 2, "--set=species.gas.count=1000": 1, "--set=run.search=pairs": 1}
+    for option, expected in options.items():
+        force = [] if option == "--resume" else ["--force", "--set=stop.events=5"]
+        done = run(program, gas, "many.h5", option, *force, "--set=run.threads=2")
+        assert done.returncode == FINISHED, done.stderr
+        with h5py.File(gas / "many.h5") as file:
+            assert file["provenance"].attrs["threads"] == expected
