@@ -1,12 +1,12 @@
 !> Disks from a text file: a line `x y` or `x y vx vy` for each. A first line of names says which columns there are if
-!> there are others. Empty lines, and text from a # to the end of its line, are comments.
+!> there are others, in small letters or capitals. Empty lines, and text from a # to the end of its line, are comments.
 module position_file
   use kinds, only: int64, real64
   use errors, only: error_t, exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
   use input_values, only: read_real
   use system, only: opening_problem
-  use texts, only: counted, joined, place_of, shown, suggestion, written
+  use texts, only: counted, joined, lower_case, place_of, shown, suggestion, written
   implicit none
   private
   public :: column_names, radius_row, mass_row, read_positions
@@ -97,15 +97,14 @@ contains
     real(real64), intent(inout) :: table(:, :)
     character(len=:), allocatable, intent(out) :: problem
     real(real64) :: value(size(column_names))
-    integer :: first(size(known_names)), last(size(known_names)), n_words, k, its_species
+    integer :: first(longest_line), last(longest_line), n_words, k, its_species
 
     problem = ""
     if (len_trim(line) == longest_line) problem = "the line is too long"
     call find_words(line, first, last, n_words)
     if (n_words == 0 .or. problem /= "") return
     if (size(column) == 0) then
-      if (n_words <= size(known_names) .and. &
-        any([(place_of(line(first(k):last(k)), known_names), k=1, min(n_words, size(known_names)))] > 0)) then
+      if (are_names(line, first(:n_words), last(:n_words))) then
         call read_names(line, first(:n_words), last(:n_words), column, problem)
         return
       end if
@@ -138,7 +137,7 @@ contains
     table(:, n) = value
   end subroutine read_line
 
-  !> Where the words of a line begin and end; of too many only the number is right.
+  !> Where the words of a line begin and end.
   pure subroutine find_words(line, first, last, n)
     character(len=*), intent(in) :: line
     integer, intent(out) :: first(:), last(:)
@@ -154,11 +153,30 @@ contains
       if (begin >= comment) exit
       past = begin - 1 + scan(line(begin:comment - 1)//" ", blanks)
       n = n + 1
-      if (n > size(first)) cycle
       first(n) = begin
       last(n) = past - 1
     end do
   end subroutine find_words
+
+  !> Whether the words of a line name columns: one of them is the name of a column, or none is a number.
+  pure function are_names(line, first, last) result(yes)
+    character(len=*), intent(in) :: line
+    integer, intent(in) :: first(:), last(:)                !! of each word
+    logical :: yes
+    character(len=:), allocatable :: problem
+    real(real64) :: number
+    logical :: some_number
+    integer :: k
+
+    some_number = .false.
+    do k = 1, size(first)
+      yes = place_of(lower_case(line(first(k):last(k))), known_names) > 0
+      if (yes) return
+      call read_real(line(first(k):last(k)), number, problem)
+      some_number = some_number .or. problem == ""
+    end do
+    yes = .not. some_number
+  end function are_names
 
   !> Reads the names of the columns.
   subroutine read_names(line, first, last, column, problem)
@@ -166,18 +184,28 @@ contains
     integer, intent(in) :: first(:), last(:)                !! of each name
     integer, allocatable, intent(inout) :: column(:)
     character(len=:), allocatable, intent(inout) :: problem
+    character(len=:), allocatable :: unknown, advice
     integer :: k, place
 
+    unknown = ""
+    advice = ""
     do k = 1, size(first)
-      place = place_of(line(first(k):last(k)), known_names)
-      if (place == 0) then
-        problem = "no column is called "//shown(line(first(k):last(k)))//"; "//suggestion(line(first(k):last(k)), known_names)
-      else if (any(column == place)) then
-        problem = "the column "//trim(known_names(place))//" is named twice"
-      end if
-      if (problem /= "") return
-      column = [column, place]
+      associate (word => line(first(k):last(k)))
+        place = place_of(lower_case(word), known_names)
+        if (place > 0) then
+          if (any(column == place)) problem = "the column "//trim(known_names(place))//" is named twice"
+          column = [column, place]
+        else if (unknown == "") then
+          unknown = shown(word)
+          advice = suggestion(word, known_names)
+        else
+          unknown = unknown//", "//shown(word)
+          advice = "known: "//joined(known_names, ", ")
+        end if
+      end associate
     end do
+    if (unknown /= "") problem = "no column is called "//unknown//"; "//advice
+    if (problem /= "") return
     if (.not. (any(column == 1) .and. any(column == 2))) then
       problem = "columns x and y are needed"
     else if (any(column == 3) .neqv. any(column == 4)) then

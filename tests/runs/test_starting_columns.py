@@ -35,6 +35,16 @@ def bed(tmp_path):
     return arrays
 
 
+def test_names_of_columns_may_be_in_capitals(ricochet, tmp_path, bed):
+    finished(ricochet, "small.h5")
+    path = tmp_path / "bed.txt"
+    names, disks = path.read_text().split("\n", 1)
+    assert names.split()[:2] == ["x", "y"]
+    path.write_text(f"{names.upper()}\n{disks}")
+    finished(ricochet, "capitals.h5")
+    assert differences(tmp_path / "small.h5", tmp_path / "capitals.h5") == []
+
+
 def by_species(arrays):
     """The arrays in the order of the run: species by species."""
     order = np.argsort(arrays["species"] != "bed", kind="stable")
@@ -179,6 +189,17 @@ def test_maxwell_velocities_belong_to_the_mass_of_each_disk(ricochet, tmp_path):
         (".1 .1 .1", "bed.txt:1: 3 numbers; allowed: x y, or x y vx vy, or what"),
         ("x y radios\n.1 .1 .1", 'no column is called "radios"; did you mean "radius"?'),
         ("x y radius radius\n", "bed.txt:1: the column radius is named twice"),
+        ("X y x\n", "bed.txt:1: the column x is named twice"),
+        ("x y z\n.1 .1 .1", 'bed.txt:1: no column is called "z"; known: x, y, vx'),
+        (
+            "ID x y z vx vy vz radius mass species\n",
+            'bed.txt:1: no column is called "ID", "z", "vz"; known: x, y, vx',
+        ),
+        ("Place Size\n.1 .1", 'bed.txt:1: no column is called "Place", "Size"; known: x'),
+        (".1 .1 .1 .1 .1 .1 .1 .1 .1", "bed.txt:1: 9 numbers; allowed: x y, or"),
+        ("x y\n.1 .1 .1 .1 .1 .1 .1 .1 .1", "bed.txt:2: 9 values; expected: x y"),
+        (".1 y2 .1", "bed.txt:1: 3 numbers; allowed: x y, or"),
+        (".1 y2", 'bed.txt:1: "y2" is not a number'),
         ("x radius\n.1 .1", "bed.txt:1: columns x and y are needed"),
         ("x y vx radius\n", "bed.txt:1: columns vx and vy go together"),
         (".1 .1\n", "bed.txt: has no radius; give species.gas.radius, or a column"),
