@@ -16,7 +16,7 @@ module run
   use run_input, only: run_input_t
   use run_setup, only: choose_evolution, new_simulation, read_input
   use simulation_state, only: simulation_t
-  use stop_rules, only: stop_rule_t
+  use stop_rules, only: stop_rule_t, stop_settings_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use texts, only: counted, legible, size_text, written
@@ -123,7 +123,7 @@ contains
       if (finished .and. rule%met(sim)) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
           //written(sim%collisions)//" collisions; to continue it, repeat the command with --resume and a stop rule that " &
-          //"is not met yet, such as --set stop.time="//written(2*sim%time()))
+          //"is not met yet, such as"//later_rules(run%input%settings%stop, sim))
       else if (finished .and. rule%too_cold(sim)) then
         call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
       else if (command%check) then
@@ -133,6 +133,37 @@ contains
       end if
     end associate
   end subroutine go_on
+
+  !> Options with which the rules that have ended a run are met later: at twice of all.
+  pure function later_rules(rules, sim) result(options)
+    type(stop_settings_t), intent(in) :: rules
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: options
+    integer(int64), parameter :: most = huge(0_int64)
+    character(len=19), parameter :: names(*) = [character(len=19) :: "time", "collisions", "collisions_per_disk", "events", &
+      "energy_fraction"]
+    character(len=24) :: later(size(names))
+    type(stop_settings_t) :: alone(size(names))
+    type(stop_rule_t) :: rule
+    integer :: k
+
+    alone = stop_settings_t(never, most, never, most, 0.0_real64, never)
+    alone(1)%time = rules%time
+    alone(2)%collisions = rules%collisions
+    alone(3)%collisions_per_disk = rules%collisions_per_disk
+    alone(4)%events = rules%events
+    alone(5)%energy_fraction = rules%energy_fraction
+    later(1) = written(merge(2*sim%time(), 1.0_real64, sim%time() > 0))
+    later(2) = written(max(2*sim%collisions, 1_int64))
+    later(3) = written(max(4*sim%collisions/real(sim%n_disks(), real64), 1.0_real64))
+    later(4) = written(max(2*sim%events, 1_int64))
+    later(5) = written(rules%energy_fraction/2)
+    options = ""
+    do k = 1, size(names)
+      rule = stop_rule_t(alone(k), sim)
+      if (rule%met(sim)) options = options//" --set stop."//trim(names(k))//"="//trim(later(k))
+    end do
+  end function later_rules
 
   !> Warns of what is legal but rarely meant.
   subroutine warn(run)

@@ -138,6 +138,31 @@ def test_a_finished_run_asks_for_a_longer_stop_rule(finished, end):
 
 
 @pytest.mark.parametrize(
+    "rules",
+    [
+        "time=0.5",
+        "time=0",
+        "collisions=3",
+        "collisions_per_disk=0.7",
+        "events=1200",
+        "energy_fraction=0.9",
+        "time=0.01 events=3",
+    ],
+)
+def test_the_rules_that_ended_a_run_are_named_and_the_advice_helps(ricochet, tmp_path, rules):
+    """No other rule is named, and a run that follows the advice goes on."""
+    write_input(tmp_path, MIXTURE.replace("time = 4", rules.replace(" ", "\n")))
+    command = ["gas.nml", "-o", "gas.h5", "--quiet"]
+    assert ricochet(*command).returncode == FINISHED
+    run = ricochet(*command, "--resume")
+    assert run.returncode == FILES
+    advice = one_line(run).split("such as ")[1].split()
+    named = [word.split("=")[0] for word in advice[1::2]]
+    assert named and {f"stop.{rule.split('=')[0]}" for rule in rules.split()} >= set(named)
+    assert ricochet(*command, "--resume", *advice).returncode == FINISHED
+
+
+@pytest.mark.parametrize(
     "change", ["run.seed=8", "species.heavy.mass=3", "output.event_log=.false.", "box.gravity=0,-1"]
 )
 def test_what_would_be_another_run_is_refused_by_name(finished, change):
