@@ -19,6 +19,7 @@ contains
     character(len=:), allocatable, intent(out) :: warning  !! of what the user may not have meant; empty if there is nothing
     character(len=:), allocatable :: name
     integer :: wanted, cores
+    type(parallel_events_t) :: usual
 
     call ask(settings%run%threads, name)
     associate (threads => settings%run%threads)
@@ -26,7 +27,7 @@ contains
       warning = ""
       if (threads > cores) warning = name//": "//written(threads)//" threads are more than the " &
         //counted(int(cores, int64), "core")//" that the run may use, and slower"
-      wanted = min(threads, most_domains(settings))
+      wanted = min(threads, usual%most_domains(int(settings%n_disks()), settings%box%periodic))
       if (.not. settings%wants_domains()) wanted = 1
       threads = max(wanted, 1)
       if (wanted < 2) return
@@ -40,15 +41,6 @@ contains
       end if
     end associate
   end subroutine start_threads
-
-  !> How many threads find something to do in the box: each has a domain, as `parallel_events` cuts them.
-  pure function most_domains(settings) result(n)
-    type(settings_t), intent(in) :: settings
-    integer :: n
-    type(parallel_events_t) :: usual
-
-    n = int(settings%n_disks()/(usual%least_disks*merge(2, 1, all(settings%box%periodic))))
-  end function most_domains
 
   !> How many threads are asked for, and where: in the input, or in the environment. Else it is one.
   subroutine ask(threads, name)

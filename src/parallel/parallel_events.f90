@@ -12,7 +12,6 @@ module parallel_events
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use partition, only: partition_t
-  use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use system, only: seconds
   implicit none
@@ -48,6 +47,7 @@ module parallel_events
   contains
     procedure :: start
     procedure :: advance
+    procedure :: most_domains
     procedure, private :: advance_plainly
     procedure, private :: end_epoch
     procedure, private :: visit
@@ -64,12 +64,22 @@ contains
     self%holder = nobody
     self%idle = .false.
     associate (wanted => self%parts%wanted)
-      wanted = min(self%parts%threads, sim%n_disks()/(self%least_disks*merge(2, 1, all(sim%box%periodic))))
+      wanted = min(self%parts%threads, self%most_domains(sim%n_disks(), sim%box%periodic))
       if (wanted > 0) wanted = wanted*max(sim%n_disks()/self%most_disks/wanted, 1)
     end associate
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
+
+  !> How many domains are worth their copies, and so how many threads find something to do.
+  pure function most_domains(self, n_disks, periodic) result(n)
+    class(parallel_events_t), intent(in) :: self
+    integer(int32), intent(in) :: n_disks
+    logical, intent(in) :: periodic(2)
+    integer(int32) :: n
+
+    n = n_disks/(self%least_disks*merge(2, 1, all(periodic)))
+  end function most_domains
 
   !> Goes on to a limit, or for as long as the caller can wait.
   subroutine advance(self, sim, limits, error)

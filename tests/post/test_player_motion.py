@@ -342,7 +342,7 @@ LONG = """&run threads = 1 /
 
 
 #: The player waits for pages that have asked lately, however slow they are.
-SHOW = """import sys; sys.path[:0] = [sys.argv.pop(1)]
+SHOW = """import sys; sys.path[:0] = [sys.argv.pop(1)]; sys.argv[0] = "player.py"
 from ricochet import live, script; live.PATIENCE = 1e9
 import player; script.launch(player.main)"""
 
