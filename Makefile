@@ -1,14 +1,13 @@
 # Ricochet. `make` builds the program, `make help` lists everything.
 #
 #   BUILD=folder      where everything built goes; other flags need another folder
-#   DEBUG=1           all run-time checks, no optimisation, in build/debug
+#   DEBUG=1, V=1      all checks, no optimisation, in build/debug; shows commands
 #   ARCH=x86-64-v3    code for other machines, as a cluster; default: this one
-#   FFLAGS, LDFLAGS   replaced as a whole, as usual
-#   HINTS=            no hints about memory (src/base/memory_hints.c)
+#   FFLAGS, LDFLAGS   replaced as a whole; HINTS= without hints about memory
 #   PFUNIT_DIR=folder an installed pFUnit; default: found, or a substitute
-#   V=1               shows the commands
 #
-# Modules and their order are derived from the files in src/: file name = module name.
+# Modules and their order are derived from the files in src/ by src/modules.awk: file name = module name.
+# src/build_info.sh writes one module more, src/install.sh installs, .ci/set-up fetches what is missing.
 MAKEFLAGS += --no-print-directory
 comma := ,
 PREFIX ?= /usr/local
@@ -29,8 +28,8 @@ gnu = $(eval gnu := $(findstring GNU Fortran,$(shell $(FC) --version 2>/dev/null
 ARCH ?= native
 OPT ?= $(if $(DEBUG),-O0 $(if $(gnu),-Wno-maybe-uninitialized),-O2 $(if $(gnu),-march=$(ARCH) $(hot) -fno-backtrace))
 # For the innermost loops: inlining across modules, and a version of the kernel for each of its cases.
-hot := -flto -flto-partition=none -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
-  --param=ipa-cp-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
+hot := -flto=auto -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-threshold=1 \
+  --param=ipa-cp-unit-growth=200 --param=inline-unit-growth=200 -fno-trapping-math -fno-tree-vectorize
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
@@ -68,8 +67,8 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all demo figures test unit-tests check bench bench-check sanitize lint coverage docs install uninstall dist \
-  set-up clean distclean help
+targets := all demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
+  uninstall dist set-up clean distclean help
 .PHONY: $(targets) FORCE
 
 # --- What is built, by a `make` whose goals are files in $(BUILD) ---------------------------------------------
@@ -77,9 +76,15 @@ ifneq ($(filter $(BUILD)/%,$(MAKECMDGOALS)),)
 $(shell mkdir -p $(T))
 -include $(BUILD)/hints.mk $(BUILD)/deps.mk
 
-$(BUILD)/ricochet: $(BUILD)/main.o $(objects)
+# Under another name first: a build that is killed leaves no half of a program that looks finished.
+define link
 	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(LDFLAGS) -o $@ $^ $(hints) $(hdf5_libs)
+	$(Q)$(FC) $(flags) $1 -o $@.new $2 $(hints) $(hdf5_libs)
+	$(Q)mv $@.new $@
+endef
+
+$(BUILD)/ricochet: $(BUILD)/main.o $(objects)
+	$(call link,$(LDFLAGS),$^)
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
@@ -103,10 +108,10 @@ $(BUILD)/flags: FORCE
 	@echo '$(FC) $(flags) $(hints) $(PFUNIT_DIR)' | { $(keep); }
 
 $(BUILD)/build_info.f90: FORCE
-	@.ci/build_info $(flags) | { $(keep); }
+	@src/build_info.sh $(flags) | { $(keep); }
 
 $(BUILD)/deps.mk: FORCE
-	@awk -v build='$(BUILD)' -v tests='$(T)' -f .ci/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
+	@awk -v build='$(BUILD)' -v tests='$(T)' -f src/modules.awk $(sources) $(tests) $(shared) /dev/null | sort | { $(keep); }
 
 # Whether compiler, linker and system know what the hints are made of.
 $(BUILD)/hints.mk: src/base/memory_hints.c
@@ -115,13 +120,11 @@ $(BUILD)/hints.mk: src/base/memory_hints.c
 	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
 
 $(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects)
-	@echo "link    $@"
-	$(Q)$(FC) $(flags) $(test_flags) -o $@ $< $(filter %.o,$^) $(PFUNIT_LIBRARIES) $(hints) $(hdf5_libs)
+	$(call link,$(test_flags),$< $(filter %.o,$^) $(PFUNIT_LIBRARIES))
 
 # The engine of docs/how-it-works.md.
 $(BUILD)/four_disks: docs/four_disks.f90 $(objects)
-	@echo "link    $@"
-	$(Q)$(FC) $(flags) -I$(BUILD) -o $@ $^ $(hints) $(hdf5_libs)
+	$(call link,-I$(BUILD),$^)
 
 $(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
 	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
@@ -152,7 +155,7 @@ build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write
 all:  ## builds the program (default)
 	@+$(build) $(BUILD)/ricochet
 
-unit-tests:
+unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
 	@+$(build) $(BUILD)/unit_tests
 	@tests/support/run_unit_tests.sh "$(if $(PFUNIT_DIR),pFUnit $(PFUNIT_VERSION),the substitute for pFUnit)" \
@@ -172,13 +175,30 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 	$(venv) post/player.py runs/demo/gas_start.h5 -o runs/demo/gas.html
 	@echo 'In runs/demo: crater.html and gas.html, films for the browser; crater.png, speeds.png, gas.png; the data (*.h5).'
 
+FILM ?= runs/film
+film: name = $(FILM)/$(basename $(notdir $(INPUT)))
+film: $(if $(wildcard $(BUILD)/ricochet),,all)  ## runs INPUT=FILE.nml SET="group.name=value", opens the film
+	@$(if $(INPUT),:,$(error Which input? make film INPUT=input/crater.nml))
+	$(BUILD)/ricochet '$(INPUT)' -o '$(name).h5' --force $(addprefix --set ,$(SET))
+	$(PYTHON) post/player.py '$(name).h5' -o '$(name).html' --open
+
+lab:  ## sets up, builds, opens the laboratory in your browser
+	@.ci/set-up demo
+	@$(MAKE) $(jobs) all
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) post/lab.py --open
+
+notebook:  ## sets up, and opens the tour in JupyterLab
+	@.ci/set-up demo notebook
+	@$(MAKE) $(jobs) all
+	$(venv) -m jupyterlab $(if $(filter 0,$(shell id -u)),--allow-root) docs/tour.ipynb
+
 figures:  ## draws the figures of all systems in runs/figures/ (long)
 	@.ci/set-up demo
 	@$(MAKE) $(jobs) all
 	@runs/figures.sh
 
 # The unit tests take one core; meanwhile the others build the program.
-test:  ## sets up, then unit tests and whole runs (three minutes)
+test:  ## sets up, then unit tests and whole runs (six minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked all
@@ -188,11 +208,15 @@ test:  ## sets up, then unit tests and whole runs (three minutes)
 checked:
 	@$(MAKE) $(unit_build) unit-tests
 
-check:  ## validates the physics and provokes faults (minutes)
+# Other systems each day; SEED=20270131 has those of that day again.
+SYSTEMS ?= 200
+SEED ?= $(shell date +%Y%m%d)
+check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@.ci/set-up demo test check
 	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/runs/fuzz_systems.py --count $(SYSTEMS) --seed $(SEED)
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
 bench: all  ## measures collisions per second; FULL=1: and more
@@ -236,7 +260,7 @@ lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 	@$(venv) tests/support/check_style.py
 lint-shell:
-	@shellcheck --format gcc .ci/run .ci/set-up .ci/build_info .ci/install $(wildcard runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
+	@shellcheck --format gcc $(wildcard .ci/* src/*.sh runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 
 coverage:  ## which lines of src/ the tests reach
 	@.ci/set-up demo test coverage
@@ -249,21 +273,20 @@ docs:  ## pages of the source, with FORD: build/docs/index.html
 	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
 
-install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## for all users, PREFIX=/usr/local, DESTDIR=; or uninstall
-dist:  ## a release, build/ricochet-VERSION.tar.gz
+install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## for all users (PREFIX=, DESTDIR=); uninstall; dist: tarball
 install uninstall dist: export BUILD := $(BUILD)
 install uninstall dist: export DESTDIR := $(DESTDIR)
 install uninstall dist: export PREFIX := $(PREFIX)
 install uninstall dist:
-	@.ci/install $@
+	@src/install.sh $@
 
 set-up:  ## installs what `demo` and `test` need: compiler, HDF5, .venv
 	@.ci/set-up demo test
 
-clean:  ## removes what was built; runs/ and .venv stay
+clean:  ## removes what was built, not runs/; distclean: .venv, too
 	rm -rf '$(BUILD)'
 
-distclean: clean  ## removes .venv, too; results in runs/ stay
+distclean: clean
 	rm -rf .venv
 
 nearest = import difflib, sys; near = difflib.get_close_matches(sys.argv[1], sys.argv[2:], 1); \

@@ -40,8 +40,8 @@ contains
     type(simulation_t) :: sim
     integer(int32) :: i
 
-    allocate (sim%disk(n), sim%tag(n), sim%species(1), sim%image(2, n))
-    sim%image = 0
+    allocate (sim%species(1))
+    call sim%make_room(n)
     sim%law%restitution = reshape([1.0_real64], [1, 1])
     sim%box%upper = 4
     sim%species(1)%count = n
@@ -60,7 +60,7 @@ contains
     character(len=:), allocatable :: kind
     logical :: stale
 
-    write (*, "(a,es24.16e3,a,i0,a)") '{"now": ', sim%now, ', "events": ', sim%events, ', "disks": ['
+    write (*, "(a,es24.16e3,a,i0,a)") '{"now": ', sim%now, ', "events": ', sim%tally%events, ', "disks": ['
     do i = 1, n
       code = sim%disk(i)%partner
       kind = "crossing"

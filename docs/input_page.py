@@ -3,21 +3,26 @@
 python docs/input_page.py build/ricochet > docs/input.md
 """
 
-import re
-import subprocess
 import sys
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "post" / "ricochet"))
+from variables import explained
 
 GROUPS = {
     "run": "What is run, and by which method.",
     "box": "The box and the gravity in it.",
+    "side": "The law of a side of the box that is a wall; the group is repeated for each.",
     "obstacle": "A circular wall; the group is repeated for each.",
     "wall": "A straight wall, solid on both sides; disks bounce off its ends as off points. The "
     "group is repeated for each.",
     "species": "Disks of one kind; the group is repeated for each.",
     "contact": "What happens at a contact.",
+    "drive": "Kicks: random changes of velocity at fixed intervals.",
     "stop": "When the run ends: at the first of these that is met. At least one is needed.",
-    "output": "What is written, and when. The initial and the final state are always written.",
+    "output": "What is written, and when. The initial and the final state are always written. "
+    "Averages over samples by collisions or events differ from those over time by a part of the "
+    "order 1/N ([output](output.md#observables)).",
 }
 
 HEAD = """\
@@ -32,23 +37,6 @@ On the command line a variable is set with `--set GROUP.VARIABLE=VALUE`; a speci
 wall is addressed by its name: `--set species.projectile.mass=50`. The file chooses the
 units of length, time and mass.
 """
-
-ENTRY = re.compile(
-    r"^(?P<name>\S+?)(?:  \[(?P<unit>.*)\])?\n"
-    r"    (?P<help>.*)\n    allowed: (?P<allowed>.*)\n"
-    r"    (?P<kind>default|example): (?P<value>.*)$",
-    re.MULTILINE,
-)
-
-
-def explained(program: Path, group: str) -> list[dict]:
-    """The variables of a group as the program explains them."""
-    command = [program, "--explain", group]
-    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    entries = [found.groupdict() for found in ENTRY.finditer(text)]
-    if 4 * len(entries) != len(text.splitlines()):
-        raise SystemExit(f"input_page.py: does not understand ricochet --explain {group}")
-    return entries
 
 
 def row(entry: dict) -> str:

@@ -1,18 +1,27 @@
-"""Write the manual page ricochet(1) from what the program says of itself.
+"""Write the manual page of a command from what it says of itself: ricochet, ricochet-ensemble.
 
 python docs/manual_page.py build/ricochet PREFIX > ricochet.1
+
+The program, which knows its version, is ricochet in the same folder.
 """
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 from textwrap import dedent
 
-from input_page import GROUPS, explained
+from input_page import GROUPS
+from variables import explained, said
 
-#: The paragraphs of --help, in order.
-SECTIONS = ("SYNOPSIS", "OPTIONS", "EXIT STATUS", "EXAMPLES")
+#: What a paragraph of --help is about, by the word before the colon at its beginning.
+SECTIONS = {
+    "usage": "SYNOPSIS",
+    "members": "OPTIONS",
+    "": "OPTIONS",
+    "exit": "EXIT STATUS",
+    "examples": "EXAMPLES",
+}
+LINK = r"\[\w+\]\(([\w.]+)[^)]*\)"  # to another page of docs/
 FILES = """\
 .SH FILES
 .ad l
@@ -21,13 +30,22 @@ FILES = """\
 Experiments, ready to run; reference.nml shows every variable.
 .TP
 .I {prefix}/share/ricochet/post
-Python scripts that turn output files into figures and films: each has a \\-\\-help.
+Python scripts that turn output files into figures and films: player.py is the command
+.BR ricochet\\-player ,
+crater_scan.py
+.BR ricochet\\-crater\\-scan ,
+and so on; each has a \\-\\-help.
 They need the packages in requirements.txt there.
+.TP
+.I {prefix}/share/doc/ricochet
+README.md, which leads to all pages.
 .TP
 .I OUT.h5
 Results, in the format H5MD. Until the run has finished: OUT.h5.part, and the checkpoint OUT.chk.h5.
 .SH SEE ALSO
-.BR ricochet\\-ensemble " (its \\-\\-help), " h5dump (1)
+.BR ricochet (1),
+.BR ricochet\\-ensemble (1),
+.BR h5dump (1)
 """
 
 
@@ -37,38 +55,52 @@ def roff(text: str) -> str:
     return "\n".join("\\&" + line if line[:1] in {".", "'"} else line for line in text.split("\n"))
 
 
-def said(program: Path, option: str) -> str:
-    """What the program answers to an option."""
-    return subprocess.run([program, option], check=True, capture_output=True, text=True).stdout
+def section(paragraph: str) -> list[str]:
+    """A paragraph of --help."""
+    found = re.match(r"(\w+):( *)", paragraph)
+    word = found[1] if found else "" if paragraph.startswith(" ") else None
+    heading = SECTIONS.get(word, "DESCRIPTION")
+    if heading != "OPTIONS":
+        paragraph = re.sub(r"^\w+:", lambda found: " " * len(found[0]), paragraph)
+    return [f".SH {heading}", ".nf", roff(dedent(paragraph).strip("\n")), ".fi"]
 
 
-def page(program: Path, prefix: str) -> str:
-    """The whole page."""
-    version = said(program, "--version").split()[1]
-    headline, *paragraphs = said(program, "--help").rstrip().split("\n\n")
-    title, purpose = headline.split(": ", 1)
+def variables(program: Path) -> list[str]:
+    """The groups of the input and their variables."""
     lines = [
-        f'.TH RICOCHET 1 "" "Ricochet {version}" "User Commands"',
-        ".SH NAME",
-        f"{title} \\- {roff(purpose)}",
-    ]
-    for heading, paragraph in zip(SECTIONS, paragraphs, strict=True):
-        text = re.sub(r"^(usage|exit|examples):", lambda word: " " * len(word[0]), paragraph)
-        lines += [f".SH {heading}", ".nf", roff(dedent(text).strip("\n")), ".fi"]
-    lines += [
         ".SH INPUT",
         "A file consists of groups",
         ".B &name ... /",
         "with lines variable = value; only what differs from the default is needed.",
     ]
     for group, words in GROUPS.items():
-        lines += [f'.SS "&{group}"', roff(words)]
+        purpose = re.sub(LINK, r"PREFIX/share/doc/ricochet/docs/\1", words)
+        lines += [f'.SS "&{group}"', roff(purpose)]
         for entry in explained(program, group):
             unit = f" [{entry['unit']}]" if entry["unit"] else ""
             meaning = f"{entry['help'].rstrip('.')}{unit}. Allowed: {entry['allowed']};"
             meaning += f" {entry['kind']}: {entry['value']}."
             lines += [".TP", f".B {roff(entry['name'])}", roff(meaning)]
-    return "\n".join(lines) + "\n" + FILES.format(prefix=roff(prefix))
+    return lines
+
+
+def page(command: Path, prefix: str) -> str:
+    """The whole page."""
+    program = command.with_name("ricochet")
+    version = said(program, "--version").split()[1]
+    headline, *paragraphs = said(command, "--help").rstrip().split("\n\n")
+    title, purpose = headline.split(": ", 1)
+    lines = [
+        f'.TH {roff(title.upper())} 1 "" "Ricochet {version}" "User Commands"',
+        ".SH NAME",
+        f"{title} \\- {roff(purpose)}",
+    ]
+    for paragraph in paragraphs:
+        lines += section(re.sub(r"(?<!\S)input/", "PREFIX/share/ricochet/input/", paragraph))
+    if command == program:
+        lines += variables(program)
+    text = "\n".join(lines) + "\n"
+    return text.replace("PREFIX/", f"{roff(prefix)}/") + FILES.format(prefix=roff(prefix))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 # Completion for bash:  source docs/ricochet-completion.bash
-# Completes options, input files, variables for --set and --explain, and their values; all of it comes
+# Completes options, input files, variables for --set, --scan and --explain, and their values; all of it comes
 # from the program itself.
 
-# "run.title" "run.seed" ...: every variable, those of species and obstacles also by the names in FILE.
+# "run.title" "run.seed" ...: every variable, those of groups with names also by the names in FILE.
 _ricochet_variables() { # program, input file or nothing
   local group
-  for group in run box obstacle wall species contact stop output; do
+  "$1" --print-defaults 2>/dev/null | sed -n 's/^\(! \)*&\([a-z]*\).*/\2/p' | while read -r group; do
     "$1" --explain "$group" 2>/dev/null | sed -n 's/^\([a-z]\{1,\}\.[a-z_]\{1,\}\).*/\1/p'
   done | awk -v file="$2" '
     BEGIN {
@@ -35,7 +35,9 @@ _ricochet_values() { # program, variable
 }
 
 _ricochet() {
-  local program=${COMP_WORDS[0]} word before input='' k options variable
+  local command=${COMP_WORDS[0]} program word before input='' k options variable
+  program=${command%-ensemble} # the variables are those of the program that the members run
+  program=${program/%runs\/ensemble.sh/build\/ricochet}
   # "--set run.queue=he" may arrive as one word or as three, as COMP_WORDBREAKS has it.
   word=${COMP_WORDS[COMP_CWORD]}
   k=$COMP_CWORD
@@ -51,7 +53,7 @@ _ricochet() {
   done
   COMPREPLY=()
   case $before in
-  --set)
+  --set | --scan)
     if [[ -n $variable ]]; then
       mapfile -t COMPREPLY < <(compgen -W "$(_ricochet_values "$program" "$variable")" -- "$word")
     else
@@ -68,7 +70,7 @@ _ricochet() {
     compopt -o filenames 2>/dev/null
     ;;
   *)
-    options=$("$program" --help 2>/dev/null | grep -oE '(^|[ ,|])--?[a-z][a-z-]*' | tr -d ' ,|' | sort -u)
+    options=$("$command" --help 2>/dev/null | grep -oE '(^|[ ,|])--?[a-z][a-z-]*' | tr -d ' ,|' | sort -u)
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$word")
     if [[ $word != -* ]]; then
       mapfile -t COMPREPLY < <(compgen -f -X '!*.nml' -- "$word"; compgen -d -- "$word")
@@ -78,4 +80,4 @@ _ricochet() {
   esac
 }
 
-complete -F _ricochet ricochet
+complete -F _ricochet ricochet ricochet-ensemble

@@ -8,6 +8,7 @@ of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.
 curves, against collisions per disk in the same units, against time in those of the input.
 """
 
+from itertools import chain, cycle
 from typing import NamedTuple
 
 from ricochet import Run
@@ -18,6 +19,8 @@ from ricochet.theory import EQUIPARTITION
 from ricochet.thermodynamics import lightest_and_heaviest
 
 import numpy as np
+
+DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # of the species
 
 
 class Cooling(NamedTuple):
@@ -61,32 +64,34 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Cooling]) -> None:
     if len(kinds) == 2 and kinds[1] == (4 * kinds[0][0], kinds[0][1]):
         dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
-    axes.set(xlabel="collisions per disk", xlim=(0, None), ylabel="temperature ratio heavy / light")
+    last = max(result.by_collisions[0][-1] for result in results)
+    axes.set(xlabel="collisions per disk", xlim=(0, last), ylabel="temperature ratio heavy / light")
     axes.legend(ncols=2)
 
 
 def draw(groups: list[tuple[float, list[Run]]], results: list[Cooling]) -> plt.Figure:
-    """Columns: restitution.  Rows: against time, against collisions; below the ratio."""
-    rows = 2 + any(result.ratio is not None for result in results)
-    figure = plt.figure(figsize=(10, 3 * rows))
-    grid = figure.add_gridspec(rows, len(groups))
-    upper = grid[:2, :].subgridspec(2, len(groups))
-    panels = upper.subplots(sharex="row", sharey=True, squeeze=False)
-    floor = min(r.by_time[1].mean.min() for r in results)
-    for column, (xi, runs), result in zip(panels.T, groups, results, strict=True):
-        labels = ("all", *runs[0].names)
-        shades = ("black", *colours(len(runs[0].names)))
-        for axes, (x, y) in zip(column, (result.by_time, result.by_collisions), strict=True):
-            for label, mean, error, colour in zip(labels, y.mean, y.error, shades, strict=True):
-                band(axes, x, mean, error, color=colour, label=label)
-            axes.set(yscale="log", xlim=(0, None), ylim=(0.8 * floor, 2))
-        column[0].set(title=f"ξ = {xi:g}", xlabel="time (reduced units)")
-        column[1].set(xlabel="collisions per disk")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
-    panels[0, 0].legend()
-    if rows == 3:
-        draw_ratio(figure.add_subplot(grid[2, :]), groups, results)
+    """Against time, against collisions; below the ratio.  Colours: restitution."""
+    rows = 1 + any(result.ratio is not None for result in results)
+    figure = plt.figure(figsize=(11, 4.5 + 3 * (rows - 1)))
+    grid = figure.add_gridspec(rows, 2, height_ratios=(1.5, 1)[:rows])
+    left = figure.add_subplot(grid[0, 0])
+    right = figure.add_subplot(grid[0, 1], sharey=left)
+    styles = list(zip(("all", *groups[0][1][0].names), chain("-", cycle(DASHES)), strict=False))
+    for (xi, _), result, colour in zip(groups, results, colours(len(groups), 2), strict=True):
+        for axes, (x, y) in ((left, result.by_time), (right, result.by_collisions)):
+            for (_, style), mean, error in zip(styles, y.mean, y.error, strict=False):
+                band(axes, x, mean, error, color=colour, ls=style, lw=1.4)
+        left.plot([], [], color=colour, label=f"ξ = {xi:g}")
+    for name, style in styles:
+        right.plot([], [], color="0.3", ls=style, label=name)
+    left.set(yscale="log", xlabel="time (reduced units)")
+    left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
+    right.set(xlabel="collisions per disk")
+    for axes in (left, right):
+        axes.set_xlim(0, max(line.get_xdata()[-1] for line in axes.lines if len(line.get_xdata())))
+        axes.legend(loc="lower left")
+    if rows == 2:
+        draw_ratio(figure.add_subplot(grid[1, :]), groups, results)
     runs = [run for _, members in groups for run in members]
     figure.suptitle(
         f"{caption(runs)}, wall rule: {runs[0].parameter('contact', 'wall_rule', '')}", fontsize=10

@@ -24,9 +24,10 @@ from ricochet.crater import (
     energy_fraction,
     projectile,
 )
-from ricochet.drawing import COLOURS, caption, colours, panel_grid, plt
+from ricochet.drawing import COLOURS, colours, panel_grid, plt
+from ricochet.reader import span
 from ricochet.script import command_line, launch, measured, read_all, report
-from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law
+from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law, to_error
 
 import numpy as np
 
@@ -160,7 +161,7 @@ def power(axis: str, fit: PowerLaw | None) -> str:
     """The law of a fit, for a legend."""
     if not fit:
         return ""
-    exponent = f"{fit.exponent:z.2f} \\pm {fit.exponent_error:.2f}"
+    exponent = "\\pm".join(to_error(fit.exponent, fit.exponent_error))
     return f", $\\propto {SYMBOLS[axis]}^{{{exponent}}}$"
 
 
@@ -224,8 +225,9 @@ def draw(scans: dict[str, list[Curve]], runs: list[Run]) -> plt.Figure:
             axes.legend(loc="upper left", fontsize=8, ncols=1 + (len(scan) > 2))
     points = [p for scan in scans.values() for curve in scan for p in curve.points]
     number = "-".join(map(str, sorted({f([p.runs for p in points]) for f in (min, max)})))
+    count = span(np.array([run.count for run in runs]))
     figure.suptitle(
-        f"{caption(runs)}\n{number} runs per point,  ended at {100 * fraction:g} % of the energy"
+        f"N = {count},  {number} runs per point,  ended at {100 * fraction:g} % of the energy"
         + (" (open: the box takes part, or ended by time)" * any(not p.free for p in points)),
         fontsize=10,
     )

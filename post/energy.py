@@ -3,7 +3,8 @@
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
 Above: mean kinetic and potential energy per disk of each species in the first run.  Below: the
-relative change of the total energy in each run.  Prints, for each run and relative to the energy
+largest relative change of the total energy so far in each run.  The axis of time is logarithmic,
+for most happens at first.  Prints, for each run and relative to the energy
 at the start: the drift, that is the change over the whole run along a fitted line; the spread,
 the standard deviation from that line; and the largest change.
 """
@@ -11,11 +12,11 @@ the standard deviation from that line; and the largest change.
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, colours, plt
 from ricochet.script import command_line, launch, read_all, report
-from ricochet.statistics import windows
 
 import numpy as np
 
 EPSILON = np.finfo(float).eps  # the smallest change of a number near 1
+WINDOWS = 60  # of time
 
 
 def method(run: Run) -> str:
@@ -37,6 +38,16 @@ def drift_and_spread(time: np.ndarray, change: np.ndarray) -> tuple[float, float
     return float(line(time[-1]) - line(time[0])), float(np.std(change - line(time)))
 
 
+def means_of_windows(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means of a series over windows of time that grow by a factor, at their mean times."""
+    cuts = np.geomspace(time[0], time[-1], WINDOWS + 1)[1:-1]
+    parts = np.searchsorted(cuts, time)
+    number = np.bincount(parts)
+    some = number > 0
+    sums = (np.bincount(parts, series)[some] for series in (time, value))
+    return tuple(total / number[some] for total in sums)
+
+
 def draw_species(axes: plt.Axes, run: Run) -> None:
     """Kinetic solid, potential dotted, a colour per species; faint: every sample."""
     curves = [(name, "kinetic", "-") for name in run.names]
@@ -44,17 +55,13 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         curves += [(name, "potential", ":") for name in run.names]
     for name, kind, style in curves:
         colour = COLOURS[run.names.index(name) % len(COLOURS)]
-        time, value = run.observable(f"{name}/{kind}_energy")
-        axes.plot(time, value, color=colour, lw=0.5, alpha=0.25)
-        axes.plot(
-            *windows(time, value, np.ptp(time) / 50),
-            color=colour,
-            ls=style,
-            label=f"{kind}, {name}",
-        )
+        time, value = (series[1:] for series in run.observable(f"{name}/{kind}_energy"))
+        axes.plot(time, value, color=colour, lw=0.5, alpha=0.15)
+        means = means_of_windows(time, value)
+        axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}")
     axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    axes.legend(ncols=2, loc="upper right", title="means over 2 % of the time; faint: samples")
+    axes.legend(ncols=2, loc="upper right", title="means; faint: samples")
 
 
 def draw(runs: list[Run]) -> plt.Figure:
@@ -63,13 +70,13 @@ def draw(runs: list[Run]) -> plt.Figure:
     draw_species(top, runs[0])
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, change = total_change(run)
-        size = np.maximum(np.abs(change), EPSILON / 2)
-        bottom.semilogy(time, size, color=colour, lw=1, label=method(run))
+        largest = np.maximum(np.maximum.accumulate(np.abs(change)), EPSILON / 2)
+        bottom.loglog(time[1:], largest[1:], color=colour, lw=1.4, label=method(run))
     bottom.set(
         xlabel="time (reduced units)",
-        ylabel="$|E(t)/E(0) - 1|$, total energy",
-        xlim=(0, None),
-        ylim=(EPSILON / 4, 30 * bottom.get_ylim()[1]),
+        ylabel="largest $|E(t)/E(0) - 1|$ so far",
+        xlim=(min(run.observable("total_energy").time[1] for run in runs), None),
+        ylim=(EPSILON / 4, 10 * bottom.get_ylim()[1]),
     )
     bottom.legend(ncols=2, loc="upper right")
     return figure

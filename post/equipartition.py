@@ -4,9 +4,10 @@
 
 Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
 windows of --window.  T_therm is the middle of the first window from which the two agree within
---within for three windows.  A single run is not enough: with 30 + 30 disks the ratio of the
-energies fluctuates by 26 % in equilibrium, so take many.  K_light and K_heavy in the table are
-means in equilibrium, which is found or begins after --skip.
+--within for three windows, and are known so well: their difference with twice its error.  A single
+run has no error and no T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in
+equilibrium, so take many.  K_light and K_heavy in the table are means in equilibrium, which is
+found or begins after --skip.
 """
 
 from typing import NamedTuple
@@ -26,14 +27,15 @@ class Approach(NamedTuple):
     time: np.ndarray  # (W,) middles
     light: Estimate  # (W,)
     heavy: Estimate
-    thermalisation: float  # NaN if they never agree
+    gap: Estimate  # (W,) heavy / light - 1
+    thermalisation: float  # NaN if they never agree, or are not known so well
 
 
 def thermalisation_time(
-    time: np.ndarray, light: np.ndarray, heavy: np.ndarray, within: float = 0.1, lasting: int = 3
+    time: np.ndarray, gap: Estimate, within: float = 0.1, lasting: int = 3
 ) -> float:
-    """First time from which |heavy / light - 1| <= within for `lasting` windows in a row."""
-    close = np.abs(heavy / light - 1) <= within
+    """First time from which |gap| and twice its error are <= within for `lasting` windows."""
+    close = (np.abs(gap.mean) <= within) & (2 * gap.error <= within)
     for k in range(len(time) - lasting + 1):
         if close[k : k + lasting].all():
             return float(time[k])
@@ -47,9 +49,21 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
         name = runs[0].names[kind]
         tracks = [windows(*run.observable(f"{name}/kinetic_energy"), width) for run in runs]
         time = tracks[0][0]
-        both.append(estimate([values for _, values in tracks]))
-    light, heavy = both
-    return Approach(time, light, heavy, thermalisation_time(time, light.mean, heavy.mean, within))
+        both.append(np.array([values for _, values in tracks]))
+    light, heavy = map(estimate, both)
+    difference = estimate(both[1] - both[0])
+    gap = Estimate(difference.mean / light.mean, difference.error / light.mean)
+    return Approach(time, light, heavy, gap, thermalisation_time(time, gap, within))
+
+
+def doubt(gap: Estimate, within: float) -> str:
+    """Why two energies do not agree."""
+    known = 2 * np.median(gap.error) <= within
+    return (
+        f"the energies never agree within {100 * within:g} %"
+        if known
+        else f"the difference of the energies is not known to {100 * within:g} %, take more runs"
+    )
 
 
 def late_energy(runs: list[Run], which: int, skip: float | None) -> Estimate:
@@ -106,7 +120,8 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
                 color="0.5",
                 ls="--",
                 lw=1,
-                label=f"equal to {100 * within:g} % from t = {result.thermalisation:.3g}",
+                label=f"means differ by less than {100 * within:g} % "
+                f"for three windows from t = {result.thermalisation:.3g}",
             )
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)
@@ -126,7 +141,7 @@ def main() -> None:
     results = [approach(members, args.window, args.within) for _, members in groups]
     figure = draw(groups, results, args.until, args.within)
     never = [
-        f"v0 = {v0:g}: the energies never agree within {100 * args.within:g} %, T_therm is nan"
+        f"v0 = {v0:g}: no T_therm; {doubt(found.gap, args.within)}"
         for (v0, _), found in zip(groups, results, strict=True)
         if np.isnan(found.thermalisation)
     ]

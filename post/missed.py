@@ -88,6 +88,12 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
     return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(kt)
 
 
+def unpaired(runs: list[Run]) -> list[Run]:
+    """Runs by time steps whose seed no event-driven run has."""
+    seeds = {run.seed for run in runs if run.time_step == 0}
+    return [run for run in runs if run.seed not in seeds]
+
+
 def compare(runs: list[Run], skip: float | None) -> list[Missed]:
     """A row per step; the event-driven runs come first, with dt = 0."""
     groups = grouped(runs, lambda run: run.time_step)
@@ -144,7 +150,7 @@ def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
         marker="o",
         color=COLOURS[0],
         capsize=3,
-        label=f"measured, {steps[0].runs} pairs of runs",
+        label=f"measured, {steps[0].runs} pair{'s' * (steps[0].runs > 1)} of runs",
     )
     axes.set(
         xscale="log",
@@ -163,7 +169,9 @@ def main() -> None:
     args = command_line(__doc__, "missed.png", skip=None).parse_args()
     runs = read_all(args.runs)
     rows = compare(runs, args.skip)
-    report(args, runs, "Missed collisions", draw(runs, rows), table(rows))
+    alone = ", ".join(str(run.path) for run in unpaired(runs))
+    notes = [f"left out, as no event-driven run has their seeds: {alone}"] if alone else []
+    report(args, runs, "Missed collisions", draw(runs, rows), table(rows), notes=notes)
 
 
 if __name__ == "__main__":

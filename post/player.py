@@ -6,12 +6,14 @@
     python post/player.py runs/gas.h5.part --live             while the run goes on
 
 Disks of true size with walls and obstacles, in true time: between two frames they fly along their
-paths, if no disk collided more than once or the run has an event log.  Play, step, speed, zoom;
+paths, and colours, energies and counts follow them, if no disk collided more than once or the run
+has an event log; else the film shows frames.  Play, step to the next frame or event, speed, zoom;
 colour by species, speed, displacement or collisions; a click on a disk shows its trace, and the
 camera follows it; speeds, energies, and for up to 20 disks the events to come.  Without --count a
 film has as many frames, evenly spread, as fit into 30 MB.
 
---live shows a run on this computer, at an address that is printed, until the run ends.
+--live shows a run on this computer, at an address that is printed, until the run ends.  --open
+opens what is shown in the browser.
 """
 
 import base64
@@ -19,7 +21,11 @@ import hashlib
 import html
 import json
 import re
+import webbrowser
 from argparse import Namespace
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from ricochet import Run, RunError, read_run
@@ -38,12 +44,13 @@ PAGE = Path(__file__).with_name("page")  # what the page is made of
 SCRIPTS = ("film", "motion", "camera", "stage", "panels", "queue", "controls", "live")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
-TURN = 16 * 4 / 3  # bytes of a collision of a disk between two frames
+TURN = (20 + 8 / 2) * 4 / 3  # bytes of a collision of a disk between two frames, and half its time
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, which predicts collisions
 BINS = 40  # of the speed histogram
-FEWEST = 10  # disks of a species that has a histogram
+FEWEST = 10  # disks of a species that has a histogram, samples of a plot
+MOST_SAMPLES = 500  # of a plot
 RESTING = 0.02  # of the disks at rest at the end: no gas
 DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 
@@ -51,12 +58,13 @@ DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 def frames_that_fit(run: Run, room: float) -> int:
     """How many frames the file can hold.
 
-    Each disk needs two 16-bit positions and an 8-bit colour per quantity; time, energies and
-    histograms are in words.  Up to half of the room is for collisions between frames.
+    Each disk needs two 16-bit positions, an 8-bit colour per quantity, 32 bits of an angle; time,
+    energies and histograms are in words.  Up to half of the room is for collisions between frames.
     """
-    one = run.count * (4 + len(quantities(run)) + (run.image is not None) + 1 / 8) * 4 / 3
+    turning = 4 * ("orientation" in run.elements)
+    one = run.count * (4 + len(quantities(run)) + (run.image is not None) + turning + 1 / 8) * 4 / 3
     words = 50 + 200 * len(run.names)
-    fixed = run.count * (2 + 1) * 4 / 3  # species and size
+    fixed = run.count * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
     turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
     return int(np.clip((room - fixed - min(turns, room / 2)) / (one + words), 2, MOST_FRAMES))
 
@@ -87,25 +95,63 @@ def coded_shifts(run: Run, frames: list[int], before: int) -> np.ndarray:
     return (16 * crossed[..., 0] + crossed[..., 1]).astype(np.uint8)
 
 
-def coded_turns(run: Run, frames: list[int], room: float) -> tuple[dict[str, bytearray], list[int]]:
-    """Collisions between the frames, and how many disks have guessed paths.
+def coded_origins(run: Run, first: int) -> np.ndarray:
+    """(N, 2) where displacements count from, without jumps until the first frame of the film."""
+    shift = run.position[first] - run.unwrapped(first)
+    return ((run.unwrapped(0) + shift - run.lower) / run.edges).astype("<f4")
 
-    Of each gap between two frames the number of collisions; of each collision its disk, and three
-    numbers: when, as share of the gap, and where, in units of the box.
+
+def coded_headings(velocity: np.ndarray) -> bytes:
+    """Directions of velocities (n, 2), a full turn in 256 parts."""
+    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
+    return (np.round(256 * angle / (2 * np.pi)) % 256).astype(np.uint8).tobytes()
+
+
+def coded_turns(
+    run: Run, paths: Paths, frames: list[int]
+) -> tuple[dict[str, bytearray], list[int]]:
+    """Collisions between the frames, and how many disks have unknown paths.
+
+    Of each gap between two frames the number of collisions; of each collision its disk, three
+    numbers: when, as share of the gap, and where, in units of the box; and the kinetic energy that
+    the disk gains.  Of disks with unknown paths the heading in the first frame.
     """
     kind = "<f8" if run.count <= FEW_DISKS else "<f4"
-    blocks = {name: bytearray() for name in ("gaps", "turning", "turns", "guessed")}
+    names = ("gaps", "turning", "turns", "gains", "guessed", "headings")
+    blocks = {name: bytearray() for name in names}
     guesses = []
-    for k, turns in enumerate(Paths(run, room // TURN).along(frames)):
+    for k, turns in enumerate(paths.along(frames)):
         start, end = run.time[[frames[k], frames[k + 1]]]
         when = (turns.time - start) / (end - start if end > start else 1)
         where = (turns.place - run.lower) / run.edges
         blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
         blocks["turning"] += turns.disk.astype("<u4").tobytes()
         blocks["turns"] += np.column_stack([when, where]).astype(kind).tobytes()
+        blocks["gains"] += turns.gain.astype(kind).tobytes()
         blocks["guessed"] += np.packbits(turns.guessed, bitorder="little").tobytes()
         guesses.append(int(turns.guessed.sum()))
+        if guesses[-1]:
+            blocks["headings"] += coded_headings(run.velocity[frames[k]][turns.guessed])
     return blocks, guesses
+
+
+def counted(run: Run, paths: Paths, frames: list[int], most: float) -> tuple[dict, np.ndarray]:
+    """Collisions per disk in each frame, with what, and the moments of those in the film.
+
+    Those of "pairs" are known from the log.  Without one, or if they were more than `most`, frames
+    tell how often each disk has collided with anything ("all", or "disks" if there is nothing
+    else), and no moments are known.
+    """
+    time = run.time[frames]
+    if paths.log is not None:
+        moments = paths.log[0][paths.log[2] > 0]
+        before = np.searchsorted(moments, time, "right")
+        if before[-1] - before[0] <= most:
+            means = (2 * before / run.count).tolist()
+            return {"collisions": means, "with": "pairs"}, moments[before[0] : before[-1]]
+    hits = None if run.collisions is None else [float(run.collisions[f].mean()) for f in frames]
+    walled = bool(not run.periodic.all() or run.obstacles or len(run.walls))
+    return {"collisions": hits, "with": "all" if walled else "disks"}, np.zeros(0)
 
 
 def scale_top(run: Run, frames: list[int], name: str) -> float:
@@ -147,6 +193,17 @@ def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[
         [e[:, kind.disks].mean(axis=1) for kind in run.by_species] for e in (kinetic, potential)
     )
     return tuple([list(map(significant, row)) for row in np.transpose(m)] for m in means)
+
+
+def pressure(run: Run) -> dict | None:
+    """The pressure against time, of as many samples as a plot can show; None without any."""
+    with suppress(RunError):
+        series = run.observable("pressure")
+        some = np.linspace(0, len(series.time) - 1, min(len(series.time), MOST_SAMPLES)).astype(int)
+        if len(some) >= FEWEST and np.isfinite(series.value[some]).all():
+            value = list(map(significant, series.value[some]))
+            return {"time": list(map(significant, series.time[some])), "value": value}
+    return None
 
 
 def speed_bins(run: Run, frames: list[int], top: float) -> dict:
@@ -192,42 +249,56 @@ def significant(value: float) -> float:
 
 
 def film(
-    run: Run, frames: list[int], colour: str, traced: list[int], room: float = ROOM
+    run: Run,
+    frames: list[int],
+    colour: str,
+    traced: list[int],
+    room: float = ROOM,
+    watched: Callable[[list], Iterable] = iter,
 ) -> tuple[dict, dict]:
-    """What the page needs to know, and the arrays that move as name -> bytes."""
+    """What the page needs to know, and the arrays that move as name -> bytes.
+
+    `watched` passes on the parts in which frames are read, as tqdm does.
+    """
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     bins = speed_bins(run, frames, 1.3 * tops["speed"])
     blocks = {name: bytearray() for name in ("positions", *tops)}
     before = frames[0]
+    angles = blocks.setdefault("angles", bytearray()) if "orientation" in run.elements else None
     shifts = blocks.setdefault("shifts", bytearray()) if run.image is not None else None
     kinetic, potential, counts = [], [], []
-    with tqdm(total=len(frames), unit="frame", desc="player", disable=None) as progress:
-        at_once = max(1, MOST_AT_ONCE // run.count)
-        for first in range(0, len(frames), at_once):
-            some = frames[first : first + at_once]
-            blocks["positions"] += coded_positions(run, some).tobytes()
-            for name, top in tops.items():
-                values = values_of(run, some, name)
-                blocks[name] += coded(values, top, name == "collisions").tobytes()
-            if shifts is not None:
-                shifts += coded_shifts(run, some, before).tobytes()
-                before = some[-1]
-            means = mean_energies(run, some)
-            kinetic += means[0]
-            potential += means[1]
-            counts += speed_counts(run, some, bins)
-            progress.update(len(some))
-    turns, guesses = coded_turns(run, frames, room / 2)
-    blocks |= turns
+    at_once = max(1, MOST_AT_ONCE // run.count)
+    for some in watched([frames[k : k + at_once] for k in range(0, len(frames), at_once)]):
+        blocks["positions"] += coded_positions(run, some).tobytes()
+        for name, top in tops.items():
+            values = values_of(run, some, name)
+            blocks[name] += coded(values, top, name == "collisions").tobytes()
+        if shifts is not None:
+            shifts += coded_shifts(run, some, before).tobytes()
+            before = some[-1]
+        if angles is not None:
+            angles += run.orientation[some].astype("<f4").tobytes()
+        means = mean_energies(run, some)
+        kinetic += means[0]
+        potential += means[1]
+        counts += speed_counts(run, some, bins)
+    most = 0.4 * room // TURN  # the rest of its half is for headings
+    paths = Paths(run, most)
+    turns, guesses = coded_turns(run, paths, frames)
+    counts_of, moments = counted(run, paths, frames, most / 2)
+    blocks |= turns | {"moments": moments.astype("<f8").tobytes()}
+    blocks["mass"] = run.mass.astype("<f4").tobytes()
+    blocks["origins"] = coded_origins(run, frames[0]).tobytes()
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
     radii, own = radii_of(run)
     blocks["sizes"] = own.astype("u1").tobytes()
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {
         "time": run.time[frames].tolist(),
-        "collisions": run.collisions_per_disk_at(run.time[frames]).round(4).tolist(),
+        "counted": counts_of,
         "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
+        "kicked": run.kicked,
         "gravity": run.gravity.tolist(),
         "lower": run.lower.tolist(),
         "edges": run.edges.tolist(),
@@ -238,6 +309,7 @@ def film(
         "radii": radii.tolist(),
         "kinetic": kinetic,
         "potential": potential if run.gravity.any() else None,
+        "pressure": pressure(run),
         "speeds": {
             "edges": [significant(edge) for edge in bins["edges"]],
             "rest": bins["rest"],
@@ -260,38 +332,53 @@ def page(run: Run, film: dict | None) -> str:
     """The whole file; without a film it asks the server of --live for one."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
-    style = (PAGE / "style.css").read_text(encoding="utf-8")
-    script = "\n".join((PAGE / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
+    style = text_of("style.css")
+    script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
     fillings = {
-        "policy": policy(style, script, film is None),
+        "policy": policy(style, script, *["connect-src 'self'"] * (film is None)),
         "title": html.escape(title),
         "caption": html.escape(caption([run])),
-        "warning": html.escape(run.shortcoming),
+        "warning": html.escape(run.shortcoming if film else ""),
         "source": html.escape(f"{run.path.name} (ricochet {commit})"),
         "style": style,
-        "data": json.dumps(film, allow_nan=False).replace("<", "\\u003c"),
+        "data": enclosed(film),
         "script": script,
     }
+    return filled("page.html", fillings)
+
+
+def filled(name: str, fillings: dict[str, str]) -> str:
+    """A page with its blanks filled in."""
     blank = re.compile("{{(" + "|".join(fillings) + ")}}")
-    template = (PAGE / "page.html").read_text(encoding="utf-8")
-    return blank.sub(lambda found: fillings[found[1]], template)
+    return blank.sub(lambda found: fillings[found[1]], text_of(name))
 
 
-def policy(style: str, script: str, live: bool) -> str:
-    """What the page may do: run its own script in its own style, and load nothing else."""
-    rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
-    rules += ["connect-src 'self'"] * live
+def text_of(name: str) -> str:
+    """A part of the page."""
+    return (PAGE / name).read_text(encoding="utf-8")
+
+
+def enclosed(data: object) -> str:
+    """Data as a script of a page may hold it: no sign of it opens a tag."""
+    return json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+
+
+def policy(style: str, script: str, *more: str) -> str:
+    """What a page may do: run its own script in its own style, and load nothing but `more`."""
+    rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'", *more]
     for tag, own in (("script", script), ("style", style)):
         digest = base64.b64encode(hashlib.sha256(own.encode()).digest()).decode()
         rules.append(f"{tag}-src 'sha256-{digest}'")
     return "; ".join(rules)
 
 
-def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
-    """The film that the options ask for, and its frames."""
+def chosen_film(
+    run: Run, args: Namespace, room: float, watched: Callable[[list], Iterable] = iter
+) -> tuple[list[int], tuple[dict, dict]]:
+    """The film that the options ask for, and its frames; `watched` is as in `film`."""
     frames = film_frames(run, args, frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
-    return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
+    return frames, film(run, frames, chosen_colour(run, args.colour), traced, room, watched)
 
 
 def main() -> None:
@@ -299,6 +386,7 @@ def main() -> None:
         __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
     )
     parser.add_argument("--live", action="store_true", help="show the run while it goes on")
+    parser.add_argument("--open", action="store_true", help="open the film in the browser")
     args = parser.parse_args()
     run = read_run(args.run)
     if args.colour == "psi6":
@@ -306,17 +394,25 @@ def main() -> None:
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")
-        print(serve(run, page(run, None), lambda now: texts(*chosen_film(now, args, LIVE_ROOM)[1])))
+
+        def newest(now: Run) -> dict:
+            return texts(*chosen_film(now, args, LIVE_ROOM)[1])
+
+        print(serve(run, page(run, None), newest, webbrowser.open if args.open else None))
         return
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
         raise RunError(f"{path}: a player ends in .html")
-    frames, parts = chosen_film(run, args, ROOM)
+    # Only here: a server makes films in threads, and the lock of tqdm may be lost to an interrupt.
+    bar = partial(tqdm, desc="player", unit="part", leave=False, disable=None)
+    frames, parts = chosen_film(run, args, ROOM, bar)
     text = page(run, texts(*parts))
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
     rows = [{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]
     report(args, [run], "Player", None, rows)
+    if args.open:
+        webbrowser.open(path.resolve().as_uri())
 
 
 if __name__ == "__main__":

@@ -2,15 +2,17 @@
 
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
-Runs are combined; all must be of one system, elastic, without gravity.  Means are taken in
-equilibrium: from where nothing drifts any more, or after --skip.  Errors take the memory of each
-quantity into account, `samples` is how many independent ones it is worth, and what speaks against
-an error is a warning.  All is scaled to the mean temperature of the runs.  Pressure: by the virial
-of the pair collisions, and by the impulses on each side (a little larger: centres keep a radius
-away from sides).  With an event log also w_ij, the collisions of a disk of species i with disks of
-species j per time, and the free paths: in a frame each disk is on one, as long as its speed times
-the time between its collisions before and after.  Frames meet long paths more often; therefore each
-counts 1 over its time.  The line is for equal disks that meet without memory (Boltzmann, Enskog).
+Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium: from
+where nothing drifts any more, or after --skip.  Errors take the memory of each quantity into
+account, `samples` is how many independent ones it is worth, and what speaks against an error is a
+warning.  All is scaled to the mean temperature of the runs.  Pressure: by the virial of the pair
+collisions, and by the impulses on each side (a little larger: centres keep a radius away from
+sides).  With an event log also w_ij, the collisions of a disk of species i with disks of species j
+per time, and the free paths: in a frame each disk is on one, as long as its speed times the time
+between its collisions before and after.  Frames meet long paths more often; therefore each counts 1
+over its time.  The line is for equal disks that meet without memory (Boltzmann, Enskog).  Of runs
+that lose energy in collisions and have no equilibrium only the free paths are found, in the frames
+after --skip, or else 15 collisions per disk.
 """
 
 from ricochet import Run, RunError
@@ -18,8 +20,11 @@ from ricochet.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import FINE, SeriesMean, combined, doubts, estimate, series_mean
 from ricochet.thermodynamics import (
+    after_start,
+    all_cool,
     collision_rate,
     equal_disks,
+    loses_energy,
     packing,
     start_of_equilibrium,
     steps,
@@ -37,7 +42,13 @@ BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 def check(runs: list[Run]) -> None:
     """Refuse what is no gas in an empty box, and runs of different systems."""
     first = runs[0]
+    cool = all_cool(runs)
     for run in runs:
+        if cool and not has_log(run):
+            raise RunError(
+                f"{run.path}: is not elastic: it loses energy in collisions, and has free paths "
+                "only; those need output.event_log = .true."
+            )
         if run.gravity.any() or run.obstacles or len(run.walls):
             raise RunError(f"{run.path}: needs a gas without gravity, obstacles, walls")
         if run.names != first.names or run.count != first.count:
@@ -107,7 +118,8 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
         after = np.searchsorted(own, run.time, side="right")
         inside = (after > 0) & (after < len(own))
         duration[inside, k] = own[after[inside]] - own[after[inside] - 1]
-    duration[run.time < start_of_equilibrium(run, skip)] = np.nan
+    begin = after_start if loses_energy(run) else start_of_equilibrium
+    duration[run.time < begin(run, skip)] = np.nan
     known = duration > 0
     return (run.speed(slice(None)) * duration)[known], 1 / duration[known]
 
@@ -173,18 +185,22 @@ def draw_pressure(axes: plt.Axes, runs: list[Run], means: dict, start: float) ->
     band(axes, ends, np.full(2, mean), error, color="black", lw=1, label=label)
     axes.axvspan(0, start, color="0.9", lw=0, zorder=0, label="left out")
     axes.set(xlabel="time t (reduced units)", ylabel="pressure", xlim=(0, cuts[-1]))
-    axes.legend()
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend above what it names
+    axes.legend(loc="upper right")
 
 
 def draw(
     runs: list[Run], means: dict, start: float, paths: tuple[float, np.ndarray] | None
 ) -> plt.Figure:
-    """The pressure in time; with an event log also the free paths."""
-    figure, panels = plt.subplots(1, 2 if paths else 1, figsize=(10 if paths else 6, 4.5))
-    draw_pressure(np.atleast_1d(panels)[0], runs, means, start)
+    """The pressure in time, of a gas with means; with an event log also the free paths."""
+    count = bool(means) + bool(paths)
+    figure, panels = plt.subplots(1, count, squeeze=False, figsize=(2 + 4 * count, 4.5))
+    if means:
+        draw_pressure(panels[0, 0], runs, means, start)
     if paths:
         mean, density = paths
-        axes = panels[1]
+        axes = panels[0, -1]
         axes.stairs(density, BINS, color=COLOURS[0], label=f"measured, $\\ell$ = {mean:.4g}")
         fine = np.linspace(0, BINS[-1], 200)
         if equal_disks(runs[0]):
@@ -205,7 +221,7 @@ def table(runs: list[Run], means: dict, start: float, path: float | None) -> dic
         "kT": float(np.mean([temperature(run) for run in runs])),
         "momentum_x": float(momentum[0]),
         "momentum_y": float(momentum[1]),
-        "equilibrium_from": start,
+        "from_time" if not means else "equilibrium_from": start,
     }
     if path is not None:
         exact["mean_free_path"] = path
@@ -222,14 +238,19 @@ def main() -> None:
     args = command_line(__doc__, "rates.png", skip=None).parse_args()
     runs = read_all(args.runs)
     check(runs)
-    kt = float(np.mean([temperature(run) for run in runs]))
-    found = [at_temperature(quantities(run, args.skip), kt / temperature(run)) for run in runs]
+    cool, kt = all_cool(runs), float(np.mean([temperature(run) for run in runs]))
+    begin = after_start if cool else start_of_equilibrium
+    found = [
+        {} if cool else at_temperature(quantities(run, args.skip), kt / temperature(run))
+        for run in runs
+    ]
     members = {name: [one[name] for one in found] for name in found[0]}
     means = {name: combined(ones) for name, ones in members.items()}
-    start = max(start_of_equilibrium(run, args.skip) for run in runs)
+    start = max(begin(run, args.skip) for run in runs)
     paths = histogram(runs, args.skip)
     rows = table(runs, means, start, paths[0] if paths else None)
     notes = [note for name, ones in members.items() for note in doubts(name, ones)]
+    notes += ["the gas loses energy, no equilibrium: kT is that of the start"] * cool
     title = "Pressure, rates and free paths of hard disks"
     report(args, runs, title, draw(runs, means, start, paths), rows, notes=notes)
 

@@ -22,6 +22,7 @@ from ricochet.drawing import (
     draw_box,
     panel_grid,
     plt,
+    radius_marks,
     species_colours,
     species_legend,
     values_of,
@@ -84,6 +85,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
             seen = np.maximum(values[k], norm.vmin)  # 0 has no place on a logarithmic scale
             style = {"array": seen, "norm": norm, "cmap": colour_map(colour)}
         disks = disk_collection(axes, run, run.position[frames[k]], **style)
+        radius_marks(axes, run, frames[k])
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
         if args.quiver:

@@ -10,21 +10,24 @@ A gas that loses energy in collisions has no equilibrium: its histogram is of th
 --skip, or else 15 collisions per disk, with the kT of each frame for itself; `kT_first` and
 `kT_last` say how far it has cooled meanwhile.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
-disks that share a fixed energy, which matters if they are few.  A disk forgets its speed within 5
-collisions: frames that are closer count for the tests as one frame every 5 collisions per disk.
+disks that share a fixed kinetic energy, which matters if they are few; none where that law is not
+known: with gravity, losses, one periodic axis of two, or two and unequal masses.  A disk forgets
+its speed within 5 collisions: frames that are closer count for the tests as one frame every 5
+collisions per disk.
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 from argparse import Namespace
 from typing import NamedTuple
 
-from ricochet import Run, RunError
-from ricochet.drawing import caption, colours, dilute_limit, plt
+from ricochet import Run
+from ricochet.drawing import caption, colours, dilute_limit, noise_band, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
-from ricochet.statistics import estimate, excess_kurtosis, hold_against
+from ricochet.statistics import Law, estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import (
     after_start,
+    all_cool,
     conserved,
     equal_disks,
     loses_energy,
@@ -71,15 +74,6 @@ def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
     return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
 
 
-def all_cool(runs: list[Run]) -> bool:
-    """Whether the runs lose energy: all of them, or none."""
-    cool = [loses_energy(run) for run in runs]
-    if any(cool) and not all(cool):
-        lossy, elastic = runs[cool.index(True)], runs[cool.index(False)]
-        raise RunError(f"{lossy.path}: loses energy, {elastic.path} does not: draw them apart")
-    return all(cool)
-
-
 def pooled(runs: list[Run], args: Namespace, cool: bool) -> Pool:
     """The late frames of all runs; of those that cool, each at its own temperature."""
     begin = after_start if cool else start_of_equilibrium
@@ -92,13 +86,21 @@ def pooled(runs: list[Run], args: Namespace, cool: bool) -> Pool:
     )
 
 
+def exact_law(run: Run) -> Law | None:
+    """The law of N disks that share a fixed kinetic energy, for runs that have one."""
+    axes = conserved(run).sum()
+    if loses_energy(run) or run.gravity.any() or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
+        return None
+    return finite_n_cdf(run.count, bool(axes == 2))
+
+
 def table(groups: list, pools: list[Pool]) -> list[dict]:
     """The tests of each group."""
     rows = []
     for (count, runs), (u, n, kts) in zip(groups, pools, strict=True):
         maxwell = hold_against(u, maxwell_cdf, independent=n)
-        law = finite_n_cdf(count, bool(conserved(runs[0]).all()))
-        exact = hold_against(u, law, independent=n)
+        law = exact_law(runs[0])
+        exact = hold_against(u, law, independent=n) if law else None
         rows.append(
             {
                 "N": count,
@@ -114,8 +116,8 @@ def table(groups: list, pools: list[Pool]) -> list[dict]:
                 "KS_p": maxwell.ks_p,
                 "chi2/dof": maxwell.chi2,
                 "chi2_p": maxwell.chi2_p,
-                "KS_D_exact": exact.ks,
-                "KS_p_exact": exact.ks_p,
+                "KS_D_exact": exact and exact.ks,
+                "KS_p_exact": exact and exact.ks_p,
             }
         )
     return rows
@@ -151,6 +153,7 @@ def draw_relaxation(axes: plt.Axes, groups: list, cool: bool) -> None:
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
+        noise_band(axes, count * len(runs), colour)
     everyone = [run for _, runs in groups for run in runs]
     equal = all(equal_disks(run) and relaxation(run, 0)[1][0] < -0.4 for run in everyone)
     if equal and not cool:
@@ -180,18 +183,18 @@ def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.
     last.set_title("One frame at the end")
     labels = []
     for row in tests:
-        size, free = row["speeds"], row["independent"]
+        size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
         labels.append(
             f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
             + (f"\n{cooling(row)}" if cool else "")
-            + f"\nKS D = {row['KS_D']:.4f}, p = {row['KS_p']:.2g}"
-            + f" (at fixed energy {row['KS_p_exact']:.2g})"
+            + f"\nKS D = {row['KS_D']:.4f}, p-value {row['KS_p']:.2g}"
+            + ("" if exact is None else f",\nof the law at fixed energy {exact:.2g}")
         )  # fmt: skip
     draw_histogram(late, [pool.speeds for pool in pools], labels)
     late.set_title(
         "No equilibrium: each frame at its own kT" if cool else "Equilibrium, many frames"
     )
-    late.set_ylim(0, 1.1 + (0.5 if cool else 0.25) * len(groups))
+    late.set_ylim(0, 1.1 + (0.6 if cool else 0.4) * len(groups))
     draw_relaxation(way, groups, cool)
     way.set_title("The way there" if cool else "The way to equilibrium")
     figure.suptitle(caption(everyone), fontsize=10)
@@ -199,10 +202,16 @@ def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.
 
 
 def histograms(groups: list, pools: list[Pool]) -> dict[str, np.ndarray]:
-    """Densities of the late frames, with the mean of the Maxwell density over each bin."""
+    """Densities of the late frames, with the mean of the Maxwell density over each bin.
+
+    Errors are those of so many independent speeds as there are.
+    """
     columns = {"u_low": BINS[:-1], "u_high": BINS[1:]}
-    for (count, _), (u, *_) in zip(groups, pools, strict=True):
-        columns[f"density_N{count}"] = np.histogram(u, BINS)[0] / (len(u) * np.diff(BINS))
+    for (count, _), (u, independent, _) in zip(groups, pools, strict=True):
+        share = np.histogram(u, BINS)[0] / len(u)
+        columns[f"density_N{count}"] = share / np.diff(BINS)
+        error = np.sqrt(share * (1 - share) / independent) / np.diff(BINS)
+        columns[f"density_error_N{count}"] = error
     return {**columns, "maxwell": np.diff(maxwell_cdf(BINS)) / np.diff(BINS)}
 
 

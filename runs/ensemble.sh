@@ -1,13 +1,17 @@
 #!/usr/bin/env bash
 # Run many members of an ensemble or a scan: seeds x values, all cores, safe to stop and repeat.
 set -euo pipefail
+me=${0##*/}
+((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
 export OMP_NUM_THREADS=1 # a core for each member; run.threads still decides
 
 usage() {
-  cat <<'TEXT'
-Usage: runs/ensemble.sh INPUT.nml -d FOLDER [options]
+  cat <<TEXT
+$me: many runs of one input, seeds x values, safe to stop and to repeat
 
-Members:
+usage:  $me INPUT.nml -d FOLDER [option]...
+
+members:
   --seeds LIST           run.seed of each member: 1-8 or 1,5,9 or 1-4,11
   --scan VARIABLE=A,B,C  values of a variable; repeated: every combination.  Vectors hold commas,
                          so separate them by semicolons: --scan 'species.ball.velocity=0,-1;0,-2'
@@ -15,7 +19,7 @@ Members:
   --manifest FILE        instead of --seeds and --scan: one member per line,
                              NAME <TAB or blank> --set VARIABLE=VALUE --set VARIABLE=VALUE ...
                          (a NAME with blanks needs the TAB; lines that begin with # are left out)
-Running:
+running:
   -j N                   members at a time [all cores]
   --dry-run              print the members and stop
   --engine pool          who runs them: this script, on this machine [default],
@@ -29,10 +33,11 @@ Running:
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
 with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that failed is tried
 again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
-share the work.  The program is build/ricochet (installed: the one beside this), or what RICOCHET names.
+share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
+build/ricochet).  All machines need the same folders.
 
-All machines need the same folders.  Exit codes: 0 all finished; 1 some failed; 2 wrong usage; 3 the
-folder cannot be used; 75 stopped, the same command goes on.
+exit:   0 all finished; 1 some failed; 2 wrong usage; 3 the folder cannot be used; 75 stopped, the
+        same command goes on
 TEXT
 }
 
@@ -40,7 +45,7 @@ TEXT
 fail() {
   local code=$1
   shift
-  printf 'ensemble.sh: %s\n' "${*//[[:cntrl:]]/?}" >&2
+  printf '%s: %s\n' "$me" "${*//[[:cntrl:]]/?}" >&2
   exit "$code"
 }
 
@@ -166,8 +171,9 @@ has_data() {
 remember() {
   local line name k door='' changed=''
   local -A before=() linked=()
-  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time
-    flock -w 2 "$door" 2>/dev/null || true
+  if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, where folders have locks
+    flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
+      fail 3 "another command keeps $folder to itself: try again"
   fi
   for name in input.nml manifest.txt; do check_ordinary "$folder/$name"; done
   while IFS= read -r -d '' name; do
@@ -222,13 +228,15 @@ run_member() {
   fi
   "$program" "${arguments[@]}" >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
   child=$!
+  [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
   while :; do # `wait` also ends when a signal comes
     interrupted='' status=0
     wait "$child" || status=$?
     [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
   done
   child=
-  if [[ -n $stopping ]] && ((status >= 127)); then status=75; fi # stopped while it started
+  # Stopped while it started, or while bash waited for it a second time (-1: it has lost the status).
+  if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
@@ -244,7 +252,7 @@ open_log() {
 # The lock is on the log; the program inherits it, so it holds as long as the program lives.
 work() {
   local k base lock child='' stopping='' interrupted=''
-  trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null' TERM INT
+  trap 'stopping=1 interrupted=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT
   for k in "${!names[@]}"; do
     if [[ -n $stopping ]] || ! kill -0 $$ 2>/dev/null; then break; fi
     base=$folder/${names[k]}
@@ -304,6 +312,7 @@ run_all() {
     [[ -z $stopped ]] || break
     work &
     workers+=($!)
+    [[ -z $stopped ]] || forward # the signal came before
   done
   set +m
   while ((ended < ${#workers[@]})); do
@@ -384,15 +393,16 @@ judge_by_files() {
 # TERM must meet the script itself: a shell above it would die at once, and GNU parallel would take
 # that for the end of the share, and go on with its sequence.
 run_parallel() {
-  local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child
+  local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
   prepare_shares
   put "$folder/parallel.log" </dev/null
   [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
   [[ ! -t 2 ]] || options+=(--bar)
+  trap 'stopped=1; [[ -z $child ]] || kill -TERM "$child" 2>/dev/null || true' TERM INT HUP
   parallel "${options[@]}" "exec $(printf '%q ' "${share_command[@]}"){}/$shares" < <(seq "$shares") 2>"$folder/parallel.log" &
   child=$!
-  trap 'stopped=1; kill -TERM "$child" 2>/dev/null' TERM INT HUP
+  [[ -z $stopped ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
   while kill -0 "$child" 2>/dev/null; do wait "$child" || true; done
   [[ -z $stopped ]] || wait_for_locks
   judge_by_files
@@ -422,8 +432,10 @@ submit_to_slurm() {
   prepare_shares
   check_ordinary "$folder/slurm.log"
   task="#!/usr/bin/env bash
-trap 'kill -TERM \$child' TERM
+trap 'stopped=1; [[ -z \$child ]] || kill -TERM \$child' TERM
+stopped='' child=''
 $(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!
+[[ -z \$stopped ]] || kill -TERM \$child
 status=143
 while kill -0 \$child 2>/dev/null; do status=0; wait \$child || status=\$?; done
 if ((status == 75)) && [[ \$(squeue --noheader --format=%T --jobs=\$SLURM_JOB_ID) == RUNNING ]]; then

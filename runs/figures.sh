@@ -5,7 +5,7 @@
 #   runs/figures.sh gas crater      some
 #   runs/figures.sh -j 4 gas        options before the names go to ensemble.sh
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
-known=(scattering gas mixture cooling crater lab cost billiards gravity state stages melting)
+known=(scattering gas mixture cooling crater lab cost billiards gravity state stages melting driven)
 
 options=()
 while [[ ${1:-} == -* ]]; do
@@ -102,6 +102,16 @@ HTML
   section melting_0.698 'Direction of the bonds at 0.698' melting
   section melting_0.708 'Direction of the bonds at 0.708' melting
   section melting_0.72 'Direction of the bonds at 0.720' melting
+  section fourier 'Heat between a hot and a cold wall' driven
+  section couette 'A gas between sliding walls' driven
+  section rough 'Rough disks: temperatures of translation and rotation' driven
+  section leidenfrost 'Leidenfrost: a dense layer floats on a hot one' driven
+  section leidenfrost_fields 'Leidenfrost: density and temperature above the floor' driven
+  section demon "Maxwell's demon: grains gather in one of two chambers" driven
+  section nut 'The Brazil nut: a large disk rises in a shaken bed' driven
+  section heated 'A granular gas held by random kicks' driven
+  section active 'Active disks gather in clusters' driven
+  section transport 'Bulk: viscosity, conductivity, diffusion' driven
   section coverage 'Bulk: how often an error bar holds the truth' coverage
   printf '</main>\n</html>\n'
 } | replace "$figures/index.html"

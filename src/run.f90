@@ -3,24 +3,28 @@ module run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use checkpoint, only: read_checkpoint, write_checkpoint
   use command_line, only: command_t
-  use errors, only: error_t, exit_broken, exit_files, exit_stopped, fail
+  use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system, restless_disk
   use kinds, only: int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
+  use partners, only: n_sides
   use progress, only: progress_t
   use progress_line, only: progress_line_t
   use run_files, only: current_checkpoint, is_file, run_file
-  use run_input, only: run_input_t
+  use run_description, only: recall_overrides
   use run_setup, only: choose_evolution, new_simulation, read_input
+  use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t, stop_settings_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
+  use tally, only: dissipated, drive_energy
   use texts, only: counted, legible, size_text, written
   use threads, only: start_threads
+  use time_use, only: begin_time_use, part_end, part_events, part_samples, spend_time_on, time_use_report
   implicit none
   private
   public :: perform_run
@@ -52,11 +56,13 @@ contains
     character(len=:), allocatable :: warning
 
     run%started = seconds()
+    call begin_time_use(run%started)
     run%command = command
     call watch_signals()
     call run%line%open(command%quiet)
-    call end_at_signals("stopped before the run began; nothing is lost: repeat the command")
-    call read_input(command%input, command%overrides, run%input, error)
+    call end_at_signals("stopped before the run began; nothing is lost: repeat the command", exit_stopped)
+    if (command%resume) call recall_overrides(command%output, run%command%overrides)
+    call read_input(command%input, run%command%overrides, run%input, error)
     if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
     call start_threads(run%input%settings, warning)
@@ -75,11 +81,21 @@ contains
       if (error%code == exit_broken) call run%output%break_off(run%sim, cost(run), error%message)
       call rescue(run, error)
     else
-      call end_at_signals("stopped; the run is finished, only its summary is missing")
+      call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
       call print_text(summary(run), error)
     end if
     call run%output%release()
+    call tell_times(run%input%settings%run%threads)
   end subroutine perform_run
+
+  !> Tells where the wall clock went, if it was measured.
+  subroutine tell_times(threads)
+    integer, intent(in) :: threads
+    character(len=:), allocatable :: report
+
+    report = time_use_report(threads)
+    if (report /= "") write (error_unit, "(a)") report
+  end subroutine tell_times
 
   !> Creates the state of a new run and opens its output; with --check says only that all is well.
   subroutine begin(run, error)
@@ -122,7 +138,7 @@ contains
       rule = stop_rule_t(run%input%settings%stop, sim)
       if (finished .and. rule%met(sim)) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
-          //written(sim%collisions)//" collisions; to continue it, repeat the command with --resume and a stop rule that " &
+          //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a stop rule that " &
           //"is not met yet, such as"//later_rules(run%input%settings%stop, sim))
       else if (finished .and. rule%too_cold(sim)) then
         call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
@@ -139,30 +155,27 @@ contains
     type(stop_settings_t), intent(in) :: rules
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: options
-    integer(int64), parameter :: most = huge(0_int64)
-    character(len=19), parameter :: names(*) = [character(len=19) :: "time", "collisions", "collisions_per_disk", "events", &
-      "energy_fraction"]
-    character(len=24) :: later(size(names))
-    type(stop_settings_t) :: alone(size(names))
-    type(stop_rule_t) :: rule
-    integer :: k
 
-    alone = stop_settings_t(never, most, never, most, 0.0_real64, never)
-    alone(1)%time = rules%time
-    alone(2)%collisions = rules%collisions
-    alone(3)%collisions_per_disk = rules%collisions_per_disk
-    alone(4)%events = rules%events
-    alone(5)%energy_fraction = rules%energy_fraction
-    later(1) = written(merge(2*sim%time(), 1.0_real64, sim%time() > 0))
-    later(2) = written(max(2*sim%collisions, 1_int64))
-    later(3) = written(max(4*sim%collisions/real(sim%n_disks(), real64), 1.0_real64))
-    later(4) = written(max(2*sim%events, 1_int64))
-    later(5) = written(rules%energy_fraction/2)
-    options = ""
-    do k = 1, size(names)
-      rule = stop_rule_t(alone(k), sim)
-      if (rule%met(sim)) options = options//" --set stop."//trim(names(k))//"="//trim(later(k))
-    end do
+    options = proposal(stop_settings_t(time=rules%time), "time", written(merge(2*sim%time(), 1.0_real64, sim%time() > 0))) &
+      //proposal(stop_settings_t(collisions=rules%collisions), "collisions", written(max(2*sim%tally%collisions, 1_int64))) &
+      //proposal(stop_settings_t(collisions_per_disk=rules%collisions_per_disk), "collisions_per_disk", &
+      written(max(4*sim%tally%collisions/real(sim%n_disks(), real64), 1.0_real64))) &
+      //proposal(stop_settings_t(events=rules%events), "events", written(max(2*sim%tally%events, 1_int64))) &
+      //proposal(stop_settings_t(energy_fraction=rules%energy_fraction), "energy_fraction", written(rules%energy_fraction/2))
+
+  contains
+
+    !> The option that sets a variable to another value, if its rule alone has ended the run.
+    pure function proposal(alone, name, later) result(option)
+      type(stop_settings_t), intent(in) :: alone
+      character(len=*), intent(in) :: name, later
+      character(len=:), allocatable :: option
+      type(stop_rule_t) :: rule
+
+      option = ""
+      rule = stop_rule_t(alone, sim)
+      if (rule%met(sim)) option = " --set stop."//name//"="//later
+    end function proposal
   end function later_rules
 
   !> Warns of what is legal but rarely meant.
@@ -184,12 +197,14 @@ contains
     integer(int64) :: collisions
     real(real64) :: cpu(2)                                 ! [s]
 
-    collisions = run%sim%collisions
+    collisions = run%sim%tally%collisions
     call cpu_time(cpu(1))
+    call spend_time_on(part_events)
     call run%evolution%start(run%sim)
     call main_loop(run, error)
     call cpu_time(cpu(2))
-    run%rate = (run%sim%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    call spend_time_on(part_end)
+    run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     deallocate (run%evolution)                             ! the end of the output needs room
   end subroutine follow
 
@@ -198,23 +213,28 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    integer(int64) :: turns
+    integer(int64) :: turns, kicks
     integer :: requests, requests_served
     logical :: stopping
-    real(real64) :: now, before, next_checkpoint      ! [s]
+    real(real64) :: now, next_checkpoint              ! [s]
     real(real64) :: first_time                        ! of the simulation [time]
 
     turns = 1
     requests_served = 0
     first_time = run%sim%time()
-    before = seconds()
-    next_checkpoint = before + run%input%settings%output%checkpoint_every
+    next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
     call run%line%start(run%sim, run%stop_rule, run%started)
     do while (.not. is_over(run))
       limits = run%stop_rule%limits
       limits%turns = turns
       call run%output%tighten(limits)
+      now = seconds()
+      kicks = run%sim%kicks
+      call spend_time_on(part_events)
       call run%evolution%advance(run%sim, limits, error)
+      call spend_time_on(part_samples)
+      turns = adapted(turns, seconds() - now, limits%reached(run%sim%tally) .or. run%sim%time() >= limits%time &
+        .or. run%sim%kicks > kicks)
       call run%output%write_events(run%sim, run%evolution%log)
       if (allocated(error)) exit
       call run%output%write_what_is_due(run%sim, error)
@@ -235,8 +255,6 @@ contains
         next_checkpoint = seconds() + run%input%settings%output%checkpoint_every     ! after a write, however slow
       end if
       call run%line%report(run%sim, run%stop_rule)
-      turns = adapted(turns, now - before)
-      before = now
     end do
     call run%line%clear()
   end subroutine main_loop
@@ -269,14 +287,16 @@ contains
       (run%evolution%idle .and. .not. run%stop_rule%limits%time < never)
   end function is_over
 
-  !> The number of turns that take about `pause_interval`.
-  pure function adapted(turns, elapsed) result(n)
+  !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
+  !> would have any number of them, and when the samples cease it would not look up for hours.
+  pure function adapted(turns, elapsed, cut_short) result(n)
     integer(int64), intent(in) :: turns
-    real(real64), intent(in) :: elapsed               !! for these turns [s]
+    real(real64), intent(in) :: elapsed               !! for these turns, or some of them [s]
+    logical, intent(in) :: cut_short                  !! something was due before they were over
     integer(int64) :: n
 
     n = turns
-    if (elapsed < 0.5_real64*pause_interval) n = min(2*turns, 2_int64**40)
+    if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*turns, 2_int64**40)
     if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
   end function adapted
 
@@ -288,15 +308,17 @@ contains
     associate (sim => run%sim)
       text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
-        eol//"collisions = "//written(sim%collisions)// &
-        eol//"wall_collisions = "//written(sum(sim%wall_collisions))// &
-        eol//"obstacle_collisions = "//written(sim%obstacle_collisions)// &
+        eol//"collisions = "//written(sim%tally%collisions)// &
+        eol//"wall_collisions = "//written(sum(sim%tally%surface(:n_sides)%collisions))// &
+        eol//"obstacle_collisions = "//written(sum(sim%tally%surface(n_sides + 1:)%collisions))// &
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
         eol//"total_energy = "//written(total_energy(sim))// &
-        eol//"dissipated_energy = "//written(sim%dissipated%value())// &
+        eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
+      if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
+        eol//"drive_energy = "//written(sim%tally%total(drive_energy))
     end associate
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary

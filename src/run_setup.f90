@@ -3,6 +3,7 @@
 module run_setup
   use all_pairs, only: all_pairs_t
   use cell_grid, only: cell_grid_t
+  use driven_evolution, only: driven_evolution_t
   use errors, only: error_t, exit_files, exit_usage
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t, log_capacity
@@ -16,8 +17,8 @@ module run_setup
   use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
-  use run_input, only: run_input_t
-  use settings, only: settings_t
+  use settings, only: run_input_t, settings_t
+  use sheared_cells, only: sheared_cells_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: text_t
@@ -77,6 +78,7 @@ contains
     type(event_driven_t), allocatable :: events
     type(parallel_events_t), allocatable :: parallel
     type(time_stepped_t), allocatable :: steps
+    type(driven_evolution_t), allocatable :: driven
     logical :: cuts_space
 
     cuts_space = settings%wants_domains()
@@ -89,7 +91,11 @@ contains
     else
       allocate (events)
       if (settings%run%search == "cells") then
-        allocate (cell_grid_t :: events%search)
+        if (settings%box%is_sheared()) then
+          allocate (sheared_cells_t :: events%search)
+        else
+          allocate (cell_grid_t :: events%search)
+        end if
       else
         allocate (all_pairs_t :: events%search)
         events%search%everyone = settings%run%search == "rescan"
@@ -103,6 +109,11 @@ contains
       else
         call move_alloc(events, evolution)
       end if
+    end if
+    if (settings%drive%is_on()) then
+      allocate (driven)
+      call move_alloc(evolution, driven%free)
+      call move_alloc(driven, evolution)
     end if
     if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution

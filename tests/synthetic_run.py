@@ -11,7 +11,10 @@ import numpy as np
 from ricochet.script import launch
 
 ROOT = Path(__file__).resolve().parents[1]
-SCRIPTS = sorted(path.stem for path in (ROOT / "post").glob("*.py"))
+#: Those that read runs; the laboratory makes them.
+SCRIPTS = sorted(
+    path.stem for path in (ROOT / "post").glob("*.py") if "command_line(" in path.read_text()
+)
 
 
 def text(value: str) -> np.bytes_:

@@ -57,6 +57,29 @@ def same(a, b) -> bool:
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
+def imbalance(path: Path) -> float:
+    """How far the energy is from what was given and lost, in parts of the greatest of them.
+
+    What cancels counts in full: kinetic and potential energy, and kicks of noise whose momentum is
+    taken back.
+    """
+    with h5py.File(path) as file:
+        found = {
+            name: file[f"observables/{name}/value"][:]
+            for name in ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
+            if f"observables/{name}" in file
+        }
+        drive = file["parameters/drive"].attrs if "parameters/drive" in file else {}
+        kick = drive.get("strength", 0) * drive.get("interval", 0)
+        mass = file["particles/disks/mass"][:]
+        kinetic = len(mass) * file["observables/all/kinetic_energy/value"][:]  # a mean in the file
+    signs = {"total_energy": 1, "dissipated_energy": 1}
+    balance = sum(signs.get(name, -1) * values for name, values in found.items())
+    parts = [kinetic, found["total_energy"] - kinetic, *found.values()]
+    most = max([kick * mass.max(), *(abs(values).max(initial=0) for values in parts)])
+    return np.ptp(balance) / most if most else 0.0
+
+
 def committed(path) -> dict[str, np.ndarray]:
     """Frames and observables of a file that may still be written, as far as they are committed."""
     found = {}
@@ -141,8 +164,10 @@ def has_ended(process) -> bool:
 def let_work(process, seconds=0.0):
     """Returns when a run can be stopped and has used so much processor time, or has ended."""
     wait_for(
-        lambda: has_ended(process)
-        or (heeds(process.pid, signal.SIGTERM) and processor_time(process.pid) >= seconds)
+        lambda: (
+            has_ended(process)
+            or (heeds(process.pid, signal.SIGTERM) and processor_time(process.pid) >= seconds)
+        )
     )
 
 
@@ -152,6 +177,20 @@ def held(process):
     process.send_signal(signal.SIGSTOP)
     yield
     process.send_signal(signal.SIGCONT)
+
+
+@contextlib.contextmanager
+def filled_pipe():
+    """A pipe that takes nothing any more: whoever reads it has stopped reading."""
+    outlet, inlet = os.pipe()
+    os.set_blocking(inlet, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(inlet, b"x" * 4096)
+    os.set_blocking(inlet, True)
+    yield inlet
+    os.close(inlet)
+    os.close(outlet)
 
 
 def processor_time_of(process) -> float:

@@ -18,14 +18,16 @@ function begin() {
 
 // What depends on the frames that there are.
 function prepareFilm() {
-  sums = null;
+  sums = crossings = null;
   counted = kinds.map((_, s) => s).filter(s => film.speeds.counts[0][s].length);
-  coming.shown = film.exact;
+  coming.shown = film.exact && !film.kicked;
   $('coming').hidden = !coming.shown;
   $('speeds').hidden = !counted.length;
+  $('pressures').hidden = !film.pressure;
   $('now').parentElement.hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed. Curves: Maxwell’s law at the mean kinetic energy of the species.';
   $('guess').hidden = !film.guesses.some(count => count);
+  $('event').hidden = !turning.length;
 }
 
 // How far apart the curves of the species would lie: largest over smallest energy, multiplied by these numbers.
@@ -50,15 +52,16 @@ function show(time, anew = false) {
   told = performance.now();
   $('cursor').style.transform = `translateX(${cursorAt(moment.time)}px)`;
   drawHistogram(moment.frame);
-  tellEnergies(moment.frame);
+  tellEnergies();
+  drawPressure();
   tell();
   tellQueue();
 }
 
 function layout() {
+  if (!film) return;  // it is still to come
   layOutStage();
-  layOutPlot($('histogram'), 190);
-  layOutPlot($('energy'), 170);
+  for (const name of ['histogram', 'energy', 'pressure']) layOutPlot($(name), plotHeight(name));
   layEnergyOut();
   show(moment.time, true);
 }
@@ -74,12 +77,14 @@ function refresh() {
     follow: camera.follow >= 0,
   });
   const speed = 10 ** +$('pace').value;
-  $('times').textContent = `×${+speed.toPrecision(2)} (${short(+(pace * speed).toPrecision(2))} t/s)`;
-  $('times').title = `${short(pace * speed)} time units of the run per second`;
+  const perSecond = short(+(pace * speed).toPrecision(2));
+  $('times').innerHTML = `×${+speed.toPrecision(2)} (${perSecond} time unit${perSecond === '1' ? '' : 's'} per second)`;
   layout();
 }
 
 // ---------- time ----------
+
+const paceNow = () => live.on && live.newest ? live.pace : pace * 10 ** +$('pace').value;
 
 function play(on) {
   if (state.playing === on) return;
@@ -97,12 +102,13 @@ function play(on) {
     if (!state.playing) return;
     const passed = Math.min(0.1, Math.max(0, stamp - before) / 1000);
     before = stamp;
-    show(moment.time + passed * pace * 10 ** +$('pace').value);
+    show(moment.time + passed * paceNow());
     if (moment.time === last() && !live.on) play(false); else requestAnimationFrame(tick);
   });
 }
 
 function go(time) {
+  follow(false);
   play(false);
   show(time, true);
   remember();
@@ -199,13 +205,13 @@ function on(id, action) { $(id).addEventListener('click', action); }
 
 const turn = (name, value) => () => { state[name] = value ?? !state[name]; refresh(); };
 const actions = {
-  play: () => play(!state.playing), first: () => step(0), last: () => step(frames - 1), back, next: () => step(moment.frame + 1),
+  play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => go(nextTurn()),
   clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), now: turn('sofar', false), sofar: turn('sofar', true),
   mean: turn('total', false), total: turn('total', true), nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
   whole: () => { lookAtAll(); look(); }, full: fullScreen, theme: () => { theme(!dark()); refresh(); },
 };
 const keys = {
-  ' ': 'play', ArrowLeft: 'back', ArrowRight: 'next', Home: 'first', End: 'last', '+': 'nearer', '=': 'nearer', '-': 'farther',
+  ' ': 'play', ArrowLeft: 'back', ArrowRight: 'next', n: 'event', Home: 'first', End: 'last', '+': 'nearer', '=': 'nearer', '-': 'farther',
   0: 'whole', f: 'full', v: 'arrows',
 };
 
@@ -215,7 +221,7 @@ function listen() {
   for (const [id, action] of Object.entries(actions)) on(id, action);
   $('full').hidden = !document.fullscreenEnabled;
   $('scrub').addEventListener('input', () => go(first() + $('scrub').value * (last() - first())));
-  $('pace').addEventListener('input', refresh);
+  $('pace').addEventListener('input', () => { follow(false); refresh(); });
   $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
   const stage = $('stage');
   stage.addEventListener('pointerdown', event => {

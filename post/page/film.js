@@ -5,11 +5,16 @@
 const $ = id => document.getElementById(id);
 let film, frames, disks, kinds;  // facts; the number of frames, of disks; species
 let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the box
-let speciesOf, sizeOf;           // by disk
+let speciesOf, sizeOf, masses;   // by disk
+let origins;                     // x1 y1 x2 y2 ... where displacements count from, in units of the box
 let codes, viridis;              // places on the colour scales, frame by frame; the colours of the scale
+let angles;                      // orientations frame by frame, not wrapped; none if disks have none
 let shifts;                      // periods crossed since the frame before, x + 8 and y + 8 in four bits each
 let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, x, y in the box
+let gains;                       // kinetic energy that the disk has from each of them
 let guessed, guessedRow;         // bits, gap by gap: disks whose paths there are not known; bytes of a gap
+let headings, headingsStart;     // of these disks in the frame before, a full turn in 256 parts; first one of each gap
+let moments;                     // times of all collisions of two disks, if they are known
 
 function load({ facts, blocks }) {
   const bytes = name => {
@@ -27,11 +32,18 @@ function load({ facts, blocks }) {
   grain = film.exact ? 1 : 65535;
   codes = Object.fromEntries(Object.keys(film.scales).map(name => [name, bytes(name)]));
   viridis = bytes('palette');
+  angles = blocks.angles && new Float32Array(bytes('angles').buffer);
   shifts = blocks.shifts && bytes('shifts');
   gapStart = [0];
   new Uint32Array(bytes('gaps').buffer).forEach((count, gap) => gapStart.push(gapStart[gap] + count));
   turning = new Uint32Array(bytes('turning').buffer);
-  turns = new (film.exact ? Float64Array : Float32Array)(bytes('turns').buffer);
+  [turns, gains] = ['turns', 'gains'].map(name => new (film.exact ? Float64Array : Float32Array)(bytes(name).buffer));
+  headings = bytes('headings');
+  headingsStart = [0];
+  film.guesses.forEach((count, gap) => headingsStart.push(headingsStart[gap] + count));
+  moments = new Float64Array(bytes('moments').buffer);
+  masses = new Float32Array(bytes('mass').buffer);
+  origins = new Float32Array(bytes('origins').buffer);
   guessed = bytes('guessed');
   guessedRow = Math.ceil(disks / 8);
 }

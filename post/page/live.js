@@ -1,30 +1,66 @@
 // ---------- a run that goes on ----------
 
 // A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
-const live = { on: false, stamp: '' };
+// The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
+const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
 
 async function ask() {
   const answer = await fetch('film?known=' + encodeURIComponent(live.stamp)).catch(() => null);
   const news = answer?.ok ? await answer.text() : null;
   if (news) receive(JSON.parse(news));
-  if (news === null) $('live').textContent = 'No answer: player.py has ended. The film stays as it is.';
+  if (news === null) $('live').textContent = 'No answer: the server has ended. The film stays as it is.';
   if (!live.on) return;
   setTimeout(ask, news === null ? 5000 : 1500);
 }
 
 function receive(news) {
   const started = live.stamp !== '', { time } = moment, own = started ? kinds.map(kind => kind.own) : [];
+  const now = performance.now(), taken = Math.min(10, (now - live.heard) / 1000);
+  live.heard = now;
   load(news);
   kinds.forEach((kind, s) => { kind.own = own[s]; });
   live.stamp = news.stamp;
   live.on = !news.end;
   $('warning').textContent = news.end ? news.warning : '';
-  $('live').textContent = news.end ? `The run ${news.end}, at t = ${short(last())}.` : `Live: the run is at t = ${short(last())}.`;
+  live.pace = started ? (last() - time) / taken : 0;
+  tellLive(news.end);
   if (!started) begin();
   else prepareFilm();
   move(started ? time : last());
   refresh();
   if (!started) play(true);
+}
+
+function tellLive(end) {
+  $('live').textContent = end ? `The run ${end}, at t = ${short(last())}.` : live.on ? `Live: the run is at t = ${short(last())}; `
+    + (live.newest ? 'the film follows it.' : 'End follows it.') : '';
+}
+
+// Follow the newest frame, or leave it.
+function follow(newest) {
+  if (!live.on) return;
+  live.newest = newest;
+  tellLive('');
+  if (newest) { show(last(), true); play(true); }
+}
+
+// ---------- a part of another page ----------
+
+// The laboratory shows runs side by side: what is chosen in one of them can be chosen in the others.
+const isPart = parent !== window;
+document.documentElement.classList.toggle('part', isPart);
+
+function choices(wish) {
+  if (wish) {
+    const { pace: own, speed, colour, ...rest } = wish;
+    pace = own;
+    $('pace').value = speed;
+    if ([...$('colour').options].some(({ value }) => value === colour)) $('colour').value = state.colour = colour;
+    Object.assign(state, rest);
+    refresh();
+  }
+  const { colour, arrows, sofar, total } = state;
+  return { pace, speed: $('pace').value, colour, arrows, sofar, total };
 }
 
 // ---------- here it begins ----------

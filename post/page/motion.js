@@ -1,13 +1,20 @@
 // ---------- where the disks are at a moment ----------
 
 // A gap is the time between two frames. In it a disk flies from one frame to the next, by way of its turns; each
-// flight is straight, or a parabola under gravity. A guessed path is a straight line.
-const moment = { time: 0, frame: 0, gap: 0, share: 0 };
+// flight is straight, or a parabola under gravity. A disk whose path is not known stands still until the next frame;
+// where many do, all stand: the frame is shown as it is.
+const moment = { time: 0, frame: 0, gap: 0, share: 0, known: true, shown: 0, hits: 0, kinetic: [], potential: [] };
+const MANY = 0.1;  // of the disks
 let X, Y, VX, VY;  // of all disks at the moment; inside the box along a periodic axis
+let UX, UY;        // the same places in units of the box, without jumps since the frame before
+let HITS;          // collisions of each disk since the frame before
+let ANCHOR, FALL;  // of its flight: the frame that it begins or ends in, else -1; what the square of its speed has won since
 
 function newMoment() {
-  [X, Y, VX, VY] = Array.from({ length: 4 }, () => new Float64Array(disks));
+  [X, Y, VX, VY, UX, UY, HITS, ANCHOR, FALL] = Array.from({ length: 9 }, () => new Float64Array(disks));
 }
+
+const stands = gap => film.guesses[gap] > MANY * disks;
 
 // The last frame that is not later.
 function frameAt(time) {
@@ -23,33 +30,146 @@ function move(time) {
   moment.time = Math.max(first(), Math.min(last(), time));
   moment.frame = frameAt(moment.time);
   const gap = moment.gap = Math.max(0, Math.min(moment.frame, frames - 2)), next = Math.min(gap + 1, frames - 1);
-  const h = film.time[next] - film.time[gap], u = moment.share = h > 0 ? (moment.time - film.time[gap]) / h : 1;
-  const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic;
-  const gx = film.gravity[0] / width, gy = film.gravity[1] / height, start = 2 * gap * disks, end = 2 * next * disks;
-  for (let i = 0, turn = gapStart[gap], stop = gapStart[next]; i < disks; i++) {
-    let u0 = 0, u1 = 1;
-    let x0 = positions[start + 2 * i] / grain, y0 = positions[start + 2 * i + 1] / grain;
+  const h = film.time[next] - film.time[gap], passed = h > 0 ? (moment.time - film.time[gap]) / h : 1;
+  const u = moment.share = stands(gap) && passed < 1 ? 0 : passed;
+  const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic, [gX, gY] = film.gravity;
+  const gx = gX / width, gy = gY / height, start = 2 * gap * disks, end = 2 * next * disks;
+  const gained = kinds.map(() => 0), fallen = kinds.map(() => 0);  // energy of each species since the frame before
+  const known = moment.known = !film.guesses[gap], falls = gX !== 0 || gY !== 0;
+  let total = 0;
+  moment.shown = film.time[gap] + u * h;
+  for (let i = 0, turn = gapStart[gap], stop = gapStart[next], heading = headingsStart[gap]; i < disks; i++) {
+    const kind = speciesOf[i], xa = positions[start + 2 * i] / grain, ya = positions[start + 2 * i + 1] / grain;
+    const unknown = !known && isGuessed(gap, i), guess = unknown && u < 1;
+    let u0 = 0, u1 = 1, x0 = xa, y0 = ya, hits = 0;
     let x1 = positions[end + 2 * i] / grain, y1 = positions[end + 2 * i + 1] / grain;
     if (shifts && next > gap) {
       const code = shifts[next * disks + i];
       x1 += (code >> 4) - 8;
       y1 += (code & 15) - 8;
     }
+    if (guess) [x1, y1] = [x0, y0];
+    const xb = x1, yb = y1;
     for (; turn < stop && turning[turn] === i; turn++) {
       const t = turns[3 * turn], x = turns[3 * turn + 1], y = turns[3 * turn + 2];
+      if (t <= u) { hits++; gained[kind] += gains[turn]; }
       if (t <= u && t < 1) { u0 = t; x0 = x; y0 = y; } else { u1 = t; x1 = x; y1 = y; break; }
     }
     while (turn < stop && turning[turn] === i) turn++;
-    const span = h * (u1 - u0), free = span > 0, share = free ? (u - u0) / (u1 - u0) : 1;
-    const bend = isGuessed(gap, i) ? 0 : 0.5 * h, both = u - u0 + u - u1, product = h * (u - u0) * (u - u1);
+    const span = h * (u1 - u0), free = span > 0 && !unknown, share = free ? (u - u0) / (u1 - u0) : 1;
+    const bend = guess ? 0 : 0.5 * h, both = u - u0 + u - u1, product = h * (u - u0) * (u - u1);
     let x = x0 + share * (x1 - x0) + bend * gx * product, y = y0 + share * (y1 - y0) + bend * gy * product;
     VX[i] = free ? width * ((x1 - x0) / span + bend * gx * both) : 0;
     VY[i] = free ? height * ((y1 - y0) / span + bend * gy * both) : 0;
+    if (guess) {
+      const angle = 2 * Math.PI * headings[heading++] / 256, speed = codes.speed[gap * disks + i] / 255 * film.scales.speed[1];
+      VX[i] = speed * Math.cos(angle);
+      VY[i] = speed * Math.sin(angle);
+    }
+    UX[i] = x;
+    UY[i] = y;
+    HITS[i] = hits;
+    total += hits;
+    ANCHOR[i] = u0 === 0 ? gap : u1 === 1 ? next : -1;
+    if (falls) {
+      const work = gX * width * (x - xa) + gY * height * (y - ya);
+      fallen[kind] += masses[i] * work;
+      FALL[i] = 2 * (ANCHOR[i] === gap ? work : gX * width * (x - xb) + gY * height * (y - yb));
+    }
     if (wrapX) x -= Math.floor(x);
     if (wrapY) y -= Math.floor(y);
     X[i] = left + width * x;
     Y[i] = bottom + height * y;
   }
+  moment.hits = total;
+  const { frame } = moment, between = known && frame === gap;
+  moment.kinetic = kinds.map((kind, s) => film.kinetic[frame][s] + (between ? (gained[s] + fallen[s]) / kind.count : 0));
+  moment.potential = film.potential && kinds.map((kind, s) => film.potential[frame][s] - (between ? fallen[s] / kind.count : 0));
+}
+
+// How many of these ascending numbers are not larger.
+function upTo(values, value) {
+  let low = 0, high = values.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (values[middle] <= value) low = middle + 1; else high = middle;
+  }
+  return low;
+}
+
+// Collisions per disk: of two disks if the log tells, else those in frames and known turns; null where nothing tells.
+function collisionsNow() {
+  const { collisions } = film.counted, { frame, gap, known } = moment;
+  if (film.counted.with === 'pairs') return collisions[0] + 2 * upTo(moments, moment.shown) / disks;
+  return collisions && collisions[frame] + (known && frame === gap ? moment.hits / disks : 0);
+}
+
+// When a disk next collides with anything, or the next frame where that is not known.
+function nextTurn() {
+  const least = 4 * Number.EPSILON * Math.max(Math.abs(first()), Math.abs(last()));  // lets the moment be not before it
+  for (let gap = frameAt(moment.time); gap < frames - 1; gap++) {
+    const start = film.time[gap], h = film.time[gap + 1] - start, count = gapStart[gap + 1] - gapStart[gap];
+    if (film.guesses[gap]) return film.time[gap + 1];
+    const times = Array.from({ length: count }, (_, k) => start + h * turns[3 * (gapStart[gap] + k)] + least);
+    const soonest = times.reduce((a, b) => b > moment.time && b < a ? b : a, Infinity), alike = (film.exact ? 1e-9 : 1e-6) * h;
+    // The two disks of a collision may have its time with different rounding.
+    if (soonest < Infinity) return times.reduce((a, b) => b <= soonest + alike ? Math.max(a, b) : a, soonest);
+  }
+  return last();
+}
+
+// The periods crossed since the first frame, x1 y1 x2 y2 ..., or nothing without periods; summed up as the film goes on.
+let crossings;
+function crossedUntil(gap) {
+  if (!shifts) return null;
+  if (!crossings || gap < crossings.gap) crossings = { gap: 0, sum: new Int32Array(2 * disks) };
+  while (crossings.gap < gap) {
+    const row = ++crossings.gap * disks;
+    for (let i = 0; i < disks; i++) {
+      crossings.sum[2 * i] += (shifts[row + i] >> 4) - 8;
+      crossings.sum[2 * i + 1] += (shifts[row + i] & 15) - 8;
+    }
+  }
+  return crossings.sum;
+}
+
+// Places 0 to 255 of the disks on a colour scale at the moment.
+function codesNow(name) {
+  const { frame, gap, share } = moment, row = codes[name].subarray(frame * disks, (frame + 1) * disks);
+  if (frame !== gap || !share) return row;
+  const between = codesBetween[name](film.scales[name][1], codes[name]), known = moment.known, result = new Uint8ClampedArray(disks);
+  for (let i = 0; i < disks; i++) result[i] = known || !isGuessed(gap, i) ? 255 * between(i) : row[i];
+  return result;
+}
+
+const codesBetween = {
+  speed: (top, all) => {
+    const { exact } = film, falls = film.gravity.some(Boolean);
+    return i => {
+      const anchor = ANCHOR[i], x = VX[i], y = VY[i];
+      if (exact || anchor < 0) return Math.sqrt(x * x + y * y) / top;
+      const before = all[anchor * disks + i] / 255;
+      return falls ? Math.sqrt(Math.max(0, before * before + FALL[i] / (top * top))) : before;
+    };
+  },
+  displacement: top => {
+    const [width, height] = film.edges, crossed = crossedUntil(moment.gap);
+    return i => {
+      const x = width * (UX[i] + (crossed ? crossed[2 * i] : 0) - origins[2 * i]);
+      const y = height * (UY[i] + (crossed ? crossed[2 * i + 1] : 0) - origins[2 * i + 1]);
+      return Math.sqrt(x * x + y * y) / top;
+    };
+  },
+  collisions: (top, all) => i => {
+    const before = all[moment.gap * disks + i] / 255, scale = Math.log1p(top);
+    return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
+  },
+};
+
+// How far a disk has turned; between frames evenly, as only they know its spin.
+function angleOf(i) {
+  const next = Math.min(moment.gap + 1, frames - 1), start = angles[moment.gap * disks + i];
+  return start + moment.share * (angles[next * disks + i] - start);
 }
 
 // The flights of a disk in a gap, in units of the box: [share of the gap, x, y] of each end, without jumps.
@@ -78,7 +198,7 @@ function flights(i, from, to) {
       const at = (s, start, end, g) => start + s * (end - start) + (straight ? 0 : 0.5 * g * span * span * s * (s - 1));
       const place = s => [at(s, left + width * x0, left + width * x1, film.gravity[0]), at(s, bottom + height * y0, bottom + height * y1, film.gravity[1])];
       const bend = straight ? 0 : (b - a) ** 2 * span * span / 4;
-      result.push({ from: place(a), to: place(b), bend: film.gravity.map(g => bend * g) });
+      result.push({ from: place(a), to: place(b), bend: film.gravity.map(g => bend * g), straight });
     }
   }
   return result;

@@ -9,17 +9,18 @@ const long = value => String(+value.toPrecision(8)).replace('-', '−');
 const remedy = 'output.event_log = .true. in the input would tell them';
 
 function tell() {
-  const { time, frame, gap } = moment, part = frame < frames - 1 ? moment.share : 0;
-  const collisions = film.collisions[frame] + part * ((film.collisions[frame + 1] ?? 0) - film.collisions[frame]);
+  const { time, frame, gap } = moment, collisions = collisionsNow();
   $('scrub').value = (time - first()) / (last() - first() || 1);
-  $('clock').innerHTML = `t = <b>${long(+time.toPrecision(5))}</b> · frame ${frame + 1}/${frames}`
-    + (disks > 1 ? ` · ${short(+collisions.toPrecision(3))} collisions per disk` : '');
+  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · frame ${frame + 1}/${frames}`
+    + (disks > 1 && collisions !== null ? ` · ${short(+collisions.toPrecision(3))} collisions per disk${film.counted.with === 'all' ? ', with walls' : ''}` : '');
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
   const unknown = film.guesses[gap];
   $('guess').textContent = !film.guesses.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
-    : `Here ${unknown} of ${disks} disks fly straight instead of along their true paths, which several collisions bend between two frames`
+    : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
+    : `${stands(gap) ? 'Here the film shows frames as they are' : `Here ${unknown} of ${disks} disks stand until the next frame`}: `
+      + `between two frames ${stands(gap) ? `${unknown} of ${disks} disks` : 'they'} have several collisions that are not in the file`
       + (film.logged ? '.' : `; ${remedy}.`);
 }
 
@@ -51,11 +52,14 @@ function drawLegend() {
 
 // ---------- small plots ----------
 
+// By the style, which knows the size of the screen.
+const plotHeight = name => parseFloat(getComputedStyle($(name)).getPropertyValue('--height')) * innerHeight / 100;
+
 // As wide as there is room; asked for once, for it takes long.
 function layOutPlot(canvas, height) {
   const parent = canvas.parentElement, padding = parent.tagName === 'SECTION' ? 2 * parseFloat(getComputedStyle(parent).paddingLeft) : 0;
   const width = parent.clientWidth - padding;
-  Object.assign(canvas, { width: Math.round(width * page.dots), height: height * page.dots });
+  Object.assign(canvas, { width: Math.round(width * page.dots), height: Math.round(height * page.dots) });
   canvas.style.width = width + 'px';
 }
 
@@ -129,13 +133,12 @@ function speedsNow() {
   const rounding = Math.max(...film.edges) / grain / h;
   if (!share || frame !== gap || film.guesses[gap] || rounding > 1e-3 * film.scales.speed[1]) return { counts: film.speeds.counts[frame], energies: film.kinetic[frame] };
   const bins = film.speeds.edges.length - 1, width = film.speeds.edges[1];
-  const counts = kinds.map(() => new Array(bins).fill(0)), energies = kinds.map(() => 0);
+  const counts = kinds.map(() => new Array(bins).fill(0));
   for (let i = 0; i < disks; i++) {
-    const s = speciesOf[i], square = VX[i] * VX[i] + VY[i] * VY[i], bin = Math.floor(Math.sqrt(square) / width);
-    energies[s] += kinds[s].mass * square / 2 / kinds[s].count;
-    if (bin < bins) counts[s][bin]++;
+    const bin = Math.floor(Math.hypot(VX[i], VY[i]) / width);
+    if (bin < bins) counts[speciesOf[i]][bin]++;
   }
-  return { counts, energies };
+  return { counts, energies: moment.kinetic };
 }
 
 function drawHistogram(frame) {
@@ -204,18 +207,36 @@ function layEnergyOut() {
   const all = [film.kinetic, ...(film.potential ? [film.potential] : [])];
   const values = all.flatMap(series => series.flatMap(row => row.map((e, s) => e * share(s))));
   const low = values.reduce((a, b) => Math.min(a, b), 0), high = values.reduce((a, b) => Math.max(a, b), 0) || 1;
-    const plot = prepare($('energy')), { pen } = plot;
+  const plot = prepare($('energy')), { pen } = plot;
   const { x, y } = axes(plot, [first(), last() > first() ? last() : first() + 1], [low, low + 1.06 * (high - low)], 'time');
   pen.lineWidth = 1.6;
   pen.lineJoin = 'round';
+  const between = energiesBetween(x);
   all.forEach((series, dashed) => kinds.forEach((kind, s) => {
-    pen.setLineDash(dashed ? [4, 3] : []);
-    pen.strokeStyle = css(speciesColour(kind));
-    pen.beginPath();
-    series.forEach((row, k) => pen.lineTo(x(film.time[k]), y(row[s] * share(s))));
-    pen.stroke();
+    const place = ([time, ...energies]) => [x(time), y(energies[dashed][s] * share(s))];
+    const at = k => [film.time[k], film.kinetic[k], film.potential?.[k]];
+    pen.fillStyle = pen.strokeStyle = css(speciesColour(kind));
+    for (const known of [true, false]) {
+      pen.setLineDash(dashed ? [4, 3] : []);
+      pen.globalAlpha = known ? 1 : 0.35;
+      pen.beginPath();
+      for (let gap = 0; gap < frames - 1; gap++) {
+        if (known === !!film.guesses[gap]) continue;
+        pen.moveTo(...place(at(gap)));
+        between[gap]?.forEach(row => pen.lineTo(...place(row)));
+        pen.lineTo(...place(at(gap + 1)));
+      }
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+    if (sparse(x)) for (let k = 0; k < frames; k++) if (film.guesses[k] || film.guesses[k - 1]) {
+      pen.beginPath();
+      pen.arc(...place(at(k)), 2.2, 0, 2 * Math.PI);
+      pen.fill();
+    }
   }));
   pen.setLineDash([]);
+  $('guide').textContent = film.guesses.some(count => count) && sparse(x) ? 'Dots: frames. What happens along the pale lines between them is not in the file.' : '';
   cursorAt = x;
   const heads = ['', 'disks', 'kinetic', ...(film.potential ? ['potential (dashed)'] : [])];
   const table = $('energies');
@@ -232,11 +253,49 @@ function layEnergyOut() {
   });
 }
 
-function tellEnergies(frame) {
+// Whether frames lie so far apart on the axis of time that they can be told from one another.
+const sparse = x => (x(last()) - x(first())) / frames > 6;
+
+// Of each gap with known paths that is several pixels wide, energies pixel by pixel: time, kinetic, potential.
+function energiesBetween(x) {
+  const { time } = moment, rows = [];
+  for (let gap = 0; gap < frames - 1; gap++) {
+    const start = film.time[gap], h = film.time[gap + 1] - start, steps = Math.floor(2 * (x(start + h) - x(start)));
+    if (film.guesses[gap] || steps < 3) continue;
+    rows[gap] = Array.from({ length: steps - 1 }, (_, k) => {
+      move(start + (k + 1) / steps * h);
+      return [moment.time, moment.kinetic, moment.potential];
+    });
+  }
+  move(time);
+  return rows;
+}
+
+function tellEnergies() {
   kinds.forEach((_, s) => {
     const cells = $('energies').rows[s + 1].cells;
-    cells[2].textContent = short(film.kinetic[frame][s] * share(s));
-    if (film.potential) cells[3].textContent = short(film.potential[frame][s] * share(s));
+    cells[2].textContent = short(moment.kinetic[s] * share(s));
+    if (film.potential) cells[3].textContent = short(moment.potential[s] * share(s));
   });
 }
 
+
+// ---------- pressure ----------
+
+// Up to the moment; the rest is still to come.
+function drawPressure() {
+  if (!film.pressure) return;
+  const { time, value } = film.pressure, plot = prepare($('pressure')), { pen } = plot;
+  const high = value.reduce((a, b) => Math.max(a, b), 0) || 1, now = time.findLastIndex(t => t <= moment.time);
+  const { x, y } = axes(plot, [first(), last() > first() ? last() : first() + 1], [0, 1.06 * high], 'time');
+  pen.lineWidth = 1.6;
+  pen.strokeStyle = ink.accent;
+  for (const [from, to, alpha] of [[0, now, 1], [now, time.length - 1, 0.3]]) {
+    pen.globalAlpha = alpha;
+    pen.beginPath();
+    for (let k = Math.max(0, from); k <= to; k++) pen.lineTo(x(time[k]), y(value[k]));
+    pen.stroke();
+  }
+  pen.globalAlpha = 1;
+  $('force').textContent = now < 0 ? '' : short(value[now]);
+}

@@ -82,7 +82,7 @@ function approach(i, gap, horizon) {
 
 function updateQueue() {
   if (!coming.shown) return;
-  const known = moment.time < last() && !film.guesses[moment.gap];
+  const known = moment.time < last() && moment.known;
   const before = coming.list, list = known ? predict() : [];
   const same = (a, b) => a.key === b.key && Math.abs(a.time - b.time) < 1e-6 * (1 + Math.abs(a.time));
   const forward = before.length && moment.time >= coming.time && moment.time <= before[0].time + 1e-3 * (last() - first());

@@ -40,14 +40,17 @@ function layOutStage() {
   stamps = new Map();
 }
 
-// In CSS pixels: beside the controls on a flat screen, else above them.
+// In CSS pixels: beside the controls on a flat screen, else above them. On a telephone the view has no card of its own,
+// and between disks and controls is the histogram.
 function roomOfStage() {
-  const style = getComputedStyle($('view')), full = document.fullscreenElement === $('view');
+  const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
+  const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
-  const width = $('view').clientWidth - inner('paddingLeft') - inner('paddingRight');
+  const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
   const height = innerHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
-  if (style.display === 'grid') return { width: width - Math.max(260, 0.4 * width), height: height - (full ? 0 : 6) };
-  return { width, height: Math.max(full ? 100 : 300, height - $('controls').offsetHeight - 16) };
+  if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
+  const between = bare ? $('speeds').offsetHeight : 0;
+  return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };
 }
 
 function drawStage() {
@@ -131,13 +134,13 @@ const PHASES = 8, LARGEST_STAMP = 16;
 let stamps = new Map();  // by radius
 
 function drawDisks() {
-  const code = codes[state.colour], base = moment.frame * disks, [width, height] = film.edges, wraps = film.periodic.some(Boolean);
+  const code = codes[state.colour] && codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
   const { unit, x: x0, y: y0 } = view, high = page.height, stampOf = radii.map(stampFor);
   const [left, top, right, bottom] = seenBox();
   const clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
   pixels.fill(0);
   for (let i = 0; i < disks; i++) {
-    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], colour = palette[code ? code[base + i] : kind], x = X[i], y = Y[i];
+    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], colour = palette[code ? code[i] : kind], x = X[i], y = Y[i];
     if (!wraps) {
       drawDisk((x - x0) * unit, high - (y - y0) * unit, r, colour, stampOf[size], clip);
       continue;
@@ -214,22 +217,46 @@ function painted(old, colour, covered) {
 // ---------- marks ----------
 
 function drawMarks() {
-  const wanted = state.traced.length || state.arrows || coming.first;
+  const wanted = state.traced.length || state.arrows || coming.first || film.exact || angles;
   if (wanted || marked) marks.clearRect(0, 0, page.width, page.height);
   marked = wanted;
   if (!wanted) return;
   inBox(marks, () => {
+    if (angles) drawRadii();
     state.traced.forEach(drawTrace);
     if (state.arrows) drawArrows();
     if (coming.first) drawNextEvent(coming.first);
+    if (film.exact) drawNumbers();
   });
+}
+
+// A radius of each disk that is large enough for one shows how it turns.
+function drawRadii() {
+  marks.strokeStyle = ink.stage;
+  marks.lineWidth = 1.2 * page.dots;
+  marks.beginPath();
+  for (let i = 0; i < disks; i++) {
+    const length = radii[sizeOf[i]], reach = length / view.unit, angle = angleOf(i);
+    if (length < 3 * page.dots) continue;
+    copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
+      const x = across(X[i] + dx), y = up(Y[i] + dy);
+      marks.moveTo(x, y);
+      marks.lineTo(x + length * Math.cos(angle), y - length * Math.sin(angle));
+    });
+  }
+  marks.stroke();
 }
 
 // Where a disk was in the last frames, the older part pale.
 function drawTrace(i) {
   const recent = film.time[Math.max(0, moment.frame - 30)];
-  drawPath(flights(i, film.time[Math.max(0, moment.frame - 300)], recent), ink.soft, 0.9);
-  drawPath(flights(i, recent, moment.time), ink.ink, 1.6);
+  for (const straight of [0, 1]) {  // dotted where the path is not known
+    const part = (from, to) => flights(i, from, to).filter(flight => flight.straight === straight);
+    marks.setLineDash(straight ? [page.dots, 4 * page.dots] : []);
+    drawPath(part(film.time[Math.max(0, moment.frame - 300)], recent), ink.soft, 0.9);
+    drawPath(part(recent, moment.shown), ink.ink, 1.6);
+  }
+  marks.setLineDash([]);
   marks.lineWidth = 2 * page.dots;
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
 }
@@ -266,8 +293,6 @@ function drawPath(list, colour, width) {
 function drawArrows() {
   const usual = film.scales.speed[1], apart = Math.sqrt(film.edges[0] * film.edges[1] / Math.max(10, disks));
   const length = apart * view.unit / usual / Math.sqrt(camera.zoom);
-  marks.strokeStyle = ink.ink;
-  marks.lineWidth = 1.2 * page.dots;
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
     const vx = VX[i] * length, vy = -VY[i] * length, size = Math.hypot(vx, vy);
@@ -282,5 +307,27 @@ function drawArrows() {
       marks.lineTo(x - head * (vx - 0.5 * vy), y - head * (vy + 0.5 * vx));
     });
   }
-  marks.stroke();
+  for (const [colour, width] of [[ink.stage, 3.2], [ink.ink, 1.4]]) {  // with a rim, to be seen on dark disks, too
+    marks.strokeStyle = colour;
+    marks.lineWidth = width * page.dots;
+    marks.lineCap = marks.lineJoin = 'round';
+    marks.stroke();
+  }
+}
+
+// In disks that have the room, else beside them.
+function drawNumbers() {
+  const code = codes[state.colour] && codesNow(state.colour), least = 7 * page.dots;
+  marks.textAlign = 'center';
+  marks.textBaseline = 'middle';
+  for (let i = 0; i < disks; i++) {
+    const r = radii[sizeOf[i]], inside = r > least, colour = palette[code ? code[i] : speciesOf[i]];
+    const light = (colour & 255) * 0.3 + (colour >> 8 & 255) * 0.59 + (colour >> 16 & 255) * 0.11 > 140;
+    const reach = (r + 2 * least) / view.unit, away = inside ? 0 : r + least;
+    marks.font = `600 ${Math.min(20 * page.dots, Math.max(12 * page.dots, r))}px system-ui, sans-serif`;
+    marks.fillStyle = !inside ? ink.ink : light ? '#101418' : '#ffffff';
+    copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
+      marks.fillText(i + 1, across(X[i] + dx) + away, up(Y[i] + dy) - away);
+    });
+  }
 }

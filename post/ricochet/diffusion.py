@@ -13,6 +13,13 @@ from .statistics import SeriesMean, series_mean
 from .thermodynamics import packing, temperature
 
 
+def lags(frames: int, per_decade: int = 12) -> np.ndarray:
+    """Whole numbers of frames, in logarithmic steps, up to half the run."""
+    last = max(1, frames // 2)
+    count = 1 + int(per_decade * np.log10(last))
+    return np.unique(np.geomspace(1, last, count).round().astype(int))
+
+
 def velocity_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
     """Normalised velocity autocorrelation at lags in frames."""
     v = run.velocity[frames]
@@ -43,6 +50,13 @@ def crossing_time(run: Run) -> float:
     """Time in which sound crosses the box, after which disks feel its size."""
     eta, mass = packing(run), run.mass.mean()
     return float(run.edges.min()) / hard_disks.speed_of_sound(eta, temperature(run), mass)
+
+
+def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
+    """In frames: until sound has crossed the box, or an eighth of the shortest run."""
+    step = runs[0].time[1] - runs[0].time[0]
+    shortest = min(f.stop - f.start for f in frames)
+    return int(np.clip(crossing_time(runs[0]) / step, 2, max(2, shortest // 8)))
 
 
 def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:

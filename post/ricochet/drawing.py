@@ -10,12 +10,13 @@ from textwrap import wrap
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.collections import EllipseCollection
+from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
 from .files import destination
 from .reader import Run, RunError
+from .statistics import kurtosis_noise
 from .structure import bond_order
 
 STYLE = Path(__file__).with_name("style.mplstyle")
@@ -71,6 +72,10 @@ def numbers_of(run: Run) -> dict[str, float]:
         if "packing_fraction" in own:
             own = {name: value for name, value in own.items() if name != "radius"}
         found |= {prefix * (len(run.names) > 1) + name: value for name, value in own.items()}
+    for name in ("left", "right", "bottom", "top"):
+        own = run.parameters.get("side", {}).get(name, {})
+        found |= {f"{name} {variable}": value for variable, value in own.items()}
+    found |= {f"drive {name}": value for name, value in run.parameters.get("drive", {}).items()}
     found["dt"] = run.time_step
     return {
         name: float(value)
@@ -193,10 +198,34 @@ def move_disks(
         collection.set_facecolors(np.asarray(facecolors)[which])
 
 
+def radius_marks(axes: plt.Axes, run: Run, frame: int) -> LineCollection | None:
+    """A radius of each disk that shows how it has turned; None where disks have no orientation."""
+    if "orientation" not in run.elements:
+        return None
+    marks = LineCollection([], colors="black", linewidths=0.6, zorder=1.5)
+    move_marks(marks, run, frame)
+    axes.add_collection(marks)
+    return marks
+
+
+def move_marks(marks: LineCollection, run: Run, frame: int) -> None:
+    """To another frame."""
+    which, places = with_images(run, run.position[frame])
+    angle = run.orientation[frame][which]
+    rim = run.radius[which] * np.array([np.cos(angle), np.sin(angle)])
+    marks.set_segments(np.stack([places, places + rim.T], axis=1))
+
+
 def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
     """A line with its standard error."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
+
+
+def noise_band(axes: plt.Axes, count: int, colour: str) -> None:
+    """Within which a2 of so many speeds lies in 95 % of all cases if they are Maxwellian."""
+    reach = 2 * kurtosis_noise(count)
+    axes.axhspan(-reach, reach, color=colour, alpha=0.12, lw=0, zorder=0)
 
 
 def dilute_limit(axes: plt.Axes, points: np.ndarray, of: str = "") -> None:

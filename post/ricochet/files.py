@@ -54,6 +54,8 @@ def hdf5_file(path: Path) -> h5py.File:
         raise RunError(f"{path}: is a {'folder' if path.is_dir() else 'device'}, not a run")
     try:
         return h5py.File(path, "r", locking=False)
+    except FileNotFoundError:  # it has just been removed, or renamed by the program
+        raise RunError(f"{path}: no such file") from None
     except PermissionError:
         raise RunError(f"{path}: no permission to read") from None
     except OSError:

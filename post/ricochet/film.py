@@ -13,7 +13,9 @@ from .drawing import (
     disk_collection,
     draw_box,
     move_disks,
+    move_marks,
     plt,
+    radius_marks,
     species_colours,
     species_legend,
     values_of,
@@ -55,6 +57,7 @@ def animate(
         return {"array": values_of(run, frame, colour)}
 
     disks = disk_collection(axes, run, run.position[0], **colours_of(0))
+    marks = radius_marks(axes, run, frames[0])
     if colour == "species":
         species_legend(figure, run)
     else:
@@ -67,6 +70,8 @@ def animate(
 
     def show(frame: int) -> None:
         move_disks(disks, run, run.position[frame], **colours_of(frame))
+        if marks is not None:
+            move_marks(marks, run, frame)
         title.set_text(f"{caption([run])},  t = {run.time[frame]:.4g}")
 
     film = FuncAnimation(figure, show, frames, interval=1000 / fps, cache_frame_data=False)

@@ -112,14 +112,31 @@ def cooling_kurtosis(xi: float) -> float:
     return 16 * (1 - xi) * (1 - 2 * xi**2) / (57 - 25 * xi + 30 * xi**2 * (1 - xi))
 
 
+def haff_rate(xi: float) -> float:
+    """-d ln K / d tau, tau collisions per disk, while the gas stays homogeneous."""
+    return float((1 - xi**2) * (1 + cooling_kurtosis(xi) / 4) / 2)
+
+
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
     """K / K0 after tau collisions per disk, while the gas stays homogeneous."""
-    return np.exp(-(1 - xi**2) * (1 + cooling_kurtosis(xi) / 4) * np.asarray(tau) / 2)
+    return np.exp(-haff_rate(xi) * np.asarray(tau))
 
 
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     """K / K0 after the time t, w0 = w at the start; Haff, J. Fluid Mech. 134, 401 (1983)."""
     return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
+
+
+def noise_temperature(
+    strength: float, xi: float, eta: float, diameter: float, mass: float = 1.0
+) -> float:
+    """The kT at which collisions take what noise gives, variance `strength` per time to each v_x.
+
+    Van Noije and Ernst, Granular Matter 1, 57 (1998), for Maxwell's velocities; chi by Henderson.
+    """
+    chi, density = contact_value(henderson(eta), eta), 4 * eta / (math.pi * diameter**2)
+    loss = math.sqrt(math.pi) * (1 - xi**2) * chi * density * diameter
+    return mass * (strength / loss) ** (2 / 3)
 
 
 def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
@@ -132,8 +149,22 @@ def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
 def enskog_viscosity(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
     """Shear viscosity over mass density; Gass, J. Chem. Phys. 54, 1898 (1971)."""
     density = 4 * eta / (math.pi * diameter**2)
-    dilute = 1.022 / (2 * diameter) * math.sqrt(mass * kt / math.pi)
+    dilute = 1.022 / (2 * diameter) * np.sqrt(mass * kt / math.pi)
     return dilute * 2 * eta * (1 / (z - 1) + 1 + 0.8729 * (z - 1)) / (mass * density)
+
+
+def enskog_bulk_viscosity(
+    z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0
+):
+    """Bulk viscosity over mass density, all of it collisional; Gass, as above."""
+    density = 4 * eta / (math.pi * diameter**2)
+    return 4 / math.pi * eta * (z - 1) / diameter * np.sqrt(mass * kt / math.pi) / (mass * density)
+
+
+def enskog_conductivity(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
+    """Heat conductivity, k = 1; Gass, J. Chem. Phys. 54, 1898 (1971)."""
+    dilute = 1.029 * 2 / diameter * np.sqrt(kt / (math.pi * mass))
+    return dilute * 2 * eta * (1 / (z - 1) + 1.5 + 0.8718 * (z - 1))
 
 
 def long_time_tail(time: np.ndarray, density: float, diffusion: float, viscosity: float):

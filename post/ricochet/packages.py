@@ -7,7 +7,8 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-missing = [name for name in ("numpy", "h5py", "matplotlib", "scipy", "tqdm") if not find_spec(name)]
+needed = ("numpy", "h5py", "matplotlib", "scipy", "tqdm")
+missing = [name for name in needed if not find_spec(name)]
 if missing:
     script, root = Path(sys.argv[0]).resolve(), Path(__file__).resolve().parents[2]
     if (root / "Makefile").exists():

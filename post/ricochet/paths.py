@@ -3,7 +3,8 @@
 A flight is known from its two ends, so a path is known by its turns, the collisions between the
 frames.  One collision lies where the flight out of the first frame meets the one into the second.
 Several are those of the event log, gone through from the first frame; that they lead to the second
-is checked.  A path that remains unknown is said to be guessed.
+is checked.  A path that remains unknown is said to be guessed: all of them are where kicks change
+velocities between the collisions.
 """
 
 from collections.abc import Iterator
@@ -18,9 +19,8 @@ import numpy as np
 from .files import RunError
 from .reader import Run
 
+SIDES = ("left", "right", "bottom", "top")
 CLOSE = 1e-3  # radii between where a path leads and where the disk is
-
-
 MOST_AT_ONCE = 200000  # disks of the frames that are read together
 
 
@@ -41,19 +41,29 @@ class Turns:
     disk: np.ndarray  # (M,) indices
     time: np.ndarray  # (M,)
     place: np.ndarray  # (M, 2) without jumps at periodic sides since the first frame
+    gain: np.ndarray  # (M,) change of the kinetic energy of the disk
     guessed: np.ndarray  # (N,) bool: disks whose paths are not known
+
+
+def unknown(guessed: np.ndarray) -> Turns:
+    """No turns: these disks, (N,) bool, have some that nobody knows."""
+    return Turns(np.zeros(0, int), np.zeros(0), np.zeros((0, 2)), np.zeros(0), guessed)
 
 
 @dataclass
 class Flight:
-    """A disk on its way: where it was last known to be, and its collisions so far."""
+    """A disk on its way: where it was last known to be, and its collisions so far.
 
+    A collision is its time, x, y, and the kinetic energy that it gives the disk.
+    """
+
+    mass: float
     time: float
     x: float
     y: float
     vx: float
     vy: float
-    turns: list[tuple[float, float, float]]
+    turns: list[tuple[float, float, float, float]]
 
     def fly(self, time: float, gx: float, gy: float) -> None:
         """On to a later time."""
@@ -64,6 +74,31 @@ class Flight:
         self.vy += t * gy
         self.time = time
 
+    def turn(self, dvx: float, dvy: float) -> None:
+        """Collide, here and now, with this change of velocity."""
+        gain = self.mass * (dvx * (self.vx + 0.5 * dvx) + dvy * (self.vy + 0.5 * dvy))
+        self.vx += dvx
+        self.vy += dvy
+        self.turns.append((self.time, self.x, self.y, gain))
+
+
+def wall_laws(run: Run) -> list[tuple[float, bool]]:
+    """Restitution of each side, obstacle and straight wall, and whether it is smooth; by code."""
+    contact, sides = run.parameters.get("contact", {}), run.parameters.get("side", {})
+    common = (
+        float(contact.get("wall_restitution", 1.0)),
+        contact.get("wall_rule", "velocity") == "normal",
+    )
+    laws = [common] * 4
+    for name, law in sides.items():
+        laws[SIDES.index(name)] = float(law["restitution"]), law["rule"] == "normal"
+    for group, count in (("obstacle", len(run.obstacles)), ("wall", len(run.walls))):
+        table = run.parameters.get(group, {})
+        restitutions = table.get("restitution", [common[0]] * count)
+        smooth = table.get("normal", [common[1]] * count)
+        laws += [(float(xi), bool(flag)) for xi, flag in zip(restitutions, smooth, strict=True)]
+    return laws
+
 
 class Paths:
     """The paths between frames of a run."""
@@ -72,20 +107,28 @@ class Paths:
         """Take what the wall rule needs from the run; give at most so many turns in all."""
         self.most = most
         self.run = run
-        contact = run.parameters.get("contact", {})
-        self.wall_restitution = float(contact.get("wall_restitution", 1.0))
-        self.smooth = contact.get("wall_rule", "velocity") == "normal"
         self.period = np.where(run.periodic, run.edges, np.inf).tolist()
         self.shapes = [*run.obstacles, *run.walls.tolist()]
 
     @cached_property
+    def laws(self) -> list[tuple[float, bool]]:
+        """The wall rules, for logs without changes of momentum."""
+        return wall_laws(self.run)
+
+    @cached_property
     def log(self) -> tuple[np.ndarray, ...] | None:
-        """Time, i, j, impulse of the events, and the collisions of all disks after each."""
+        """Time, i, j and change of the events, and the collisions of all disks after each.
+
+        The change of momentum of disk i is a vector where the log has it, else its magnitude.
+        Not of a sheared box: images that slide are beyond these paths.
+        """
+        if self.run.shear_rate != 0:
+            return None
         try:
-            time, i, j, impulse = self.run.events
+            time, i, j, impulse, vector = self.run.events
         except RunError:
             return None  # a log that is not there, or is damaged, does not stop a film
-        return time, i, j, impulse, np.cumsum(1 + (j > 0))
+        return time, i, j, impulse if vector is None else vector, np.cumsum(1 + (j > 0))
 
     def along(self, frames: list[int]) -> Iterator[Turns]:
         """The turns between each two frames that follow each other in a list."""
@@ -113,6 +156,8 @@ class Paths:
 
     def between(self, a: State, b: State) -> Turns:
         """The turns between two frames."""
+        if self.run.kicked:
+            return unknown(np.ones(self.run.count, bool))
         h, g = b.time - a.time, self.run.gravity
         end = b.position + (b.image - a.image) * self.run.edges
         if a.hits is None:  # a free flight shows in where it leads
@@ -121,7 +166,7 @@ class Paths:
         else:
             hits = b.hits - a.hits
         if hits.sum() > self.most:
-            return Turns(np.zeros(0, int), np.zeros(0), np.zeros((0, 2)), hits > 0)
+            return unknown(hits > 0)
         # The flights before and after a single collision: they meet where turning * after = way.
         turning = a.velocity - b.velocity + h * g
         way = end - a.position - h * (b.velocity - 0.5 * h * g)
@@ -132,19 +177,22 @@ class Paths:
         disk = np.flatnonzero(once)
         t = np.clip(after[disk], 0, h)
         place = a.position[disk] + t[:, None] * (a.velocity[disk] + 0.5 * t[:, None] * g)
-        found, guessed = [(disk, a.time + t, place)], (hits > 0) & ~once
+        before, later = a.velocity[disk] + t[:, None] * g, b.velocity[disk] + (t - h)[:, None] * g
+        gain = 0.5 * self.run.mass[disk] * np.sum(later**2 - before**2, axis=1)
+        found, guessed = [(disk, a.time + t, place, gain)], (hits > 0) & ~once
         if guessed.any() and self.log is not None:
             flights = self.replay(a, b)
             for k in np.flatnonzero(guessed):
                 flight = flights.get(k)
                 if flight and self.arrives(flight, b, k, end[k]):
-                    times, *xy = np.transpose(flight.turns)
-                    found.append((np.full(len(times), k), times, np.transpose(xy)))
+                    times, x, y, gain = np.transpose(flight.turns)
+                    place = np.column_stack([x, y])
+                    found.append((np.full(len(times), k), times, place, gain))
                     guessed[k] = False
-        disk, time, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        order = np.lexsort((time, disk))
-        self.most -= len(disk)
-        return Turns(disk[order], time[order], place[order], guessed)
+        parts = [np.concatenate(part) for part in zip(*found, strict=True)]
+        order = np.lexsort((parts[1], parts[0]))
+        self.most -= len(order)
+        return Turns(*(part[order] for part in parts), guessed)
 
     def arrives(self, flight: Flight, b: State, disk: int, end: np.ndarray) -> bool:
         """Whether a flight by the log leads to the next frame."""
@@ -158,29 +206,33 @@ class Paths:
 
     def replay(self, a: State, b: State) -> dict[int, Flight]:
         """The flights of all disks that collide between two frames, by the event log."""
-        run, (time, i, j, impulse, total) = self.run, self.log
+        run, (time, i, j, changes, total) = self.run, self.log
         if a.hits is None:
             span = slice(*np.searchsorted(time, [a.time, b.time], "right"))
         else:  # which events a frame has seen is clear even if several have the same time
             span = slice(*np.searchsorted(total, [a.hits.sum(), b.hits.sum()], "right"))
         flights = {
-            k: Flight(a.time, *a.position[k].tolist(), *a.velocity[k].tolist(), [])
+            k: Flight(
+                float(run.mass[k]), a.time, *a.position[k].tolist(), *a.velocity[k].tolist(), []
+            )
             for k in {*(i[span] - 1).tolist(), *(j[span][j[span] > 0] - 1).tolist()}
         }
         gravity = run.gravity.tolist()
-        for event in zip(*(part[span].tolist() for part in (time, i, j, impulse)), strict=True):
+        for event in zip(*(part[span].tolist() for part in (time, i, j, changes)), strict=True):
             at, one, other, change = event
-            pair = [(flights[one - 1], float(run.mass[one - 1]))]
+            flight = flights[one - 1]
+            flight.fly(at, *gravity)
             if other > 0:
-                pair.append((flights[other - 1], float(run.mass[other - 1])))
-            for flight, _ in pair:
-                flight.fly(at, *gravity)
-            if other > 0:
-                self.collide(*pair, change)
+                partner = flights[other - 1]
+                partner.fly(at, *gravity)
+            if changes.ndim > 1:
+                flight.turn(*(part / flight.mass for part in change))
+                if other > 0:
+                    partner.turn(*(-part / partner.mass for part in change))
+            elif other > 0:
+                self.collide(flight, partner, change)
             else:
-                self.bounce(*pair[0], other, change)
-            for flight, _ in pair:
-                flight.turns.append((at, flight.x, flight.y))
+                self.bounce(flight, other, change)
         return flights
 
     def nearest(self, dx: float, dy: float) -> tuple[float, float]:
@@ -190,32 +242,27 @@ class Paths:
             dy - py * round(dy / py) if py < np.inf else dy
         )
 
-    def collide(
-        self, one: tuple[Flight, float], other: tuple[Flight, float], change: float
-    ) -> None:
+    def collide(self, a: Flight, b: Flight, change: float) -> None:
         """Two disks get this impulse along the line of their centres."""
-        (a, mass_a), (b, mass_b) = one, other
         dx, dy = self.nearest(b.x - a.x, b.y - a.y)
         along = change / hypot(dx, dy)
-        a.vx -= along * dx / mass_a
-        a.vy -= along * dy / mass_a
-        b.vx += along * dx / mass_b
-        b.vy += along * dy / mass_b
+        a.turn(-along * dx / a.mass, -along * dy / a.mass)
+        b.turn(along * dx / b.mass, along * dy / b.mass)
 
-    def bounce(self, disk: Flight, mass: float, code: int, change: float) -> None:
+    def bounce(self, disk: Flight, code: int, change: float) -> None:
         """A disk leaves a wall by the wall rule; whether elastically shows in the impulse."""
         nx, ny = self.normal(disk, code)
         vn = disk.vx * nx + disk.vy * ny
         tx, ty = disk.vx - vn * nx, disk.vy - vn * ny
 
+        restitution, smooth = self.laws[-code]
+
         def changes(xi: float) -> tuple[float, float]:
-            slower = 0.0 if self.smooth else xi - 1
+            slower = 0.0 if smooth else xi - 1
             return -(1 + xi) * vn * nx + slower * tx, -(1 + xi) * vn * ny + slower * ty
 
-        options = [changes(xi) for xi in (self.wall_restitution, 1.0)]
-        dvx, dvy = min(options, key=lambda v: abs(mass * hypot(*v) - change))
-        disk.vx += dvx
-        disk.vy += dvy
+        options = [changes(xi) for xi in (restitution, 1.0)]
+        disk.turn(*min(options, key=lambda v: abs(disk.mass * hypot(*v) - change)))
 
     def normal(self, disk: Flight, code: int) -> tuple[float, float]:
         """The direction across a side, an obstacle or a straight wall where the disk meets it."""

@@ -45,6 +45,7 @@ class Events(NamedTuple):
     i: np.ndarray  # id of a disk
     j: np.ndarray
     impulse: np.ndarray  # magnitude of the change of momentum
+    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None where it follows from that
 
 
 class Obstacle(NamedTuple):
@@ -86,20 +87,26 @@ class Species(NamedTuple):
 
 @dataclass(frozen=True)
 class Frames:
-    """A per-disk quantity in time, (T, N, ...), read frame by frame when indexed."""
+    """A per-disk quantity in time, read frame by frame when indexed; [:] reads all."""
 
     path: Path
     name: str
-    count: int
+    shape: tuple[int, ...]  # (T, N), or (T, N, 2)
 
     def __len__(self) -> int:
-        return self.count
+        return self.shape[0]
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+        """All frames, for functions of NumPy."""
+        if copy is False:
+            raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
+        return self[:] if dtype is None else self[:].astype(dtype)
 
     def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
         try:
-            chosen = np.arange(self.count)[frame]
+            chosen = np.arange(len(self))[frame]
         except IndexError:
-            raise RunError(f"{self.path}: no frame {frame}, there are {self.count}") from None
+            raise RunError(f"{self.path}: no frame {frame}, there are {len(self)}") from None
         steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
         with open_file(self.path) as file:
             data = find(file, f"{DISKS}/{self.name}/value")
@@ -116,7 +123,7 @@ class Frames:
         return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        return (self[k] for k in range(self.count))
+        return (self[k] for k in range(len(self)))
 
 
 @dataclass(frozen=True)
@@ -129,6 +136,7 @@ class Run:
     velocity: Frames  # (T, N, 2)
     image: Frames | None  # (T, N, 2) how many periods a disk has travelled
     collisions: Frames | None  # (T, N) collisions of any kind since the start
+    elements: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
     species: np.ndarray  # (N,) 1-based
@@ -186,17 +194,46 @@ class Run:
         return 0.5 * self.mass * np.sum(self.velocity[frame] ** 2, axis=-1)
 
     def unwrapped(self, frame: int | slice | list[int]) -> np.ndarray:
-        """(..., N, 2) position with whole periods added: continuous in time."""
+        """(..., N, 2) position with whole periods added: continuous in time.
+
+        In a sheared box (Lees and Edwards) the image above is displaced by gamma L_y t along x.
+        """
         if self.image is None:
             return self.position[frame]
-        return self.position[frame] + self.image[frame] * self.edges
+        image = self.image[frame]
+        place = self.position[frame] + image * self.edges
+        if self.shear_rate != 0:
+            slide = self.shear_rate * self.edges[1] * self.time[frame]
+            place[..., 0] += image[..., 1] * np.asarray(slide)[..., None]
+        return place
 
     def displacement(self, frame: int | slice | list[int], origin: int = 0) -> np.ndarray:
         """(..., N) straight-line distance from the place in the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
+    def element(self, name: str) -> Frames:
+        """(T, N) what only some runs have of each disk, such as 'angular_velocity'."""
+        if name not in self.elements:
+            raise RunError(f"{self.path}: its frames have no {name}")
+        return self.elements[name]
+
+    @property
+    def angular_velocity(self) -> Frames:
+        """(T, N) of disks that can turn."""
+        return self.element("angular_velocity")
+
+    @property
+    def orientation(self) -> Frames:
+        """(T, N) angle to the x axis in radians, not wrapped; of disks that have a direction."""
+        return self.element("orientation")
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(N,) moments of inertia."""
+        return float(self.parameter("contact", "inertia", 0.5)) * self.mass * self.radius**2
+
     def observable(self, name: str) -> Series:
-        """The observable `name`, such as 'total_energy' or 'all/kinetic_energy'."""
+        """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
             group = find(file, f"observables/{name}")
             if group is None or find(group, "value") is None:
@@ -232,7 +269,10 @@ class Run:
             i, j = (rows(file, f"events/{name}", count, kinds="iu") for name in "ij")
             if np.any(i < 1) or np.any(np.maximum(i, j) > self.count):
                 raise Unsound("events of disks that there are not")
-            return Events(time, i, j, impulse)
+            change = find(file, "events/momentum_change")
+            if change is not None:
+                change = rows(file, "events/momentum_change", count, (2,))
+            return Events(time, i, j, impulse, change)
 
     @cached_property
     def collisions_per_disk(self) -> Series:
@@ -263,6 +303,11 @@ class Run:
         return float(self.parameter("run", "dt")) if steps else 0.0
 
     @property
+    def kicked(self) -> bool:
+        """Whether velocities change between collisions, too."""
+        return self.parameter("drive", "kind", "none") != "none"
+
+    @property
     def shortcoming(self) -> str:
         """Why this is not a run that went on until a stop rule was met; empty if it is."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
@@ -275,6 +320,11 @@ class Run:
     def seed(self) -> int:
         """Seed of the random number generator."""
         return int(self.parameter("run", "seed", self.parameters.get("seed", 0)))
+
+    @property
+    def shear_rate(self) -> float:
+        """Gradient along y of the velocity along x; 0 unless the box is sheared."""
+        return float(self.parameter("box", "shear_rate", 0.0))
 
     @property
     def gravity(self) -> np.ndarray:
@@ -316,7 +366,14 @@ def run_of(path: Path, file: h5py.File) -> Run:
     for name, item in {"position": (2,), "velocity": (2,), "image": (2,), "collisions": ()}.items():
         if name in ("position", "velocity") or find(disks, name) is not None:
             numbers(disks, f"{name}/value", count, (disk_count, *item))
-            frames[name] = Frames(path, name, count)
+            frames[name] = Frames(path, name, (count, disk_count, *item))
+    elements = {
+        name: Frames(path, name, (count, disk_count))
+        for name in disks
+        if name not in (*frames, "box") and find(disks, f"{name}/value") is not None
+    }
+    for name in elements:
+        numbers(disks, f"{name}/value", count, (disk_count,))
     box = find(disks, "box")
     parameters, provenance = (
         {} if group is None else tree(group)
@@ -330,6 +387,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         velocity=frames["velocity"],
         image=frames.get("image"),
         collisions=frames.get("collisions"),
+        elements=elements,
         mass=positive(rows(disks, "mass", disk_count), "mass"),
         radius=positive(rows(disks, "radius", disk_count), "radius"),
         species=species,
@@ -351,14 +409,14 @@ def span(values: np.ndarray) -> str:
 
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
-    """The names of the series in a group, and in the groups of the species in it."""
+    """The names of the series in a group, and in its groups: of species, of sides and of each."""
     for name in group:
         item = find(group, name)
         if isinstance(item, h5py.Group):
             if find(item, "value") is not None:
                 yield path + name
-            elif not path:
-                yield from series_in(item, f"{name}/")
+            elif path.count("/") < 2:
+                yield from series_in(item, f"{path}{name}/")
 
 
 def committed(file: h5py.File, group: str, extent: int) -> int:

@@ -9,7 +9,7 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from itertools import groupby
+from itertools import groupby, repeat
 from pathlib import Path
 from typing import NoReturn
 
@@ -76,11 +76,19 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def not_negative(text: str) -> float:
+    """A number on the command line."""
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0 on")
+    return value
+
+
 #: Options that several scripts have (type, value, meaning): a name means the same everywhere.
 OPTIONS = {
     "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "at most this many of the frames, evenly spread"),
-    "skip": (float, "X", "leave out the first X collisions per disk [until nothing drifts]"),
+    "skip": (not_negative, "X", "leave out the first X collisions per disk [until nothing drifts]"),
     "apart": (float, "X", "take frames at least X collisions per disk apart"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
     "colour": (
@@ -249,15 +257,22 @@ def measured(name: str, estimate: Estimate | SeriesMean | None) -> dict[str, flo
 
 
 def without_error(tables: Sequence[Table]) -> list[str]:
-    """Why some errors are not numbers, in at most one sentence."""
+    """Why some numbers have no error, in at most one sentence; where no number is, none is due."""
     names = [
         name.removesuffix("_error")
-        for table in tables
-        for name, values in columns(table).items()
-        if name.endswith("error") and any(isinstance(v, float) and np.isnan(v) for v in values)
+        for table in map(columns, tables)
+        for name, errors in table.items()
+        if name.endswith("error")
+        for values in [table.get(name[: -len("_error")], repeat(None))]
+        if any(is_nan(e) and not is_nan(v) for e, v in zip(errors, values, strict=False))
     ]
     reason = "takes several runs, or more samples in equilibrium"
     return [f"no error of {', '.join(names)}: it {reason}"] if names else []
+
+
+def is_nan(value: object) -> bool:
+    """Whether it is the number that is none."""
+    return isinstance(value, float) and bool(np.isnan(value))
 
 
 def columns(table: Table) -> dict[str, Iterable]:

@@ -9,9 +9,19 @@ from .files import destination
 
 SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads them
 
+#: Columns that the text has under a shorter name.
+TURNING = {"angular_velocity": "omega", "orientation": "angle"}
+
 
 def write_start(
-    path: str | Path, position, velocity=None, radius=None, mass=None, species=None
+    path: str | Path,
+    position,
+    velocity=None,
+    radius=None,
+    mass=None,
+    species=None,
+    angular_velocity=None,
+    orientation=None,
 ) -> Path:
     """Write N disks for `file = 'PATH'` of a species; what is not given the input says.
 
@@ -24,6 +34,9 @@ def write_start(
     if velocity is not None:
         velocity = table("velocity", velocity, len(position), 2)
         columns |= {"vx": velocity[:, 0], "vy": velocity[:, 1]}
+    for name, values in {"angular_velocity": angular_velocity, "orientation": orientation}.items():
+        if values is not None:
+            columns[TURNING[name]] = table(name, values, len(position))
     for name, values in {"radius": radius, "mass": mass}.items():
         if values is not None:
             columns[name] = table(name, values, len(position))

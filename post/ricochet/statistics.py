@@ -221,6 +221,23 @@ def excess_kurtosis(speed: np.ndarray) -> float:
     return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
 
 
+def to_error(mean: float, error: float) -> tuple[str, str]:
+    """Both with the two digits of the error that say something; without an error, six digits."""
+    if not (np.isfinite(error) and error > 0):
+        return f"{mean:.6g}", f"{error:g}"
+    places = max(0, 1 - int(np.floor(np.log10(float(f"{error:.1e}")))))
+    return f"{mean:z.{places}f}", f"{error:.{places}f}"
+
+
+def kurtosis_noise(count: int) -> float:
+    """Standard deviation of `excess_kurtosis` of so many Maxwellian speeds in two dimensions.
+
+    To first order a2 is the mean of x^2 / 2 - 2 x, less its mean, where x = v^2 is exponential with
+    the mean 1: variance 20 / 4 + 4 * 1 - 2 * 4 = 1.
+    """
+    return 1 / np.sqrt(count)
+
+
 def fit_power_law(x: np.ndarray, y: np.ndarray, y_error: np.ndarray) -> PowerLaw | None:
     """Weighted straight line through ln y against ln x; None with fewer than three points.
 

@@ -1,4 +1,4 @@
-"""How disks are arranged: pair correlation, structure factor, order of the bonds.
+"""How disks are arranged: pair correlation, structure factor, clusters, order of the bonds.
 
 A handful of lines of scipy each, and no library: those know periodic boxes, but not walls.
 """
@@ -6,14 +6,22 @@ A handful of lines of scipy each, and no library: those know periodic boxes, but
 import numpy as np
 import scipy
 
+from .files import RunError
 from .reader import Run
 
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
 
 
+def refuse_shear(run: Run) -> None:
+    """The images here do not slide."""
+    if run.shear_rate != 0:
+        raise RunError(f"{run.path}: box.shear_rate is not 0; structure is found in boxes at rest")
+
+
 def pair_correlation(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:
     """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them."""
+    refuse_shear(run)
     r = edges * 2 * run.radius.mean()
     size = np.where(run.periodic, run.edges, 0.0)
     sums = np.zeros(len(edges) - 1)
@@ -34,6 +42,7 @@ def structure_factor(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarr
 
     Periodic boxes.  Of many disks only every so many wave vector along x and y is taken.
     """
+    refuse_shear(run)
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
     step = int(np.ceil(np.sqrt(2 * run.count * np.prod(most + 1) / MOST_TERMS)))
@@ -50,6 +59,20 @@ def structure_factor(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarr
     total, _ = np.histogram(k[known], edges, weights=sums[known] / (run.count * len(frames)))
     number, _ = np.histogram(k[known], edges)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def largest_cluster(run: Run, frame: int, gap: float) -> int:
+    """Disks in the largest cluster: those that hang together by gaps below `gap`."""
+    refuse_shear(run)
+    x = np.clip(run.position[frame] - run.lower, 0, np.nextafter(run.edges, 0))
+    tree = scipy.spatial.cKDTree(x, boxsize=np.where(run.periodic, run.edges, 0.0))
+    i, j = tree.query_pairs(2 * float(run.radius.max()) + gap, output_type="ndarray").T
+    apart = x[i] - x[j]
+    apart -= np.where(run.periodic, run.edges * np.round(apart / run.edges), 0.0)
+    near = np.hypot(*apart.T) < run.radius[i] + run.radius[j] + gap
+    links = scipy.sparse.coo_array((near[near], (i[near], j[near])), shape=(run.count, run.count))
+    _, cluster = scipy.sparse.csgraph.connected_components(links, directed=False)
+    return int(np.bincount(cluster).max())
 
 
 def bond_order(run: Run, frame: int) -> np.ndarray:

@@ -1,9 +1,10 @@
-"""Laws that figures are compared with: speeds, scattering, relaxation of a dilute gas.
+"""Laws that figures are compared with: speeds, scattering, relaxation, chambers.
 
 Two dimensions throughout; u = v / sqrt(2 kT / m) is the reduced speed, x = K / kT = u^2.
 """
 
 import numpy as np
+import scipy
 
 from .statistics import Law
 
@@ -47,3 +48,57 @@ def scattering_angle(b: np.ndarray, mass_ratio: float = np.inf, restitution: flo
     kappa = 0.5 * (1 + restitution) / (1 + 1 / mass_ratio)
     cosine = np.sqrt(1 - b**2)
     return np.arctan2(2 * kappa * b * cosine, 1 - 2 * kappa * cosine**2)
+
+
+# Steady T_rot / T of cooling rough disks, moment of inertia m r^2 / 2, no friction limit, by direct
+# simulation of the Boltzmann equation (10^5 disks, errors 0.002): (xi, beta) -> ratio.
+ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055}
+
+
+def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
+    """A, B, C of the temperatures of rough disks with Maxwell's velocities.
+
+    dT/ds = -2 (A T - B R), dR/ds = 4 (B T - C R) per collision of a disk, T = m <v^2> / 2 and
+    R = I <omega^2>; Luding, Huthmann, McNamara and Zippelius, Phys. Rev. E 57, 3416 (1998).
+    `inertia` is over m r^2.
+    """
+    eta = inertia * (1 + beta) / (2 * inertia + 2)
+    a = (1 - xi**2) / 4 + eta * (1 - eta) / 2
+    return a, eta**2 / (2 * inertia), eta / (2 * inertia) * (1 - eta / inertia)
+
+
+def rough_ratio(xi: float, beta: float, inertia: float) -> float:
+    """R / T that the cooling approaches, for Maxwell's velocities."""
+    a, b, c = rough_rates(xi, beta, inertia)
+    return float(((a - 2 * c) + np.sqrt((a - 2 * c) ** 2 + 8 * b**2)) / (2 * b))
+
+
+def rough_temperatures(
+    tau: np.ndarray, start: tuple[float, float], xi: float, beta: float, inertia: float
+) -> np.ndarray:
+    """(2, ...) T and R after tau collisions per disk."""
+    a, b, c = rough_rates(xi, beta, inertia)
+    values, vectors = np.linalg.eig(np.array([[-2 * a, 2 * b], [4 * b, -4 * c]]))
+    parts = np.linalg.solve(vectors, np.array(start))
+    return vectors @ (parts[:, None] * np.exp(values[:, None] * np.asarray(tau, dtype=float)))
+
+
+def demon_share(climb: float, layers: float, xi: float) -> float:
+    """Share of a dilute gas that lasts in the fuller of two chambers; 1/2 above the threshold.
+
+    A sawtooth floor of velocity V gives n disks of a chamber the power n m g V.  In a column of
+    even temperature collisions take n^2 m g s sqrt(pi) (1 - xi^2) sqrt(T/m) / 2w, s the diameter,
+    w the width, and so T/m = (2 V w / (n s sqrt(pi) (1 - xi^2)))^2.  The flux through a hole at the
+    height h is as n^2 exp(-m g h / T) (J. Eggers, Phys. Rev. Lett. 83, 5322 (1999)), the same both
+    ways in a steady state; even shares grow apart where m g h > T.  `climb` is g h / V^2, `layers`
+    N s / w for all N disks, xi < 1.
+    """
+    steep = climb * np.pi * (layers * (1 - xi**2) / 2) ** 2  # m g h / T of all disks in one chamber
+
+    def excess(odds: float) -> float:  # ln(share / (1 - share))
+        return odds - steep / 2 * np.tanh(odds / 2)
+
+    if steep <= 4:
+        return 0.5
+    odds = scipy.optimize.brentq(excess, np.sqrt(3 * (1 - 4 / steep)), steep / 2)
+    return float(1 / (1 + np.exp(-odds)))

@@ -34,6 +34,15 @@ def loses_energy(run: Run) -> bool:
     return bool(lost > ROUNDING * run.kinetic_energy([0, -1]).sum(axis=1).max())
 
 
+def all_cool(runs: Sequence[Run]) -> bool:
+    """Whether the runs lose energy: all of them, or none."""
+    cool = [loses_energy(run) for run in runs]
+    if any(cool) and not all(cool):
+        lossy, elastic = runs[cool.index(True)], runs[cool.index(False)]
+        raise RunError(f"{lossy.path}: loses energy, {elastic.path} does not: draw them apart")
+    return all(cool)
+
+
 def after_start(run: Run, skip: float | None = None) -> float:
     """The time after `skip` collisions per disk, or else when speeds have forgotten the start.
 
@@ -161,6 +170,14 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
     if min(masses) == max(masses):
         raise RunError(f"{run.path}: needs two species of different mass")
     return int(np.argmin(masses)), int(np.argmax(masses))
+
+
+def mean_free_time(run: Run) -> float:
+    """1 / w, over the whole run."""
+    collisions = run.collisions_per_disk.value[-1]
+    if not collisions > 0:
+        raise RunError(f"{run.path}: has no collisions of two disks yet")
+    return run.time[-1] / collisions
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:

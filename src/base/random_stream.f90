@@ -3,12 +3,15 @@
 !> unrelated streams. A stream is a value: a copy continues with the same numbers as the original.
 !>
 !> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is
-!> not allowed, so sums are formed in two halves.
+!> not allowed, so sums are formed in two halves, and products in a longer integer.
 module random_stream
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, int128, real64
   implicit none
   private
   public :: random_stream_t
+
+  !> What random numbers are drawn for during a run. Those at its start have streams of their own.
+  integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5
 
   integer(int64), parameter :: lower_half = int(z"FFFFFFFF", int64)
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
@@ -18,6 +21,7 @@ module random_stream
     integer(int64) :: word(4) = 0_int64         !! not all zero once seeded
   contains
     procedure :: seed
+    procedure :: seed_draw
     procedure :: draw_word
     procedure :: draw_uniform
     procedure :: draw_index
@@ -45,6 +49,17 @@ contains
       call draw_seed(state, self%word(k))
     end do
   end subroutine seed
+
+  !> Starts the stream of one draw in a run: whoever asks, in whatever order, gets the same numbers.
+  pure subroutine seed_draw(self, number, purpose, id, count)
+    class(random_stream_t), intent(inout) :: self
+    integer(int64), intent(in) :: number        !! the user's seed
+    integer, intent(in) :: purpose              !! thermal_walls, ...
+    integer(int32), intent(in) :: id            !! of the disk
+    integer(int64), intent(in) :: count         !! of draws before, or of what calls for them
+
+    call self%seed(number, [purpose, int(id), int(ibits(count, 0, 31)), int(ibits(count, 31, 31))])
+  end subroutine seed_draw
 
   !> The next 64 random bits.
   pure subroutine draw_word(self, word)
@@ -147,16 +162,17 @@ contains
     c = ior(ishft(high, 32), iand(low, lower_half))
   end function wrapped_sum
 
-  !> a*b modulo 2**64 by binary long multiplication: slow, but only seeding needs it.
+  !> a*b modulo 2**64. In 128 bits the product does not overflow.
   pure function wrapped_product(a, b) result(c)
     integer(int64), intent(in) :: a, b
     integer(int64) :: c
-    integer :: k
+    integer(int128), parameter :: upper_bit = 2_int128**63
+    integer(int128) :: product
 
-    c = 0
-    do k = 0, bit_size(b) - 1
-      if (btest(b, k)) c = wrapped_sum(c, ishft(a, k))
-    end do
+    product = int(a, int128)*int(b, int128)                ! in size at most 2**126
+    product = iand(product, 2*upper_bit - 1)
+    if (product >= upper_bit) product = product - 2*upper_bit
+    c = int(product, int64)
   end function wrapped_product
 
 end module random_stream

@@ -36,9 +36,16 @@ static _Atomic double first_stop_at;
 
 /* How the program ends at a stop signal while there is nothing to lose. */
 static struct {
-    atomic_int code;  /* 0: there is something to lose */
+    atomic_bool at_once;  /* else there is something to lose */
+    int code;
     char message[256];
 } ending;
+
+static void end_at_once(void)
+{
+    (void)!write(STDERR_FILENO, ending.message, strlen(ending.message));
+    _exit(ending.code);
+}
 
 /* Ends the program at once while there is nothing to lose. Else it only records the signal, and the main loop
    acts. Launchers often send a signal twice within moments; a second stop signal that comes later than that ends
@@ -49,9 +56,8 @@ static void note_signal(int number)
     const int kept = errno;
     if (number == SIGUSR1) {
         checkpoint_signals++;
-    } else if (ending.code) {
-        (void)!write(STDERR_FILENO, ending.message, strlen(ending.message));
-        _exit(ending.code);
+    } else if (ending.at_once) {
+        end_at_once();
     } else if (!stop_signal) {
         first_stop_at = system_seconds();
         stop_signal = number;
@@ -73,11 +79,16 @@ void system_watch_signals(void)
     signal(SIGXFSZ, SIG_IGN);
 }
 
+void system_record_signals(void) { ending.at_once = false; }
+
+/* A signal that has been recorded counts, too. */
 void system_end_at_signals(const char *message, int code)
 {
-    ending.code = 0;
+    system_record_signals();
     strncpy(ending.message, message, sizeof ending.message - 1);
     ending.code = code;
+    ending.at_once = true;
+    if (stop_signal) end_at_once();
 }
 
 bool system_stop_requested(void) { return stop_signal != 0; }

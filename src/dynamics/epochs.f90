@@ -1,6 +1,7 @@
 !> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
 !> to go on from it agree.
 module epochs
+  use disks, only: columns, n_columns
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
@@ -27,18 +28,19 @@ contains
     real(real64) :: fastest, mean
     integer(int32) :: i
 
-    mean = magnitude(sim%box%gravity)*minval(sim%disk%radius)
-    fastest = mean
+    mean = magnitude(sim%box%gravity)*minval(sim%disk%radius) + sim%box%highest_speed()**2
+    fastest = max(mean, sim%fastest_drive()**2)
     do i = 1, sim%n_disks()
       associate (v => sim%disk(i)%v)
         mean = mean + dot_product(v, v)/sim%n_disks()
         fastest = max(fastest, dot_product(v, v))
       end associate
     end do
+    mean = mean + sim%fastest_drive()**2
     sim%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
     call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path(sim)))
     sim%last_advance = sim%now
-    sim%events_then = sim%events
+    sim%events_then = sim%tally%events
   end subroutine begin_first_epoch
 
   !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
@@ -68,7 +70,7 @@ contains
 
     sim%epoch_begin = sim%now
     sim%epoch_end = min(sim%now + max(length, shortest*sim%blink), last_time)
-    sim%epoch_events = sim%events
+    sim%epoch_events = sim%tally%events
   end subroutine begin_epoch
 
   !> Ends the epoch now: moves the origin of time to about now, so that times stay small and keep their digits. As
@@ -77,16 +79,19 @@ contains
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
+    integer :: k
 
     if (sim%now - sim%last_advance >= sim%blink) then
       sim%last_advance = sim%now
-      sim%events_then = sim%events
+      sim%events_then = sim%tally%events
     end if
     length = (sim%now - sim%epoch_begin)*min(2.0_real64, &
-      events_per_epoch(sim)/real(max(sim%events - sim%epoch_events, 1_int64), real64))
+      events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
-    sim%disk%clock = sim%disk%clock - shift
+    do k = 1, n_columns
+      if (columns(k)%is_moment .and. sim%has_column(k)) call sim%take_values(k, sim%values_of(k) - shift)
+    end do
     sim%disk%stamp = 0
     sim%now = sim%now - shift
     sim%epoch = sim%epoch + shift
@@ -108,7 +113,7 @@ contains
     logical :: yes
 
     yes = sim%now - sim%last_advance < sim%blink &
-      .and. sim%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
+      .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
 
 end module epochs

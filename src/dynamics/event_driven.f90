@@ -5,6 +5,7 @@
 !> partner's stamp reveals them when they come up, and the disk only predicts again.
 module event_driven
   use kinds, only: int32, int64, real64
+  use box_geometry, only: wall_law
   use calendar, only: most_coming, stages
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
@@ -16,6 +17,8 @@ module event_driven
   use partners, only: is_wall
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
+  use time_use, only: part_epochs, part_events, spend_time_on
+  use wall_hits, only: collide_wall
   implicit none
   private
   public :: event_driven_t
@@ -28,10 +31,13 @@ module event_driven
     class(neighbour_search_t), allocatable :: search
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not the heap alone
+    logical :: thorough = .false.                  !! a collision is more than a change of two velocities
+    logical :: is_part = .false.                   !! of a simulation: only collisions of disks that belong here count
     integer(int64) :: turns_left = 0               !! of those that the last advance was allowed
   contains
     procedure :: start
     procedure :: advance
+    procedure :: renew
     procedure, private :: run_events
     procedure, private :: predict_all
   end type event_driven_t
@@ -55,6 +61,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
 
+    if (.not. self%is_part) sim%box%epoch = sim%epoch
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
@@ -62,6 +69,20 @@ contains
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine rebuild
+
+  !> Predicts the disks anew that have changed; the events of all others that they were to meet are stale.
+  subroutine renew(self, sim, changed)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: changed(:)
+    integer(int32) :: k
+
+    self%idle = .false.
+    do k = 1, size(changed, kind=int32)
+      if (stop_requested()) return                 ! see `advance`
+      call predict(self, sim, changed(k))
+    end do
+  end subroutine renew
 
   !> Executes events until a limit is met. None after a stop has been requested: many predictions take long and are
   !> then left unfinished; the state itself is whole.
@@ -76,27 +97,31 @@ contains
 
     turns = limits%turns
     self%turns_left = turns
+    self%thorough = self%log%is_on() .or. sim%law%rotation .or. sim%law%detailed
+    self%arrived = .false.
     do while (turns > 0)
-      if (limits%reached(sim) .or. self%log%is_full()) return
+      if (limits%reached(sim%tally) .or. self%log%is_full()) return
       if (stop_requested()) return
       t_limit = min(limits%time - sim%epoch, sim%epoch_end)
       pause_at = next_pause(self, sim, limits)
       if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
-      events = sim%events
+      events = sim%tally%events
       call self%run_events(sim, t_limit, pause_at, turns, event)
       self%turns_left = turns
-      if (self%search%everyone .and. sim%events > events) call self%predict_all(sim)
+      if (turns == 0 .and. .not. sim%now < t_limit) turns = 1    ! a sample of this moment waits for all its events
+      if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (.not. event%time <= t_limit) then
         if (event%time /= event%time) &
           call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
-        self%idle = event%time > last_time
+        self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! there images move for ever
         if (allocated(error)) return
         if (self%idle .or. limits%time - sim%epoch <= sim%epoch_end) then
           if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
+          self%arrived = .true.
           return
         end if
         sim%now = max(sim%now, sim%epoch_end)
-      else if (sim%events < most_events(sim)) then
+      else if (sim%tally%events < most_events(sim)) then
         cycle
       end if
       if (stands_still(sim)) then
@@ -104,8 +129,10 @@ contains
           //encounter_text(sim, event%disk, event%partner)//remedy(sim, event%disk, event%partner))
         return
       end if
+      call spend_time_on(part_epochs)
       call move_epoch(sim)
       call rebuild(self, sim)
+      call spend_time_on(part_events)
       if (limits%epochs) return
     end do
   end subroutine advance
@@ -131,7 +158,7 @@ contains
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
       call execute(self, sim, i, code, t)
-      if (sim%events >= pause_at) exit
+      if (sim%tally%events >= pause_at) exit
     end do
     event = event_t(t, i, code)
   end subroutine run_events
@@ -144,9 +171,8 @@ contains
     integer(int64) :: events
 
     events = min(most_events(sim), limits%events, &
-      sim%events + min(limits%collisions - sim%collisions, events_to_look))
-    if (limits%dissipated < huge(limits%dissipated) .or. self%log%is_on() .or. self%search%everyone) &
-      events = sim%events + 1
+      sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
+    if (limits%watches() .or. self%log%is_on() .or. self%search%everyone) events = sim%tally%events + 1
   end function next_pause
 
   !> Prefetches what the next events will read, and pauses soon to do so again.
@@ -160,7 +186,7 @@ contains
       call self%queue%list_coming(sim%tag, stage, n, disks)
       call self%search%read_ahead(sim, stage, disks(:n))
     end do
-    pause_at = min(pause_at, sim%events + events_ahead)
+    pause_at = min(pause_at, sim%tally%events + events_ahead)
   end subroutine read_ahead
 
   !> Executes the event of disk i, and predicts the disks concerned again.
@@ -169,13 +195,16 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code          !! the disk and its partner: see `partners`
     real(real64), intent(in) :: t
+    logical :: counts
 
+    counts = .true.
+    if (self%is_part) counts = self%search%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        if (self%log%is_on() .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
-          call collide(sim, i, code, t, self%log)
+        if (self%thorough .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
+          call collide(sim, i, code, t, counts, self%log)
         else
-          call collide_pair(sim, i, code, t)
+          call collide_pair(sim, i, code, t, counts)
         end if
         call self%queue%forget(code)
         call self%search%predict_both(sim, i, code)
@@ -184,9 +213,13 @@ contains
         return
       end if
     else if (is_wall(code) .and. .not. passes(sim, code)) then
-      call collide(sim, i, code, t, self%log)
+      if (self%thorough) then
+        call collide(sim, i, code, t, counts, self%log)
+      else
+        call collide_wall(sim, i, code, t, counts)
+      end if
     else
-      if (is_wall(code)) call pass_side(sim, i, code)
+      if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)
       call self%queue%schedule(sim%disk, sim%tag, i)
       return
@@ -223,8 +256,13 @@ contains
     character(len=:), allocatable :: text
     real(real64) :: restitution
 
-    restitution = sim%law%wall_restitution
-    if (code > 0) restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+    if (code > 0) then
+      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+    else
+      associate (law => wall_law(sim%box, code))
+        restitution = law%restitution
+      end associate
+    end if
     text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
       //" contact.contact_time (TC model), well below the mean time between collisions"
     if (restitution < 1) text = text//", or raise " &

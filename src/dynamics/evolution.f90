@@ -1,30 +1,41 @@
 !> The seam between the main loop and the ways to move on in time.
 module evolution
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use errors, only: error_t
   use event_log, only: event_log_t
   use simulation_state, only: simulation_t
+  use tally, only: dissipated, tally_t
   implicit none
   private
-  public :: evolution_t, limits_t
+  public :: evolution_t, grown, limits_t
+
+  !> What can end a run besides time and counts, each by its number in `grown`. It must never decrease: a run that is past
+  !> the limit has met it on the way, and goes back to find out in which collision.
+  integer, parameter, public :: energy_lost = 1
+  integer, parameter :: n_grown = 1
 
   !> Where to pause; the first that is met counts. What is not set is out of reach.
   type :: limits_t
     real(real64) :: time = never                         !! since the start of the run
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
-    real(real64) :: dissipated = huge(0.0_real64)        !! [energy]
+    real(real64) :: most(n_grown) = huge(0.0_real64)     !! of what is in `grown`
     logical :: epochs = .false.                          !! whenever the epoch has moved
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
   contains
     procedure :: reached
+    procedure :: outgrown
+    procedure :: watches
   end type limits_t
 
   type, abstract :: evolution_t
     logical :: idle = .false.     !! nothing will ever happen again
+    logical :: arrived = .false.  !! at the limit of time of the last advance, with all that happens up to it behind
     type(event_log_t) :: log      !! collisions to be written; the caller empties it
   contains
     procedure :: warning
+    procedure :: pause_at
+    procedure :: renew
     procedure(start_evolution), deferred :: start
     procedure(advance_evolution), deferred :: advance
   end type evolution_t
@@ -49,15 +60,39 @@ module evolution
 
 contains
 
-  !> Whether a count or the dissipated energy is at its limit. Time is not tested: all that happens at the very
-  !> limit of time belongs to the part before it.
-  pure function reached(self, sim) result(yes)
+  !> What has grown so far.
+  pure function grown(tally) result(values)
+    type(tally_t), intent(in) :: tally
+    real(real64) :: values(n_grown)
+
+    values(energy_lost) = tally%total(dissipated)
+  end function grown
+
+  !> Whether a limit other than that of time is met: all that happens at the very limit of time belongs to the part before.
+  pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
+    type(tally_t), intent(in) :: tally
     logical :: yes
 
-    yes = sim%events >= self%events .or. sim%collisions >= self%collisions .or. sim%dissipated%value() >= self%dissipated
+    yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
+
+  !> Whether a limit of what grows is met.
+  pure function outgrown(self, tally) result(yes)
+    class(limits_t), intent(in) :: self
+    type(tally_t), intent(in) :: tally
+    logical :: yes
+
+    yes = any(grown(tally) >= self%most)
+  end function outgrown
+
+  !> Whether there is such a limit, which any collision may meet.
+  pure function watches(self) result(yes)
+    class(limits_t), intent(in) :: self
+    logical :: yes
+
+    yes = any(self%most < huge(self%most))
+  end function watches
 
   !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.
   pure function warning(self, sim) result(text)
@@ -67,5 +102,23 @@ contains
 
     text = ""
   end function warning
+
+  !> The first moment from a time on at which what happens to all disks can come between two parts of the dynamics.
+  pure function pause_at(self, time) result(t)
+    class(evolution_t), intent(in) :: self
+    real(real64), intent(in) :: time              !! since the start of the run
+    real(real64) :: t                             !! likewise
+
+    t = time
+  end function pause_at
+
+  !> Goes on after the state of some disks has been changed from outside, now.
+  subroutine renew(self, sim, changed)
+    class(evolution_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: changed(:)      !! their numbers
+
+    call self%start(sim)
+  end subroutine renew
 
 end module evolution

@@ -52,7 +52,7 @@ contains
     tag = sim%tag(i)
     sim%tag(i) = sim%tag(k)
     sim%tag(k) = tag
-    if (any(sim%box%periodic)) sim%image(:, [i, k]) = sim%image(:, [k, i])
+    if (size(sim%extra) > 0) sim%extra(:, [i, k]) = sim%extra(:, [k, i])
   end subroutine swap
 
 end module renumbering

@@ -5,22 +5,22 @@
 !> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
-  use evolution, only: limits_t
+  use evolution, only: energy_lost, grown, limits_t
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: stop_rule_t, stop_settings_t
+  public :: stop_rule_t, stop_settings_t, whole_collisions
 
   real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
 
-  !> Rules that are not given are `never` (times), `huge` (counts) or 0 (fraction).
+  !> A rule that is not given is never met.
   type :: stop_settings_t
-    real(real64) :: time
-    integer(int64) :: collisions
-    real(real64) :: collisions_per_disk
-    integer(int64) :: events
-    real(real64) :: energy_fraction
-    real(real64) :: wall_clock                        !! [s]
+    real(real64) :: time = never
+    integer(int64) :: collisions = huge(0_int64)
+    real(real64) :: collisions_per_disk = never
+    integer(int64) :: events = huge(0_int64)
+    real(real64) :: energy_fraction = 0.0_real64
+    real(real64) :: wall_clock = never                !! [s]
   end type stop_settings_t
 
   type :: stop_rule_t
@@ -43,18 +43,25 @@ contains
     type(stop_settings_t), intent(in) :: settings
     type(simulation_t), intent(in) :: sim
     type(stop_rule_t) :: rule
-    real(real64) :: collisions
 
     rule%limits%time = settings%time
-    rule%limits%collisions = settings%collisions
+    rule%limits%collisions = min(settings%collisions, &
+      whole_collisions(0.5_real64*settings%collisions_per_disk*sim%n_disks()))
     rule%limits%events = settings%events
     rule%wall_clock = settings%wall_clock
-    collisions = 0.5_real64*settings%collisions_per_disk*sim%n_disks()
-    if (collisions < 9.0e18_real64) rule%limits%collisions = min(rule%limits%collisions, ceiling(collisions, int64))
-    if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
-    if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. any(sim%law%restitution < 1)) &
-      rule%limits%epochs = .true.
+    if (settings%energy_fraction > 0) rule%limits%most(energy_lost) = (1 - settings%energy_fraction)*sim%start_energy
+    if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. sim%law%loses_energy() &
+      .and. .not. sim%is_driven()) rule%limits%epochs = .true.
   end function new_stop_rule
+
+  !> The first whole number of collisions that reaches a real one, rounding errors aside; huge if there is none.
+  pure function whole_collisions(number) result(n)
+    real(real64), intent(in) :: number
+    integer(int64) :: n
+
+    n = huge(n)
+    if (number < 9.0e18_real64) n = ceiling(number - 4*spacing(number), int64)
+  end function whole_collisions
 
   !> Whether a rule is met, wall clock aside.
   pure function met(self, sim) result(yes)
@@ -62,7 +69,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%time() >= self%limits%time .or. self%limits%reached(sim)
+    yes = sim%time() >= self%limits%time .or. self%limits%reached(sim%tally)
   end function met
 
   !> Whether the motion relative to the common motion had practically died out when the epoch began.
@@ -72,7 +79,7 @@ contains
     logical :: yes
 
     yes = .false.
-    if (self%limits%epochs .and. sim%events > 0 .and. sim%events == sim%epoch_events) &
+    if (self%limits%epochs .and. sim%tally%events > 0 .and. sim%tally%events == sim%epoch_events) &
       yes = relative_energy(sim) <= coldest*sim%start_energy
   end function too_cold
 
@@ -103,9 +110,10 @@ contains
     real(real64) :: done
     real(real64), parameter :: least = 1/never     ! a limit may be 0
 
-    done = max(sim%time()/max(self%limits%time, least), real(sim%collisions, real64)/max(self%limits%collisions, 1_int64), &
-      real(sim%events, real64)/max(self%limits%events, 1_int64), sim%dissipated%value()/max(self%limits%dissipated, least), &
-      elapsed/max(self%wall_clock, least))
+    done = max(sim%time()/max(self%limits%time, least), &
+      real(sim%tally%collisions, real64)/max(self%limits%collisions, 1_int64), &
+      real(sim%tally%events, real64)/max(self%limits%events, 1_int64), &
+      maxval(grown(sim%tally)/max(self%limits%most, least)), elapsed/max(self%wall_clock, least))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share
 

@@ -4,8 +4,10 @@
 !>
 !> As there, a disk's own state changes only at its own collisions, so no error accumulates from step to step.
 module time_stepped
+  use images, only: images_t
   use kinds, only: int32, int64, never, real64
-  use box_geometry, only: box_t, wall_normal
+  use box_geometry, only: box_t, strike_velocity, wall_normal
+  use box_sides, only: bounds
   use disks, only: disk_t
   use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
@@ -14,7 +16,6 @@ module time_stepped
   use near_pairs, only: near_pairs_t
   use pair_lists, only: list_pairs, pair_list_t, places_t
   use partners, only: axis_of, n_sides, nothing, sense_of
-  use shapes, only: nearest_image
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use texts, only: written
@@ -25,6 +26,7 @@ module time_stepped
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
   integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
+  real(real64), parameter :: most_steps = 2.0_real64**53  !! that a real tells apart
   integer(int32), parameter :: many = 5000            !! disks: to test all pairs takes long
 
   type, extends(evolution_t) :: time_stepped_t
@@ -37,7 +39,9 @@ module time_stepped
     type(pair_list_t), private :: contacts
   contains
     procedure :: warning
+    procedure :: pause_at
     procedure :: start
+    procedure :: renew
     procedure :: advance
   end type time_stepped_t
 
@@ -57,6 +61,27 @@ contains
     self%idle = .false.
   end subroutine start
 
+  !> The end of the step that contains a time.
+  pure function pause_at(self, time) result(t)
+    class(time_stepped_t), intent(in) :: self
+    real(real64), intent(in) :: time               !! since the start of the run
+    real(real64) :: t                              !! likewise
+
+    t = time
+    if (time > most_steps*self%dt) return
+    t = steps_taken(time, self%dt)*self%dt
+    if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
+  end function pause_at
+
+  !> Near pairs stay near however fast they become: only what was at rest may move.
+  subroutine renew(self, sim, changed)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: changed(:)
+
+    self%idle = .false.
+  end subroutine renew
+
   !> Takes steps; the k-th is at the time k*dt, wherever this paused before.
   subroutine advance(self, sim, limits, error)
     class(time_stepped_t), intent(inout) :: self
@@ -67,12 +92,14 @@ contains
     integer(int64) :: k, turn
     integer :: logged
 
+    self%arrived = .false.
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
-      if (limits%reached(sim) .or. self%log%is_full()) return
+      if (limits%reached(sim%tally) .or. self%log%is_full()) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
+        self%arrived = .true.
         return
       end if
       if (slow(self, sim)) before = sim
@@ -116,7 +143,7 @@ contains
     logical :: yes
     integer(int32) :: i
 
-    yes = .not. sim%box%falling()
+    yes = .not. (sim%box%falling() .or. any(sim%box%side%motion%travels()))
     do i = 1, sim%n_disks()
       if (.not. yes) return
       yes = .not. any(abs(sim%disk(i)%v) > slowest)
@@ -166,7 +193,7 @@ contains
     type(places_t), intent(inout) :: at
     integer(int32), intent(out) :: outside(*)       !! (disks) the first n count, ascending
     integer(int32), intent(out) :: n
-    real(real64) :: g(2), s
+    real(real64) :: g(2), s, side(2, 2)
     integer(int32) :: i, k, hit
 
     g = box%gravity
@@ -175,7 +202,8 @@ contains
       at%x(i, 1) = flight(disk(i)%x(1), disk(i)%v(1), g(1), s)
       at%x(i, 2) = flight(disk(i)%x(2), disk(i)%v(2), g(2), s)
     end do
-    call mark_outside(size(disk), at%x(:, 1), at%x(:, 2), at%radius, box, outside, n)
+    call bounds(box, t, side(:, 1), side(:, 2))
+    call mark_outside(size(disk), at%x, at%radius, side, box%periodic, outside, n)
     if (n == 0) return
     n = 0
     do k = 1, size(disk, kind=int32)
@@ -186,23 +214,22 @@ contains
   end subroutine fly
 
   !> Marks with 1 the disks that are not between the sides.
-  pure subroutine mark_outside(n, x, y, radius, box, hit, n_hits)
+  pure subroutine mark_outside(n, x, radius, side, periodic, hit, n_hits)
     integer, intent(in) :: n
-    real(real64), intent(in) :: x(n), y(n), radius(n)     !! [length]
-    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: x(n, 2), radius(n)        !! [length]
+    real(real64), intent(in) :: side(2, 2)                !! where they are: by axis, lower and upper [length]
+    logical, intent(in) :: periodic(2)
     integer(int32), intent(out) :: hit(n)
     integer(int32), intent(out) :: n_hits           !! how many
-    real(real64) :: low(2), high(2), inset(2)
+    real(real64) :: inset(2)
     integer :: i
 
-    low = box%lower
-    high = box%upper
-    inset = merge(0.0_real64, 1.0_real64, box%periodic)
+    inset = merge(0.0_real64, 1.0_real64, periodic)
     n_hits = 0
     !GCC$ VECTOR
     do i = 1, n
-      hit(i) = 1 - iand(between(x(i), low(1) + inset(1)*radius(i), high(1) - inset(1)*radius(i)), &
-        between(y(i), low(2) + inset(2)*radius(i), high(2) - inset(2)*radius(i)))
+      hit(i) = 1 - iand(between(x(i, 1), side(1, 1) + inset(1)*radius(i), side(1, 2) - inset(1)*radius(i)), &
+        between(x(i, 2), side(2, 1) + inset(2)*radius(i), side(2, 2) - inset(2)*radius(i)))
       n_hits = n_hits + hit(i)
     end do
   end subroutine mark_outside
@@ -220,22 +247,23 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    real(real64) :: beyond, inset, before(2)
+    real(real64) :: beyond, inset, before(2), low(2), high(2)
     integer(int32) :: side
     integer :: axis
 
+    call bounds(sim%box, sim%now, low, high)
     do side = 0, 1 - n_sides, -1
       axis = axis_of(side)
       inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
       if (sense_of(side) < 0) then
-        beyond = (sim%box%lower(axis) + inset) - self%at%x(i, axis)
+        beyond = (low(axis) + inset) - self%at%x(i, axis)
       else
-        beyond = self%at%x(i, axis) - (sim%box%upper(axis) - inset)
+        beyond = self%at%x(i, axis) - (high(axis) - inset)
       end if
       if (.not. beyond > 0) cycle
       if (passes(sim, side)) then
         before = self%at%centre(i)
-        call pass_side(sim, i, side)
+        call pass_side(sim, i, side, sim%now)
         self%at%x(i, :) = sim%position(i)
         call self%near%shift(i, self%at%centre(i) - before)
       else
@@ -244,15 +272,17 @@ contains
     end do
   end subroutine meet_sides
 
-  !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out. It keeps its position and so its
-  !> potential energy.
+  !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out of it. It keeps its position and so
+  !> its potential energy.
   subroutine meet_wall(self, sim, i, code)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
+    real(real64) :: normal(2)
 
-    if (dot_product(sim%velocity(i), wall_normal(sim%box, code, self%at%centre(i))) < 0) &
-      call collide(sim, i, code, sim%now, self%log)
+    normal = wall_normal(sim%box, code, self%at%centre(i))
+    if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
+      call collide(sim, i, code, sim%now, .true., self%log)
   end subroutine meet_wall
 
   !> Collides the disks i < j, which overlap, if they approach.
@@ -260,11 +290,13 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
+    type(images_t) :: images
     real(real64) :: dx(2)
 
+    images = sim%box%images()
     dx = self%at%centre(j) - self%at%centre(i)
-    dx = dx - nearest_image(dx, self%at%period)
-    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, self%log)
+    dx = dx + images%shift(images%nearest_image(dx))
+    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., self%log)
   end subroutine meet_disk
 
   !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the
@@ -282,14 +314,14 @@ contains
     do i = 1, sim%n_disks()
       speed = max(speed, norm2(sim%velocity(i)))
     end do
-    speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges()))
+    speed = speed + sqrt(2*sum(abs(sim%box%gravity)*sim%box%edges())) + sim%box%highest_speed()
     radius = minval(sim%disk%radius)
     if (speed*self%dt > longest_way*radius) then
       text = "run.dt: at speeds up to "//about(speed)//" a disk moves by "//about(speed*self%dt/radius) &
         //" radii in a step, so that collisions are missed; better: below "//about(longest_way*radius/speed)
     end if
     if (sim%box%falling() .and. sim%law%contact_time <= self%dt &
-      .and. min(minval(sim%law%restitution), sim%law%wall_restitution) < 1) then
+      .and. (any(sim%law%restitution < 1) .or. sim%box%has_lossy_walls())) then
       if (text /= "") text = text//"; "
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
         //"is more than run.dt"

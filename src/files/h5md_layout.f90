@@ -27,6 +27,8 @@ module h5md_layout
   character(len=*), parameter, public :: &
     position = disks_group//"position", &
     velocity = disks_group//"velocity", &
+    angular_velocity = disks_group//"angular_velocity", &
+    orientation = disks_group//"orientation", &
     disk_collisions = disks_group//"collisions", &
     image = disks_group//"image", &
     step_of = "/step", time_of = "/time", value_of = "/value"

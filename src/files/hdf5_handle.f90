@@ -9,14 +9,15 @@ module hdf5_handle
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5pset_userblock_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
-    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f
+    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5dget_space_f, h5dget_storage_size_f, &
+    h5dget_type_f, h5sclose_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tget_size_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
   use system, only: free_bytes, last_problem, move_file, opening_problem
   use texts, only: written
   implicit none
   private
-  public :: hdf5_handle_t, hdf5_version
+  public :: hdf5_handle_t, hdf5_version, is_whole
 
   integer(size_t), parameter :: sieve = 4096      !! size of the buffer that small writes share [bytes]
 
@@ -81,21 +82,32 @@ contains
     text = written(major)//"."//written(minor)//"."//written(release)
   end function hdf5_version
 
-  !> Starts the library, silent on errors, and sets its properties. No file locks: they keep readers out, and a
-  !> reader's lock could stop a run. No exit handler: files are closed by then, or could not be (disk full), and
-  !> it would crash. No links into other files, which may be devices, or not ours to write. Storage of datasets is
-  !> allocated at once, never filled, and has no time stamps, so that the same run gives the same bytes.
-  subroutine prepare(self, access, status)
-    class(hdf5_handle_t), intent(inout) :: self
-    integer(hid_t), intent(out) :: access         !! properties of access to the file
+  !> Starts the library, once in a process: each start takes memory for good. It is silent on errors. No exit handler:
+  !> files are closed by then, or could not be (disk full), and it would crash. No links into other files, which may be
+  !> devices, or not ours to write.
+  subroutine start_library(status)
     integer, intent(out) :: status
+    logical, save :: started = .false.
     logical :: followed
 
+    status = 0
+    if (started) return
     call h5dont_atexit_f(status)
     call h5open_f(status)
     if (status >= 0) call h5eset_auto_f(0, status)
     if (status >= 0) call h5lis_registered_f(h5l_type_external_f, followed, status)
     if (status >= 0 .and. followed) status = forget_link(int(h5l_type_external_f, c_int))
+    started = status >= 0
+  end subroutine start_library
+
+  !> Sets the properties of a file. No file locks: they keep readers out, and a reader's lock could stop a run. Storage
+  !> of datasets is allocated at once, never filled, and has no time stamps, so that the same run gives the same bytes.
+  subroutine prepare(self, access, status)
+    class(hdf5_handle_t), intent(inout) :: self
+    integer(hid_t), intent(out) :: access         !! properties of access to the file
+    integer, intent(out) :: status
+
+    call start_library(status)
     if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
     if (status >= 0) call h5pset_file_locking_f(access, .false., .true., status)
     if (status >= 0) call h5pset_sieve_buf_size_f(access, sieve, status)
@@ -169,6 +181,29 @@ contains
     call self%check(status, "be written")
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
+
+  !> Whether an open dataset that is not in chunks has as many bytes in the file as it says: of a damaged one HDF5 1.10 reads
+  !> what is not there.
+  function is_whole(dataset) result(yes)
+    integer(hid_t), intent(in) :: dataset
+    logical :: yes
+    integer(hid_t) :: space, type
+    integer(hsize_t) :: n, stored
+    integer(size_t) :: bytes                      ! of a value
+    integer :: status, closed
+
+    call h5dget_space_f(dataset, space, status)
+    call h5sget_simple_extent_npoints_f(space, n, status)
+    yes = status < 0 .or. n == 0                  ! for Fortran to have no values is an error
+    if (.not. yes) then
+      call h5dget_type_f(dataset, type, status)
+      call h5tget_size_f(type, bytes, status)
+      call h5dget_storage_size_f(dataset, stored, status)
+      yes = status >= 0 .and. stored == n*int(bytes, hsize_t)
+      call h5tclose_f(type, closed)
+    end if
+    call h5sclose_f(space, closed)
+  end function is_whole
 
   !> Closes the file if it is open; its failure, if any, can still be reported.
   subroutine close_file(self)

@@ -6,11 +6,11 @@ module hdf5_objects
   use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, &
     h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
     h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
-    h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_virtual_f, &
+    h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_chunked_f, h5d_virtual_f, &
     h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
     h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tget_class_f, h5tis_variable_str_f, h5tclose_f, &
     h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
-  use hdf5_handle, only: hdf5_handle_t
+  use hdf5_handle, only: hdf5_handle_t, is_whole
   use kinds, only: int32, int64, real64
   implicit none
   private
@@ -90,6 +90,7 @@ contains
     if (status >= 0 .and. (layout == h5d_virtual_f .or. n_files > 0)) status = -1
     call self%check(status, "be used: "//name//" keeps its values in another file")
     call h5pclose_f(creation, closed)
+    if (status >= 0 .and. layout /= h5d_chunked_f) status = merge(status, -1, is_whole(dataset))
     if (status >= 0 .and. present(like)) then
       call h5dget_type_f(dataset, type, status)
       if (status >= 0) call h5tget_class_f(type, kinds(1), status)

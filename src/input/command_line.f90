@@ -4,11 +4,11 @@ module command_line
   use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
   use hdf5_handle, only: hdf5_version
-  use parameters, only: defaults_text, explain
   use run_files, only: output_of
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t
   use version, only: program_version
+  use variable_help, only: defaults_text, explain
   implicit none
   private
   public :: command_t, read_command_line, parse_arguments, answer, help_text
@@ -82,6 +82,8 @@ contains
     if (command%input == "") then
       call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
     end if
+    if (command%resume .and. command%force) call fail(error, exit_usage, "--resume goes on with a run, --force starts it " &
+      //"over; give one of them")
     if (command%output == "") command%output = default_output(command%input)
     if (.not. allocated(error) .and. output_of(command%output) /= "") call fail(error, exit_usage, "the output " &
       //shown(command%output)//" would have a name that is kept for files of the run with the output " &

@@ -2,15 +2,16 @@
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: contact_law_t, wall_rules
-  use input_obstacles, only: take_obstacles
+  use collisions, only: contact_law_t, wall_law_t, wall_rules
+  use drive, only: active, drive_kinds, drive_t
+  use input_surfaces, only: take_obstacles, take_wall_laws
   use input_problems, only: problem_list_t
   use input_species, only: take_species
   use parameter_values, only: parameter_group_t, range_of
-  use parameters, only: obstacle_groups, row_of, words_of
-  use settings, only: output_settings_t, run_settings_t, settings_t
+  use parameters, only: obstacle_groups, row_of, variables_of, words_of
+  use settings, only: output_settings_t, run_settings_t, settings_t, species_settings_t
   use stop_rules, only: stop_settings_t
-  use texts, only: counted, place_of, written
+  use texts, only: counted, joined, place_of, shown, suggestion, written
   implicit none
   private
   public :: resolve_settings
@@ -25,19 +26,26 @@ contains
     type(parameter_group_t), intent(inout) :: groups(:)   !! those of one name side by side
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
-    integer :: o(2), s(2)
+    type(wall_law_t) :: wall_law                          ! of `&contact`
+    integer :: o(2), s(2), w(2)
 
     o = range_of(groups, obstacle_groups)
+    w = range_of(groups, ["side"])
     s = range_of(groups, ["species"])
     call take_run(groups(place_of("run", groups%name)), settings%run, problems)
     call take_box(groups(place_of("box", groups%name)), settings%box, problems)
     call take_obstacles(groups(o(1):o(2)), settings%box%obstacle, problems)
     call take_species(groups(s(1):s(2)), settings%box, settings%species, problems)
-    call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, problems)
+    call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, wall_law, problems)
+    call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), wall_law, settings%box, problems)
+    call take_drive(groups(place_of("drive", groups%name)), settings%species, settings%drive, problems)
     call take_stop(groups(place_of("stop", groups%name)), settings%stop, problems)
     call take_output(groups(place_of("output", groups%name)), settings%output)
+    call settle_features(settings, problems)
     call check_samples(groups(place_of("output", groups%name)), settings, problems)
+    if (settings%drive%is_on()) call check_drive(groups(place_of("drive", groups%name)), settings, problems)
     call check_end(settings, problems)
+    call check_shear(groups(place_of("box", groups%name)), groups(o(1):o(2))%name, settings, problems)
   end subroutine resolve_settings
 
   !> Title, seed and method.
@@ -67,8 +75,9 @@ contains
     box%lower = group%reals_of("lower")
     box%upper = group%reals_of("upper")
     box%gravity = group%reals_of("gravity")
+    box%shear_rate = group%real_of("shear_rate", 0.0_real64)
     box%periodic = group%values(row_of("box", "boundary"))%texts == "periodic"
-    if (any(box%periodic .and. abs(box%gravity) > 0)) call group%complain("gravity", "acts along a periodic axis, " &
+    if (any(box%periodic .and. abs(box%gravity) > 0)) call group%complain("gravity", "acts along a periodic axis (box.boundary), " &
       //"where disks would fall for ever; make the sides of that axis walls, or set the component to 0", problems)
     do axis = 1, 2
       if (box%lower(axis) >= box%upper(axis)) call group%complain("upper", written(box%upper(axis))// &
@@ -76,20 +85,63 @@ contains
     end do
   end subroutine take_box
 
+  !> What a sheared box cannot have beside its shear.
+  subroutine check_shear(group, obstacles, settings, problems)
+    type(parameter_group_t), intent(in) :: group          !! &box
+    character(len=*), intent(in) :: obstacles(:)          !! names of the groups that describe obstacles
+    type(settings_t), intent(in) :: settings
+    type(problem_list_t), intent(inout) :: problems
+    integer :: k
+
+    if (.not. settings%box%is_sheared()) return
+    if (.not. all(settings%box%periodic)) call refuse("walls: it needs box.boundary = 'periodic', 'periodic'")
+    if (settings%box%falling()) call refuse("box.gravity")
+    do k = 1, size(obstacle_groups)
+      if (any(obstacles == obstacle_groups(k))) call refuse("&"//trim(obstacle_groups(k)))
+    end do
+    if (settings%run%dynamics /= "events") call refuse("run.dynamics = '"//settings%run%dynamics//"'")
+    if (settings%stop%energy_fraction > 0) call refuse("stop.energy_fraction: the shear does work")
+
+  contains
+
+    !> Reports what it does not go with.
+    subroutine refuse(what)
+      character(len=*), intent(in) :: what
+
+      call group%complain("shear_rate", "does not go with "//what, problems)
+    end subroutine refuse
+  end subroutine check_shear
+
   !> Restitution by pair of species, and the rule for walls.
-  subroutine take_contact(group, n, law, problems)
+  subroutine take_contact(group, n, law, wall_law, problems)
     type(parameter_group_t), intent(inout) :: group
     integer, intent(in) :: n                              !! species
     type(contact_law_t), intent(out) :: law
+    type(wall_law_t), intent(out) :: wall_law
     type(problem_list_t), intent(inout) :: problems
     real(real64), allocatable :: pairs(:)
+    character(len=*), parameter :: of_walls(2) = [character(len=27) :: "wall_tangential_restitution", "wall_friction"]
     real(real64) :: restitution
+    integer :: k
 
     restitution = group%real_of("restitution", 1.0_real64)
-    law%wall_restitution = group%real_of("wall_restitution", restitution)
-    law%wall_rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
+    wall_law%restitution = group%real_of("wall_restitution", restitution)
+    wall_law%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
+    law%grip%restitution = group%real_of("tangential_restitution", -1.0_real64)
+    law%grip%friction = group%real_of("friction", law%grip%friction)
+    law%inertia = group%real_of("inertia", 0.5_real64)
+    wall_law%grip%restitution = group%real_of("wall_tangential_restitution", law%grip%restitution)
+    wall_law%grip%friction = group%real_of("wall_friction", law%grip%friction)
+    if (group%given("friction") .and. .not. law%grip%is_rough()) call group%complain("friction", &
+      "has no effect without tangential_restitution, which is -1 (smooth); give it, too", problems)
+    if (group%given("wall_friction") .and. .not. wall_law%grip%is_rough()) call group%complain("wall_friction", &
+      "has no effect without wall_tangential_restitution, which is -1 (smooth); give it, too", problems)
+    do k = 1, 2
+      if (group%given(trim(of_walls(k))) .and. group%text_of("wall_rule") == "velocity") call group%complain( &
+        trim(of_walls(k)), "has no effect with wall_rule = 'velocity'; take wall_rule = 'normal'", problems)
+    end do
     law%contact_time = group%real_of("contact_time", 0.0_real64)
-    call group%put_reals("wall_restitution", [law%wall_restitution])
+    call group%put_reals("wall_restitution", [wall_law%restitution])
     allocate (law%restitution(n, n), source=restitution)
     allocate (pairs, source=group%reals_of("pair_restitution"))
     if (size(pairs) == 0 .or. n == 0) return
@@ -102,6 +154,22 @@ contains
     if (any(law%restitution /= transpose(law%restitution))) call group%complain("pair_restitution", &
       "must be symmetric: the value for species a and b is the value for b and a", problems)
   end subroutine take_contact
+
+  !> What disks can do follows from all that the input says; what excludes each other is refused.
+  subroutine settle_features(settings, problems)
+    type(settings_t), intent(inout) :: settings
+    type(problem_list_t), intent(inout) :: problems
+
+    associate (law => settings%law, box => settings%box)
+      law%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
+        .or. any(settings%species%rotational_temperature >= 0)
+      law%orientation = settings%drive%kind == active
+      law%detailed = law%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor
+      if (settings%stop%energy_fraction > 0 .and. box%gives_energy() .and. .not. box%is_sheared()) &
+        call problems%add(0, "stop.energy_fraction", "cannot be told where walls give energy, by temperature, speed or " &
+        //"motion of &side, &obstacle or &wall; give another rule")
+    end associate
+  end subroutine settle_features
 
   !> What ends the run; at least one rule is needed.
   subroutine take_stop(group, stop_rules, problems)
@@ -116,7 +184,7 @@ contains
     stop_rules%energy_fraction = group%real_of("energy_fraction", 0.0_real64)
     stop_rules%wall_clock = group%real_of("wall_clock", never)
     if (.not. any(group%values%given)) call problems%add(group%line, "stop", "no rule ends the run; give at least " &
-      //"one of time, collisions, collisions_per_disk, events, energy_fraction, wall_clock")
+      //"one of "//joined(variables_of("stop"), ", "))
   end subroutine take_stop
 
   !> What is written, and when.
@@ -127,11 +195,14 @@ contains
     output%frames_every_time = group%real_of("frames_every_time", never)
     output%frames_every_collisions = group%integer_of("frames_every_collisions", unlimited)
     output%frames_every_events = group%integer_of("frames_every_events", unlimited)
+    output%frames_every_collisions_per_disk = group%real_of("frames_every_collisions_per_disk", never)
     output%observables_every_time = group%real_of("observables_every_time", never)
     output%observables_every_collisions = group%integer_of("observables_every_collisions", unlimited)
     output%observables_every_events = group%integer_of("observables_every_events", unlimited)
+    output%observables_every_collisions_per_disk = group%real_of("observables_every_collisions_per_disk", never)
     output%single_precision = group%text_of("precision") == "single"
     output%event_log = group%text_of("event_log") == ".true."
+    output%virial_tensor = group%text_of("virial_tensor") == ".true."
     output%checkpoint_every = group%real_of("checkpoint_every", never)
   end subroutine take_output
 
@@ -157,17 +228,77 @@ contains
       call problems%add(0, "run.dt", written(number)//" steps until stop.time; allowed: up to "//written(most**2))
   end subroutine check_samples
 
+  !> Kind and size of the kicks, and whom they reach.
+  subroutine take_drive(group, species, drive, problems)
+    type(parameter_group_t), intent(inout) :: group
+    type(species_settings_t), intent(in) :: species(:)
+    type(drive_t), intent(out) :: drive
+    type(problem_list_t), intent(inout) :: problems
+    character(len=:), allocatable :: wanted
+    integer :: s
+
+    call group%check_choices(problems)
+    drive%kind = place_of(group%text_of("kind"), words_of(drive_kinds))
+    drive%interval = group%real_of("interval", never)
+    drive%strength = group%real_of("strength", 0.0_real64)
+    drive%keep_momentum = group%text_of("keep_momentum") == ".true."
+    drive%fraction = group%real_of("fraction", 1.0_real64)
+    drive%temperature = group%real_of("temperature", 0.0_real64)
+    drive%speed = group%real_of("speed", 0.0_real64)
+    drive%rotational_diffusion = group%real_of("rotational_diffusion", 0.0_real64)
+    wanted = group%text_of("species")
+    if (wanted == "") return
+    do s = size(species), 1, -1
+      if (species(s)%name == wanted) drive%species = s
+    end do
+    if (drive%species == 0) call group%complain("species", "there is no species "//shown(wanted)//"; " &
+      //suggestion(wanted, species_names(species)), problems)
+  end subroutine take_drive
+
+  !> The names of all species.
+  pure function species_names(species) result(names)
+    type(species_settings_t), intent(in) :: species(:)
+    character(len=40) :: names(size(species))
+    integer :: s
+
+    do s = 1, size(species)
+      names(s) = species(s)%name
+    end do
+  end function species_names
+
+  !> What cannot go together with kicks. Nothing tells when an energy that they change has fallen for good, and a number of
+  !> kicks must be countable.
+  subroutine check_drive(group, settings, problems)
+    type(parameter_group_t), intent(in) :: group          !! &drive
+    type(settings_t), intent(in) :: settings
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), parameter :: most = 1.0e15_real64
+    real(real64) :: number
+
+    if (settings%stop%energy_fraction > 0) call problems%add(0, "stop.energy_fraction", &
+      "cannot be used with drive.kind = '"//group%text_of("kind")//"', as kicks change the energy; give another rule")
+    number = 0
+    if (settings%stop%time < never) number = settings%stop%time/settings%drive%interval
+    if (number > most) call group%complain("interval", &
+      written(number)//" kicks until stop.time; allowed: up to "//written(most), problems)
+  end subroutine check_drive
+
   !> Whether the run can end at all: one disk meets no other, and elastic collisions cost no energy.
   subroutine check_end(settings, problems)
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
     logical :: by_collisions
 
-    associate (stop_rules => settings%stop, law => settings%law)
-      if (min(stop_rules%time, stop_rules%wall_clock) < never .or. stop_rules%events < unlimited) return
+    associate (stop_rules => settings%stop, law => settings%law, box => settings%box)
+      if (min(stop_rules%time, stop_rules%wall_clock) < never) return
+      if (settings%drive%is_on() .and. settings%n_disks() == 1 .and. all(box%periodic) .and. box%n_obstacles() == 0) &
+        call problems%add(0, "stop", "a single disk that is kicked (drive.kind) in a periodic box meets nothing, for ever; " &
+        //"give time")
+      if (stop_rules%events < unlimited) return
       by_collisions = stop_rules%collisions < unlimited .or. stop_rules%collisions_per_disk < never
-      if (stop_rules%energy_fraction > 0) then
-        if (by_collisions .or. any(law%restitution < 1) .or. law%wall_restitution < 1) return
+      if (stop_rules%energy_fraction > 0 .and. .not. settings%drive%is_on()) then
+        if (by_collisions .or. law%loses_energy() .or. box%has_lossy_walls() &
+          .or. box%gives_energy()) return
         call problems%add(0, "stop.energy_fraction", &
           "is never reached by elastic collisions; give another rule, or a restitution below 1")
       else if (by_collisions .and. settings%n_disks() == 1) then

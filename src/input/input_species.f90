@@ -7,7 +7,7 @@ module input_species
   use name_index, only: name_index_t
   use observables, only: own_names
   use parameter_values, only: parameter_group_t
-  use parameters, only: either, largest, row_of, smallest, table, words_of
+  use parameters, only: largest, row_of, smallest
   use settings, only: species_settings_t
   use texts, only: counted, shown, suggestion, written
   implicit none
@@ -35,8 +35,11 @@ contains
     if (size(groups) == 0) call problems%add(0, "species", "there is none; give at least one")
     do k = 1, size(groups)
       call check_name(groups, k, names, problems)
-      call infer_choices(groups(k))
-      call check_choices(groups(k), problems)
+      if (groups(k)%given("file") .and. .not. groups(k)%given("velocities")) call groups(k)%put_text("velocities", "file")
+      call groups(k)%infer_choices()
+      if (groups(k)%text_of("velocities") == "file" .and. .not. groups(k)%given("file")) &
+        call groups(k)%complain("velocities", "'file' needs species.file", problems)
+      call groups(k)%check_choices(problems)
       call take_placement(groups(k), box, species(k), problems)
       call take_velocities(groups(k), species(k), problems)
     end do
@@ -78,48 +81,6 @@ contains
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
-  subroutine infer_choices(group)
-    type(parameter_group_t), intent(inout) :: group
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
-    integer :: k
-
-    if (group%given("file") .and. .not. group%given("velocities")) call group%put_text("velocities", "file")
-    do k = 1, size(group%values)
-      words = words_of(table(group%values(k)%row)%goes_with)
-      if (size(words) == 0 .or. .not. group%values(k)%given) cycle
-      if (.not. group%given(words(1))) call group%put_text(words(1), words(2))
-    end do
-  end subroutine infer_choices
-
-  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given,
-  !> that is a mistake: nothing is ignored silently.
-  subroutine check_choices(group, problems)
-    type(parameter_group_t), intent(inout) :: group
-    type(problem_list_t), intent(inout) :: problems
-    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
-    character(len=len(table%goes_with)) :: word
-    integer :: k
-
-    if (group%text_of("velocities") == "file" .and. .not. group%given("file")) &
-      call group%complain("velocities", "'file' needs species.file", problems)
-    do k = 1, size(group%values)
-      words = words_of(table(group%values(k)%row)%goes_with)
-      if (size(words) == 0) cycle
-      word = group%text_of(words(1))
-      associate (slot => group%values(k))
-        if (any(words(2:) == word)) then
-          if (table(slot%row)%status == "optional" .and. .not. slot%given) &
-            call group%complain(trim(words(1)), "'"//trim(word)//"' needs species."//slot%name, problems)
-        else
-          call slot%clear()
-          if (slot%given .and. .not. group%faulty(words(1))) call group%complain(trim(slot%name), "has no effect with "// &
-            trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
-        end if
-      end associate
-    end do
-  end subroutine check_choices
-
   !> Where the disks start, and how many there are.
   subroutine take_placement(group, box, s, problems)
     type(parameter_group_t), intent(in) :: group
@@ -156,6 +117,11 @@ contains
     s%speed = group%real_of("speed", 0.0_real64)
     s%temperature = group%real_of("temperature", 0.0_real64)
     s%exact_temperature = group%real_of("exact_temperature", -1.0_real64)
+    s%angular_velocity = group%real_of("angular_velocity", 0.0_real64)
+    s%rotational_temperature = group%real_of("rotational_temperature", -1.0_real64)
+    s%spin_in_file = s%velocities == "file" .and. .not. (group%given("angular_velocity") .or. group%given("rotational_temperature"))
+    if (group%given("angular_velocity") .and. group%given("rotational_temperature")) call group%complain("angular_velocity", &
+      "is given with rotational_temperature; give one of them", problems)
     call take_pairs(group, "velocity", s%velocity, problems)
     associate (n => size(s%velocity, 2))
       if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &

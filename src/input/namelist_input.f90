@@ -58,7 +58,7 @@ contains
     integer, intent(in) :: most                           !! groups that the file may hold
     integer :: k
 
-    allocate (reading%groups(size(group_names) + min(most, 3*most_instances)))
+    allocate (reading%groups(size(group_names) + min(most, count(is_repeated(group_names))*most_instances)))
     do k = 1, size(group_names)
       if (.not. is_repeated(group_names(k))) call add_group(reading, group_names(k), 0)
     end do

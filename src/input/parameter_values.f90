@@ -3,7 +3,7 @@
 module parameter_values
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use parameters, only: allowed, name_length, row_of, table
+  use parameters, only: allowed, either, name_length, row_of, table, words_of
   use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
@@ -42,6 +42,7 @@ module parameter_values
     procedure :: given, faulty, line_of
     procedure :: put_text, put_reals
     procedure :: complain, demand
+    procedure :: infer_choices, check_choices
   end type parameter_group_t
 
 contains
@@ -198,6 +199,45 @@ contains
       if (.not. slot%given) call self%complain(name, "is missing; give "//allowed(table(slot%row)), problems)
     end associate
   end subroutine demand
+
+  !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
+  pure subroutine infer_choices(self)
+    class(parameter_group_t), intent(inout) :: self
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    integer :: k
+
+    do k = 1, size(self%values)
+      words = words_of(table(self%values(k)%row)%goes_with)
+      if (size(words) == 0 .or. .not. self%values(k)%given) cycle
+      if (.not. self%given(words(1))) call self%put_text(words(1), words(2))
+    end do
+  end subroutine infer_choices
+
+  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given,
+  !> that is a mistake: nothing is ignored silently.
+  pure subroutine check_choices(self, problems)
+    class(parameter_group_t), intent(inout) :: self
+    type(problem_list_t), intent(inout) :: problems
+    character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
+    character(len=len(table%goes_with)) :: word
+    integer :: k
+
+    do k = 1, size(self%values)
+      words = words_of(table(self%values(k)%row)%goes_with)
+      if (size(words) == 0) cycle
+      word = self%text_of(words(1))
+      associate (slot => self%values(k))
+        if (any(words(2:) == word)) then
+          if (table(slot%row)%status == "optional" .and. .not. slot%given) &
+            call self%complain(trim(words(1)), "'"//trim(word)//"' needs "//trim(self%name)//"."//slot%name, problems)
+        else
+          call slot%clear()
+          if (slot%given .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), "has no effect with "// &
+            trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
+        end if
+      end associate
+    end do
+  end subroutine check_choices
 
   !> First and last of the groups of some names; if there are none, the last comes before the first.
   pure function range_of(groups, names) result(range)

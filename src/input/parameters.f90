@@ -3,19 +3,18 @@
 module parameters
   use kinds, only: real64
   use collisions, only: wall_rules
-  use errors, only: error_t, exit_usage, fail
-  use texts, only: joined, lower_case, nearest_word, shown, suggestion, written
+  use drive, only: drive_kinds
+  use side_motion, only: motions
+  use texts, only: joined, written
   implicit none
   private
-  public :: parameter_t, table, group_names, obstacle_groups, is_repeated, variables_of, row_of, full_names, words_of
-  public :: allowed, either, defaults_text, explain, smallest, largest, most_threads, name_length
+  public :: parameter_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of, full_names
+  public :: words_of, allowed, either, smallest, largest, most_threads, name_length
 
-  integer, parameter :: name_length = 28
+  integer, parameter :: name_length = 37
   integer, parameter :: most_threads = 1024
   real(real64), parameter :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
   real(real64), parameter :: largest = 1.0e100_real64      !! squared or multiplied
-
-  integer, parameter :: comment_column = 40                !! of the reference file
 
   type :: range_t
     real(real64) :: lower, upper             !! both belong to the range
@@ -24,6 +23,8 @@ module parameters
 
   !> The groups of which each describes an obstacle, of one shape or another.
   character(len=8), parameter :: obstacle_groups(2) = [character(len=8) :: "obstacle", "wall"]
+  !> Those of which each describes a wall of any kind. The reference file has none.
+  character(len=8), parameter :: wall_groups(*) = [character(len=8) :: "side", obstacle_groups]
 
   type(range_t), parameter :: anything = range_t(-largest, largest, "")
   type(range_t), parameter :: positive = range_t(smallest, largest, "> 0")
@@ -31,7 +32,10 @@ module parameters
   type(range_t), parameter :: number_of_threads = range_t(0, most_threads, "from 0 to 1024")
   type(range_t), parameter :: unit_interval = range_t(0, 1, "from 0 to 1")
   type(range_t), parameter :: fraction = range_t(smallest, nearest(1.0_real64, -1.0), "> 0 and < 1")
+  type(range_t), parameter :: part_of_all = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
+  type(range_t), parameter :: tangential = range_t(-1, 1, "from -1 to 1")
+  type(range_t), parameter :: moment = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter :: count_of_disks = range_t(1, 100000000, "from 1 to 100000000")
 
   type :: parameter_t
@@ -54,8 +58,8 @@ module parameters
   ! example    an example, no default          as it is, because something must be given
   ! optional   an example, no default          as a comment; its choice needs it, if it goes with one
 
-  character(len=8), parameter :: group_names(8) = [character(len=8) :: &
-    "run", "box", "obstacle", "wall", "species", "contact", "stop", "output"]
+  character(len=8), parameter :: group_names(10) = [character(len=8) :: &
+    "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
 
   type(parameter_t), parameter :: run_rows(*) = [ &
     parameter_t("run", "title", "text", 1, "default", "''", "one line that describes the run"), &
@@ -78,7 +82,23 @@ module parameters
     parameter_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
       "the two sides along x, the two sides along y", choices="wall periodic"), &
     parameter_t("box", "gravity", "real", 2, "default", "0, 0", "uniform acceleration of all disks", &
-      unit="length/time**2")]
+      unit="length/time**2"), &
+    parameter_t("box", "shear_rate", "real", 1, "default", "0", &
+      "gradient along y of the velocity along x; both axes periodic (Lees and Edwards)", unit="1/time")]
+
+  type(parameter_t), parameter :: side_rows(*) = [ &
+    parameter_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
+      choices="left right bottom top"), &
+    parameter_t("side", "motion", "text", 1, "default", "'still'", &
+      "how it moves about its place in time; sawtooth: it stays and strikes", choices=motions), &
+    parameter_t("side", "amplitude", "real", 1, "optional", "0.05", "how far it moves from its place", positive, &
+      "length", goes_with="motion sine parabolic"), &
+    parameter_t("side", "period", "real", 1, "optional", "1", "of the motion", positive, "time", &
+      goes_with="motion sine parabolic"), &
+    parameter_t("side", "phase", "real", 1, "fallback", "0", &
+      "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
+    parameter_t("side", "velocity", "real", 1, "optional", "1", "with which it strikes, inwards", positive, &
+      "length/time", goes_with="motion sawtooth")]
 
   type(parameter_t), parameter :: obstacle_rows(*) = [ &
     parameter_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &
@@ -91,6 +111,24 @@ module parameters
     parameter_t("wall", "name", "text", 1, "optional", "'ramp'", "name; default wall1, wall2, ..."), &
     parameter_t("wall", "from", "real", 2, "example", "0.2, 0.3", "one end of the straight wall", unit="length"), &
     parameter_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length")]
+
+  !> The law of a wall, in the group of each.
+  type(parameter_t), parameter :: law_rows(*) = [ &
+    parameter_t("", "restitution", "real", 1, "optional", "0.9", &
+      "of a disk and this wall; default contact.wall_restitution", unit_interval), &
+    parameter_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules), &
+    parameter_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
+      "of a rough wall; default contact.wall_tangential_restitution", tangential), &
+    parameter_t("", "friction", "real", 1, "optional", "0.3", "Coulomb's coefficient; default contact.wall_friction", &
+      not_negative), &
+    parameter_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
+      positive, "energy"), &
+    parameter_t("", "speed", "real", 1, "fallback", "0", &
+      "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time")]
+  integer, private :: g, r
+  type(parameter_t), parameter :: wall_law_rows(*) = [((parameter_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
+    law_rows(r)%size, law_rows(r)%status, law_rows(r)%value, law_rows(r)%help, law_rows(r)%range, law_rows(r)%unit, &
+    law_rows(r)%choices, law_rows(r)%goes_with), r=1, size(law_rows)), g=1, size(wall_groups))]
 
   type(parameter_t), parameter :: species_rows(*) = [ &
     parameter_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
@@ -128,7 +166,10 @@ module parameters
       "scale the velocities so that kT of the species is exactly this", not_negative, "energy"), &
     parameter_t("species", "velocity", "real", 0, "optional", "1, 0", &
       "vx1, vy1, vx2, vy2, ... of 'explicit'; one pair is used for all disks", unit="length/time", &
-      goes_with="velocities explicit")]
+      goes_with="velocities explicit"), &
+    parameter_t("species", "angular_velocity", "real", 1, "optional", "2", "of all disks at the start", unit="1/time"), &
+    parameter_t("species", "rotational_temperature", "real", 1, "optional", "1", &
+      "mean of I omega**2 at the start, instead of angular_velocity", not_negative, "energy")]
 
   type(parameter_t), parameter :: contact_rows(*) = [ &
     parameter_t("contact", "restitution", "real", 1, "default", "1", &
@@ -139,8 +180,38 @@ module parameters
       "walls reduce the whole velocity, or its normal part only", choices=wall_rules), &
     parameter_t("contact", "contact_time", "real", 1, "default", "0", &
       "TC model: elastic if a partner collided less than this ago; 0 off", not_negative, "time"), &
+    parameter_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
+      "of rough disks: -1 smooth, 0 the slip ends, 1 it is reversed", tangential), &
+    parameter_t("contact", "friction", "real", 1, "optional", "0.3", &
+      "Coulomb's coefficient; default: the tangential force has no limit", not_negative), &
+    parameter_t("contact", "inertia", "real", 1, "default", "0.5", &
+      "moment of inertia of a disk over mass times radius squared", moment), &
+    parameter_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
+      "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential), &
+    parameter_t("contact", "wall_friction", "real", 1, "optional", "0.3", "of the same; default as friction", &
+      not_negative), &
     parameter_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
       "for species 1-1, 1-2, ..., 2-1, 2-2, ...; instead of restitution", unit_interval)]
+
+  type(parameter_t), parameter :: drive_rows(*) = [ &
+    parameter_t("drive", "kind", "text", 1, "default", "'none'", &
+      "kicks: random changes of velocity, a heat bath, Brownian or active disks", choices=drive_kinds), &
+    parameter_t("drive", "interval", "real", 1, "optional", "0.01", "time from kick to kick", positive, "time", &
+      goes_with="kind noise andersen brownian active"), &
+    parameter_t("drive", "strength", "real", 1, "optional", "0.1", &
+      "growth of the variance of each component of all velocities", positive, "velocity**2/time", goes_with="kind noise"), &
+    parameter_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
+      "subtract the mean velocity that each kick gives", goes_with="kind noise"), &
+    parameter_t("drive", "fraction", "real", 1, "optional", "0.1", &
+      "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen"), &
+    parameter_t("drive", "temperature", "real", 1, "optional", "1", "kT of the new velocities", positive, "energy", &
+      goes_with="kind andersen brownian active"), &
+    parameter_t("drive", "speed", "real", 1, "optional", "1", "added along the orientation of a disk", &
+      not_negative, "length/time", goes_with="kind active"), &
+    parameter_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
+      "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active"), &
+    parameter_t("drive", "species", "text", 1, "fallback", "''", "the only species that is kicked; '' all", &
+      goes_with="kind noise andersen brownian active")]
 
   type(parameter_t), parameter :: stop_rows(*) = [ &
     parameter_t("stop", "time", "real", 1, "example", "1", &
@@ -163,29 +234,35 @@ module parameters
       "the same, by collisions between disks", positive), &
     parameter_t("output", "frames_every_events", "integer", 1, "optional", "1000", &
       "the same, by collisions of any kind", positive), &
+    parameter_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
+      "the same, by collisions per disk, 2 collisions/N", positive), &
     parameter_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "energies, pressure, ...; default the first and the last", positive, "time"), &
     parameter_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
       "the same, by collisions between disks", positive), &
     parameter_t("output", "observables_every_events", "integer", 1, "optional", "100", &
       "the same, by collisions of any kind", positive), &
+    parameter_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
+      "the same, by collisions per disk, 2 collisions/N", positive), &
     parameter_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
     parameter_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
+    parameter_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
+      "gather it for smooth disks, too, at some cost"), &
     parameter_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "computing time between checkpoints", positive, "s")]
 
-  type(parameter_t), parameter :: table(*) = [run_rows, box_rows, obstacle_rows, wall_rows, species_rows, &
-    contact_rows, stop_rows, output_rows]
+  type(parameter_t), parameter :: table(*) = [run_rows, box_rows, side_rows, obstacle_rows, wall_rows, &
+    wall_law_rows, species_rows, contact_rows, drive_rows, stop_rows, output_rows]
 
 contains
 
   !> Whether a group may occur several times in a file, told apart by `name`.
-  pure function is_repeated(group)
+  elemental function is_repeated(group)
     character(len=*), intent(in) :: group
     logical :: is_repeated
 
-    is_repeated = any(obstacle_groups == group) .or. group == "species"
+    is_repeated = any(wall_groups == group) .or. group == "species"
   end function is_repeated
 
   !> Names of the variables of a group, in order.
@@ -265,96 +342,5 @@ contains
     if (size(words) > 1) text = text//"' or '"
     text = text//trim(words(size(words)))//"'"
   end function either
-
-  !> The reference input file: every variable with its default. It is a valid input itself.
-  pure function defaults_text() result(text)
-    character(len=:), allocatable :: text
-    character(len=1), parameter :: eol = new_line("a")
-    integer :: g, k
-
-    text = "! Every variable of Ricochet with its default; a file needs only what differs."//eol// &
-      "! A variable that is commented out or called an example has no default, or not in all cases."//eol// &
-      "! Groups may be in any order; &obstacle, &wall and &species may be repeated."//eol
-    do g = 1, size(group_names)
-      text = text//eol//margin(group_names(g))//"&"//trim(group_names(g))//eol
-      do k = 1, size(table)
-        if (table(k)%group == group_names(g)) text = text//reference_line(table(k))//eol
-      end do
-      text = text//margin(group_names(g))//"/"//eol
-    end do
-  end function defaults_text
-
-  !> The reference file has no obstacles: those groups are comments.
-  pure function margin(group)
-    character(len=*), intent(in) :: group
-    character(len=:), allocatable :: margin
-
-    margin = ""
-    if (any(obstacle_groups == group)) margin = "! "
-  end function margin
-
-  !> A variable in the reference file; a choice has a second line that lists its words.
-  pure function reference_line(row) result(line)
-    type(parameter_t), intent(in) :: row
-    character(len=:), allocatable :: line
-    character(len=comment_column) :: setting
-    character(len=:), allocatable :: indent
-
-    indent = "  "
-    if (row%status == "optional" .or. row%status == "fallback") indent = "  ! "
-    if (any(obstacle_groups == row%group)) indent = "!   "
-    setting = indent//trim(row%name)//" = "//row%value
-    line = setting//" ! "
-    if (row%status == "example") line = line//"an example: "
-    line = line//trim(row%help)
-    if (row%unit /= "") line = line//" ["//trim(row%unit)//"]"
-    if (row%choices == "") return
-    setting = margin(row%group)
-    line = line//new_line("a")//setting//" ! "//allowed(row)
-  end function reference_line
-
-  !> Answers `--explain`: a variable with or without its group, or a whole group.
-  pure subroutine explain(name, text, error)
-    character(len=*), intent(in) :: name
-    character(len=:), allocatable, intent(out) :: text
-    type(error_t), allocatable, intent(out) :: error
-    character(len=len(name)) :: wanted
-    character(len=40) :: full(size(table))
-    character(len=:), allocatable :: meant
-    integer :: k
-
-    wanted = lower_case(name)
-    text = ""
-    do k = 1, size(table)
-      full(k) = trim(table(k)%group)//"."//table(k)%name
-      if (all([character(len=40) :: table(k)%name, table(k)%group, full(k)] /= wanted)) cycle
-      if (text /= "") text = text//new_line("a")
-      text = text//explanation(table(k))
-    end do
-    if (text /= "") return
-    meant = nearest_word(wanted, [character(len=40) :: table%name, full, group_names])
-    if (meant /= "") then
-      meant = "did you mean """//meant//"""?"
-    else
-      meant = suggestion(wanted, group_names)
-    end if
-    call fail(error, exit_usage, "--explain "//shown(name)//": unknown variable; "//meant)
-  end subroutine explain
-
-  !> Name and unit of a variable, its meaning, what is allowed, and its default or an example.
-  pure function explanation(row) result(text)
-    type(parameter_t), intent(in) :: row
-    character(len=:), allocatable :: text
-    character(len=*), parameter :: indent = new_line("a")//"    "
-
-    text = trim(row%group)//"."//trim(row%name)
-    if (row%unit /= "") text = text//"  ["//trim(row%unit)//"]"
-    text = text//indent//trim(row%help)//indent//"allowed: "//allowed(row)//indent
-    if (row%status == "default" .or. row%status == "fallback") then
-      text = text//"default: "//trim(row%value)
-    else
-      text = text//"example: "//trim(row%value)
-    end if
-  end function explanation
 
 end module parameters

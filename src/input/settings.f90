@@ -5,10 +5,13 @@ module settings
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
   use disks, only: species_t
+  use drive, only: drive_t
+  use parameter_values, only: parameter_group_t
   use stop_rules, only: stop_settings_t
+  use texts, only: text_t
   implicit none
   private
-  public :: settings_t, run_settings_t, species_settings_t, output_settings_t
+  public :: run_input_t, settings_t, run_settings_t, species_settings_t, output_settings_t
 
   integer, parameter :: many_disks = 500000           !! from here on parts of the box that fit into caches pay
 
@@ -27,6 +30,8 @@ module settings
     real(real64) :: radius = 0.0_real64               !! of each disk, or the largest in the file [length]
     logical :: mass_in_file = .false.                 !! the input leaves the masses to the file, which may have none
     logical :: radius_in_file = .false.               !! the input leaves the radii to the file
+    logical :: spin_in_file = .false.                 !! angular velocities come with the velocities of the file
+    logical :: angle_in_file = .false.                !! the file has orientations
     logical :: is_base = .false.                      !! sizes of other species are multiples of its own
     real(real64) :: region(4)                         !! xlo, xhi, ylo, yhi [length]
     character(len=:), allocatable :: placement        !! 'random', 'grid', 'lattice', 'dense', 'explicit', 'file', 'grown'
@@ -39,6 +44,8 @@ module settings
     real(real64) :: temperature                       !! kT of 'maxwell' [energy]
     real(real64) :: exact_temperature = -1.0_real64   !! kT to scale velocities to; negative: none [energy]
     real(real64), allocatable :: velocity(:, :)       !! (2,count) or one pair for all, of 'explicit'; else (2,0)
+    real(real64) :: angular_velocity = 0.0_real64     !! of all disks [1/time]
+    real(real64) :: rotational_temperature = -1.0_real64  !! mean of I omega**2, instead; negative: not given [energy]
   end type species_settings_t
 
   !> A cadence that is not set is `never` (time, wall clock) or `huge` (counts).
@@ -46,11 +53,14 @@ module settings
     real(real64) :: frames_every_time
     integer(int64) :: frames_every_collisions
     integer(int64) :: frames_every_events
+    real(real64) :: frames_every_collisions_per_disk
     real(real64) :: observables_every_time
     integer(int64) :: observables_every_collisions
     integer(int64) :: observables_every_events
+    real(real64) :: observables_every_collisions_per_disk
     logical :: single_precision                       !! precision == 'single'
     logical :: event_log
+    logical :: virial_tensor                          !! of smooth disks, too
     real(real64) :: checkpoint_every                  !! [s] of wall clock
   end type output_settings_t
 
@@ -59,12 +69,21 @@ module settings
     type(box_t) :: box
     type(contact_law_t) :: law
     type(species_settings_t), allocatable :: species(:)
+    type(drive_t) :: drive
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
   contains
     procedure :: n_disks
     procedure :: wants_domains
   end type settings_t
+
+  !> What a run was asked for, in all its forms.
+  type :: run_input_t
+    character(len=:), allocatable :: text                !! the input file as it is
+    type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
+    type(parameter_group_t), allocatable :: groups(:)    !! every value as used
+    type(settings_t) :: settings                         !! the same as typed data
+  end type run_input_t
 
 contains
 
@@ -82,7 +101,7 @@ contains
     logical :: yes
 
     yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
-      .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
+      .and. .not. self%box%is_sheared() .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
   end function wants_domains
 
 end module settings

@@ -1,9 +1,10 @@
-!> When samples are due: at multiples of a time, of a number of collisions or of a number of events, and at
-!> the start and the end of a run.
+!> When samples are due: at multiples of a time, of a number of collisions, in all or per disk, or of a number of events,
+!> and at the start and the end of a run.
 module cadence
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
   use simulation_state, only: simulation_t
+  use stop_rules, only: whole_collisions
   implicit none
   private
   public :: cadence_t
@@ -12,6 +13,7 @@ module cadence
     real(real64) :: every_time = never                    !! default: not by time
     integer(int64) :: every_collisions = huge(0_int64)    !! default: not by these
     integer(int64) :: every_events = huge(0_int64)
+    real(real64) :: collision_step = never        !! collisions in all that make so many per disk, whole or not
     integer(int64) :: count = 0                   !! samples taken; the first is due at once
     integer(int64) :: multiple = 1                !! of every_time that is due next
     integer(int64) :: next_collisions = huge(0_int64)
@@ -46,7 +48,7 @@ contains
     logical :: yes
 
     yes = self%count == 0 .or. sim%time() >= self%next_time() &
-      .or. sim%collisions >= self%next_collisions .or. sim%events >= self%next_events
+      .or. sim%tally%collisions >= self%next_collisions .or. sim%tally%events >= self%next_events
   end function is_due
 
   !> Whether there is no sample of the present state yet.
@@ -55,7 +57,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%events /= self%last_events
+    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events /= self%last_events
   end function is_new
 
   !> Counts a sample taken now.
@@ -65,7 +67,7 @@ contains
 
     self%count = self%count + 1
     self%last_time = sim%time()
-    self%last_events = sim%events
+    self%last_events = sim%tally%events
     call self%look_ahead(sim)
   end subroutine take
 
@@ -81,8 +83,9 @@ contains
         self%multiple = self%multiple + 1
       end do
     end if
-    self%next_collisions = next_multiple(sim%collisions, self%every_collisions)
-    self%next_events = next_multiple(sim%events, self%every_events)
+    self%next_collisions = min(next_multiple(sim%tally%collisions, self%every_collisions), &
+      next_step(sim%tally%collisions, self%collision_step))
+    self%next_events = next_multiple(sim%tally%events, self%every_events)
   end subroutine look_ahead
 
   !> Lowers the limits so that the simulation pauses at the next sample.
@@ -104,24 +107,45 @@ contains
     if (step < huge(step)) next = (n/step + 1)*step
   end function next_multiple
 
+  !> The first number of collisions beyond n that reaches another multiple of a step: where a run would end that is to
+  !> have so many per disk.
+  pure function next_step(n, step) result(next)
+    integer(int64), intent(in) :: n
+    real(real64), intent(in) :: step
+    integer(int64) :: next
+    integer(int64) :: multiple
+
+    next = n + 1
+    if (step <= 1) return
+    multiple = int(n/step, int64)
+    next = whole_collisions(multiple*step)
+    do while (next <= n)
+      multiple = multiple + 1
+      next = whole_collisions(multiple*step)
+    end do
+  end function next_step
+
   !> Number of samples of a run if it can be known in advance: there is one cadence, and one rule of the same
   !> kind ends the run. Otherwise 0.
   pure function planned(self, limits) result(n)
     class(cadence_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
     integer(int64) :: n
-    logical :: given(3), limited(3)
+    logical :: given(4), limited(4)
 
-    given = [self%every_time < never, self%every_collisions < huge(n), self%every_events < huge(n)]
-    limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n)]
+    given = [self%every_time < never, self%every_collisions < huge(n), self%every_events < huge(n), &
+      self%collision_step < never]
+    limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n), limits%collisions < huge(n)]
     n = 0
     if (.not. any(given)) n = 2
-    if (count(given) /= 1 .or. count(limited) /= 1 .or. .not. any(given .and. limited)) return
-    if (limits%dissipated < huge(limits%dissipated)) return
+    if (count(given) /= 1 .or. count(limited(:3)) /= 1 .or. .not. any(given .and. limited)) return
+    if (limits%watches()) return
     if (given(1)) then
       n = multiples_within(limits%time, self%every_time)
     else if (given(2)) then
       n = 1 + (limits%collisions + self%every_collisions - 1)/self%every_collisions
+    else if (given(4)) then
+      n = steps_within(limits%collisions, self%collision_step)
     else
       n = 1 + (limits%events + self%every_events - 1)/self%every_events
     end if
@@ -140,5 +164,15 @@ contains
     if ((n - 1)*dt >= t) n = n - 1
     n = n + 1
   end function multiples_within
+
+  !> Number of samples by collisions per disk from 0 to a limit, both included.
+  pure function steps_within(limit, step) result(n)
+    integer(int64), intent(in) :: limit
+    real(real64), intent(in) :: step
+    integer(int64) :: n
+
+    n = 1 + limit
+    if (step > 1 .and. limit > 0) n = 2 + int((limit - 1)/step*(1 + 4*epsilon(step)), int64)
+  end function steps_within
 
 end module cadence

@@ -7,6 +7,7 @@ module checkpoint
   use checkpoint_checks, only: flaw_of_progress, flaw_of_state
   use checkpoint_contents, only: check_origin, exchange_contents, exchange_final_state, put_origin
   use component_file, only: component_file_t
+  use disks, only: angle_column, columns, spin_column
   use disk_room, only: checkpoint_room
   use errors, only: error_t, exit_files, exit_usage, fail
   use h5md_layout, only: checkpoint_group
@@ -15,9 +16,8 @@ module checkpoint
   use progress, only: progress_t
   use run_files, only: check_places, current_checkpoint, identify, is_file, new_checkpoint, previous_checkpoint, run_file, &
     unfinished
-  use run_input, only: run_input_t
   use sealed_file, only: flaw_of, seal
-  use settings, only: settings_t
+  use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
   use system, only: free_bytes, last_problem, link_file, move_file, remove_file, synchronize
   use texts, only: written
@@ -103,8 +103,9 @@ contains
     call file%hdf5%open(current, writable=.false.)
     if (finished) call enter(file, error)
     if (.not. allocated(error)) call check_origin(file, input%groups, error)
+    if (.not. allocated(error)) call check_elements(file, input%settings, sim, error)
     if (.not. allocated(error)) then
-      progress = progress_t(input%settings%output)
+      progress = progress_t(input%settings)
       if (finished) progress%replaced = identity
       if (finished) call exchange_final_state(file, sim, progress, finished)
       if (.not. finished) call exchange_contents(file, sim, progress)
@@ -124,6 +125,23 @@ contains
       exit_files, file%hdf5%path//": is a finished run that lacks its last state, and cannot be continued; a new run " &
       //"can start from its last frame: placement = 'file'")
   end subroutine enter
+
+  !> Refuses to go on if disks had more than the input gives them now, or less: a starting file decides that, too.
+  subroutine check_elements(file, settings, sim, error)
+    type(component_file_t), intent(inout) :: file
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(in) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    logical :: there(2), here(2)
+    integer :: k
+
+    there = [(file%hdf5%length(file%name_of("disks/"//trim(columns(k)%name))) >= 0, k=spin_column, angle_column)]
+    here = [sim%law%rotation, sim%law%rotation .or. sim%law%orientation]
+    if (all(there .eqv. here) .or. allocated(file%hdf5%failure)) return
+    if (.not. any([(settings%species(k)%file /= "", k=1, size(settings%species))])) return
+    call fail(error, exit_files, file%hdf5%path//": whether its disks turn was read from species.file, which is not what it " &
+      //"was, or not there; --resume needs it as it was, --force instead starts over")
+  end subroutine check_elements
 
   !> Derives the rest of what has been read if all of it can be right.
   subroutine complete(file, settings, sim, progress, flaw)

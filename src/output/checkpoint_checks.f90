@@ -2,10 +2,11 @@
 !> that nobody has changed the file since it was sealed. What is wrong is named by its dataset.
 module checkpoint_checks
   use cadence, only: cadence_t
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, never, real64
   use progress, only: progress_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
+  use tally, only: dissipated, drive_energy, heat, work
   use texts, only: written
   implicit none
   private
@@ -27,6 +28,7 @@ contains
     if (flaw == "") flaw = flaw_of_counts(sim)
     dt = merge(settings%run%dt, 0.0_real64, settings%run%dynamics == "steps")
     if (flaw == "" .and. dt > 0 .and. sim%time() > countable*dt) flaw = "now is more than 2**53 steps of time"
+    if (flaw == "") flaw = flaw_of_kicks(sim, dt)
     if (flaw == "") flaw = flaw_of_motion(sim, dt)
   end function flaw_of_state
 
@@ -70,26 +72,42 @@ contains
 
     own = sum(real(sim%tag%collisions, real64))
     flaw = ""
-    associate (fixed => sum(sim%wall_collisions) + sim%obstacle_collisions)
-      if (sim%events /= sim%collisions + fixed) then
-        flaw = "events is "//written(sim%events)//", but "//written(sim%collisions + fixed)//" are counted by kind"
-      else if (own < 2*sim%collisions + fixed .or. own > 2*sim%collisions + fixed) then
-        flaw = "disks/collisions add up to "//written(own)//" instead of "//written(2*sim%collisions + fixed)
-      else if (sim%epoch_events > sim%events) then
-        flaw = "epoch_events is "//written(sim%epoch_events)//" after "//written(sim%events)//" events"
+    associate (fixed => sum(sim%tally%surface%collisions))
+      if (sim%tally%events /= sim%tally%collisions + fixed) then
+        flaw = "events is "//written(sim%tally%events)//", but "//written(sim%tally%collisions + fixed)//" are counted by kind"
+      else if (own < 2*sim%tally%collisions + fixed .or. own > 2*sim%tally%collisions + fixed) then
+        flaw = "disks/collisions add up to "//written(own)//" instead of "//written(2*sim%tally%collisions + fixed)
+      else if (sim%epoch_events > sim%tally%events) then
+        flaw = "epoch_events is "//written(sim%epoch_events)//" after "//written(sim%tally%events)//" events"
       else if (sim%epoch_end <= sim%epoch_begin .and. max(sim%epoch_begin, sim%epoch_end, sim%blink) > 0) then
         flaw = "epoch_begin is "//written(sim%epoch_begin)//", epoch_end "//written(sim%epoch_end)
       else if (sim%last_advance > sim%now) then
         flaw = "last_advance is "//written(sim%last_advance)//", now "//written(sim%now)
-      else if (sim%events_then > sim%events) then
-        flaw = "events_then is "//written(sim%events_then)//" after "//written(sim%events)//" events"
+      else if (sim%events_then > sim%tally%events) then
+        flaw = "events_then is "//written(sim%events_then)//" after "//written(sim%tally%events)//" events"
       end if
     end associate
   end function flaw_of_counts
 
-  !> There is as much kinetic energy as collisions have left and gravity may have given; so no disk has gone farther
-  !> than a speed allows, left the box, or collided in the future. With time steps a disk goes beyond a wall by less than
-  !> a step, and may sink by what it falls in each.
+  !> The kicks so far are those of the time that has passed; one that is due now may be still to come. With time steps a
+  !> kick waits for the end of its step.
+  pure function flaw_of_kicks(sim, dt) result(flaw)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: dt                !! 0: events are exact
+    character(len=:), allocatable :: flaw
+    real(real64) :: early
+
+    flaw = ""
+    early = dt + rounding*sim%time()
+    if (merge(sim%drive%time_of(sim%kicks), 0.0_real64, sim%kicks > 0) > sim%time() + early &
+      .or. sim%drive%time_of(sim%kicks + 1) < sim%time() - early) &
+      flaw = "kicks is "//written(sim%kicks)//" at time "//written(sim%time())
+  end function flaw_of_kicks
+
+  !> There is as much kinetic energy as collisions have left and what acts on the disks may have given; so no disk has gone
+  !> farther than a speed allows, left the box, or collided in the future. What a driven disk had gained and lost again
+  !> nobody knows: it may have gone anywhere. With time steps a disk goes beyond a wall by less than a step, and may sink
+  !> by what it falls in each.
   pure function flaw_of_motion(sim, dt) result(flaw)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: dt                !! 0: events are exact
@@ -98,17 +116,18 @@ contains
     integer(int32) :: i
 
     sunk = 0.5_real64*abs(sim%box%gravity)*dt*sim%now
-    fall = sum(sim%masses())*sum(abs(sim%box%gravity)*(sim%box%edges() + sunk))
+    fall = sum(sim%masses())*sum(abs(sim%box%gravity)*(sim%box%edges() + sum(sim%box%reach(), dim=2) + sunk))
     flaw = ""
     do i = 1, sim%n_disks()
-      associate (speed => sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)))
-        call check_place(sim, i, speed, dt*speed + sunk, flaw)
+      associate (speed => merge(never, sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)), sim%is_driven()))
+        call check_place(sim, i, speed, sim%box%reach() + spread(dt*speed + sunk, 2, 2), flaw)
       end associate
       if (flaw /= "") return
     end do
     energy = sim%kinetic_energy()
-    associate (left => sim%start_energy - sim%dissipated%value())
-      if (abs(energy - left) > rounding*sim%start_energy + (1 + rounding)*fall) &
+    associate (left => sim%start_energy - sim%tally%total(dissipated) + sum(sim%tally%total([heat, work, drive_energy])), &
+      terms => sim%start_energy + sum(abs(sim%tally%total([dissipated, heat, work, drive_energy]))))
+      if (abs(energy - left) > rounding*terms + (1 + rounding)*fall) &
         flaw = "start_energy less dissipated is "//written(left)//", but the disks have "//written(energy)
     end associate
   end function flaw_of_motion
@@ -118,22 +137,20 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: speed             !! that it cannot have had [length/time]
-    real(real64), intent(in) :: beyond(2)         !! how far it may be beyond a wall [length]
+    real(real64), intent(in) :: beyond(2, 2)      !! how far it may be beyond the sides: `box_t%reach` and more [length]
     character(len=:), allocatable, intent(inout) :: flaw
-    real(real64) :: x(2), reach(2), periods(2), gone(2)
+    real(real64) :: x(2), reach(2, 2), periods(2)
 
     associate (disk => sim%disk(i), edges => sim%box%edges())
       periods = merge(2 + speed*sim%time()/edges, 0.0_real64, sim%box%periodic)
-      gone = 0
-      if (size(sim%image) > 0) gone = sim%image(:, i)
       if (disk%clock > sim%now .or. disk%clock < -sim%epoch*(1 + rounding)) then
         flaw = in_row("clock", i)//" is "//written(disk%clock)//"; possible: "//written(-sim%epoch)//" to "//written(sim%now)
-      else if (any(abs(gone) > periods)) then
+      else if (any(abs(sim%image(i)) > periods)) then
         flaw = in_row("image1, image2", i)//": the disk cannot have gone so far"
       else
         x = sim%position(i)
-        reach = disk%radius + rounding*edges + beyond
-        if (any(x < sim%box%lower - reach .or. x > sim%box%upper + reach)) flaw = in_row("x1, x2", i) &
+        reach = beyond + spread(disk%radius + rounding*edges, 2, 2)
+        if (any(x < sim%box%lower - reach(:, 1) .or. x > sim%box%upper + reach(:, 2))) flaw = in_row("x1, x2", i) &
           //": the disk is outside the box, at "//written(x(1))//", "//written(x(2))
       end if
     end associate
@@ -156,7 +173,7 @@ contains
     character(len=:), allocatable :: flaw
     integer(int64) :: events
 
-    events = merge(sim%events, 0_int64, event_log)
+    events = merge(sim%tally%events, 0_int64, event_log)
     flaw = flaw_of_cadence(progress%frames, "frames", sim)
     if (flaw == "") flaw = flaw_of_cadence(progress%observables, "observables", sim)
     if (flaw == "" .and. progress%events /= events) &
@@ -171,10 +188,10 @@ contains
     character(len=:), allocatable :: flaw
 
     flaw = ""
-    if (cadence%last_time > sim%time() .or. cadence%last_events > sim%events .or. &
+    if (cadence%last_time > sim%time() .or. cadence%last_events > sim%tally%events .or. &
       sim%time() > countable*cadence%every_time) flaw = "progress/"//name//": the last sample is of time " &
       //written(cadence%last_time)//" and event "//written(cadence%last_events)//", the state of time " &
-      //written(sim%time())//" and event "//written(sim%events)
+      //written(sim%time())//" and event "//written(sim%tally%events)
   end function flaw_of_cadence
 
 end module checkpoint_checks

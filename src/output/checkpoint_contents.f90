@@ -6,13 +6,13 @@ module checkpoint_contents
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
+  use disks, only: columns, id_column, image_column, mass_column, met_column, n_columns, radius_column, species_column
   use errors, only: error_t, exit_usage, fail
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, values_text
-  use parameters, only: largest, smallest
-  use partners, only: n_sides, obstacle_code, side_name
+  use partners, only: obstacle_code
   use progress, only: progress_t
   use sample_track, only: samples_t
   use sealed_file, only: checksum
@@ -21,7 +21,7 @@ module checkpoint_contents
   use version, only: program_version
   implicit none
   private
-  public :: check_origin, exchange_contents, exchange_final_state, put_final_state, put_origin
+  public :: check_origin, exchange_contents, exchange_final_state, is_free, put_final_state, put_origin
 
   character(len=*), parameter :: eol = new_line("a")
 
@@ -34,10 +34,7 @@ module checkpoint_contents
   real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
   real(real64), parameter :: most = 1.0e300_real64          !! of sums: two of them do not overflow
   real(real64), parameter :: times(2) = [0.0_real64, longest], clocks(2) = [-longest, longest]
-  real(real64), parameter :: sums(2) = [-most, most], not_negative(2) = [0.0_real64, most]
-  real(real64), parameter :: sizes(2) = [smallest, largest]
-  real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
-  real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
+  real(real64), parameter :: anything(2) = [-most, most], not_negative(2) = [0.0_real64, most]
   integer(int64), parameter :: counts(2) = [0_int64, 2_int64**53]   !! exact also as reals
 
 contains
@@ -190,8 +187,7 @@ contains
   subroutine exchange_state(file, sim)
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
-    real(real64), allocatable :: masses(:)
-    integer(int64) :: n
+    logical :: stored
     integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
@@ -202,65 +198,102 @@ contains
     call file%exchange("blink", sim%blink, not_negative)
     call file%exchange("last_advance", sim%last_advance, clocks)
     call file%exchange("events_then", sim%events_then, counts)
-    call file%exchange("events", sim%events, counts)
-    call file%exchange("collisions", sim%collisions, counts)
-    call file%exchange("wall_collisions", sim%wall_collisions, counts)
-    call file%exchange("obstacle_collisions", sim%obstacle_collisions, counts)
-    do k = 1, n_sides
-      call exchange_sum(file, "wall_impulse_"//trim(side_name(k)), sim%wall_impulse(k))
-    end do
-    call exchange_sum(file, "virial", sim%virial)
-    call exchange_sum(file, "dissipated", sim%dissipated)
     call file%exchange("start_energy", sim%start_energy, not_negative)
-    n = sum(int(sim%species%count, int64))
-    if (.not. allocated(sim%disk)) call sim%make_room(int(n, int32))
-    call file%exchange("disks/x1", sim%disk%x(1), places)
-    call file%exchange("disks/x2", sim%disk%x(2), places)
-    call file%exchange("disks/v1", sim%disk%v(1), speeds)
-    call file%exchange("disks/v2", sim%disk%v(2), speeds)
-    call file%exchange("disks/clock", sim%disk%clock, clocks)
-    if (sim%own_sizes) then
-      call file%exchange("disks/radius", sim%disk%radius, sizes)
-      allocate (masses(n), source=1.0_real64)
-      if (file%writing) masses(sim%tag%id) = sim%masses()
-      call file%exchange("masses", masses, sizes)
-      if (.not. file%writing) call sim%take_masses(masses)
-    end if
-    call file%exchange("disks/species", sim%tag%species, [1_int64, size(sim%species, kind=int64)])
-    call file%exchange("disks/id", sim%tag%id, [1_int64, n])
-    call file%exchange("disks/collisions", sim%tag%collisions, counts)
-    call file%exchange("disks/met", sim%tag%met, [int(obstacle_code(sim%box%n_obstacles()), int64), n])
-    call exchange_periods(file, "disks/image1", sim, 1)
-    call exchange_periods(file, "disks/image2", sim, 2)
+    call file%exchange("kicks", sim%kicks, counts)
+    call exchange_tally(file, sim)
+    if (.not. allocated(sim%disk)) call sim%make_room(sum(sim%species%count))
+    do k = 1, n_columns
+      stored = sim%has_column(k)
+      if (k == radius_column .or. k == mass_column) stored = sim%own_sizes     ! else they follow from the input
+      if (stored) call exchange_column(file, sim, k)
+    end do
+    if (sim%own_sizes .and. .not. file%writing) call sim%settle_masses()
   end subroutine exchange_state
 
-  !> Writes or reads how many periods the disks have travelled along an axis.
-  subroutine exchange_periods(file, name, sim, axis)
+  !> Writes or reads what collisions have gathered.
+  subroutine exchange_tally(file, sim)
     type(component_file_t), intent(inout) :: file
-    character(len=*), intent(in) :: name
     type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: axis
-    integer(int64), allocatable :: periods(:)
 
-    allocate (periods(sim%n_disks()), source=0_int64)
-    if (size(sim%image) > 0) periods = sim%image(axis, :)
-    call file%exchange(name, periods, merge(counts(2), 0_int64, sim%box%periodic(axis))*[-1, 1])
-    if (size(sim%image) > 0) sim%image(axis, :) = periods
-  end subroutine exchange_periods
+    call sim%tally%make_room(sim%box%n_surfaces())
+    associate (tally => sim%tally)
+      call file%exchange("events", tally%events, counts)
+      call file%exchange("collisions", tally%collisions, counts)
+      call exchange_sums(file, "sums", tally%sum)
+      call file%exchange("surfaces/collisions", tally%surface%collisions, counts)
+      call exchange_sums(file, "surfaces/impulse1", tally%surface%impulse(1))
+      call exchange_sums(file, "surfaces/impulse2", tally%surface%impulse(2))
+      call exchange_sums(file, "surfaces/energy", tally%surface%energy)
+    end associate
+  end subroutine exchange_tally
 
-  !> Writes or reads a sum: the halves of a whole number of units, which may grow to twice as much.
-  subroutine exchange_sum(file, name, sum)
+  !> Writes or reads sums: the halves of whole numbers of units, which may grow to twice as much.
+  subroutine exchange_sums(file, name, sums)
     type(component_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
-    type(exact_sum_t), intent(inout) :: sum
+    type(exact_sum_t), intent(inout) :: sums(:)
     integer(int64), parameter :: lowest = ibset(0_int64, 63)
-    integer(int64) :: halves(2)
+    integer(int64) :: halves(2, size(sums))
+    integer :: k
 
-    halves = transfer(sum%units, halves)
-    call file%exchange(name//"/low", halves(1), [lowest, huge(lowest)])
-    call file%exchange(name//"/high", halves(2), [-2_int64**62, 2_int64**62 - 1])
-    sum%units = transfer(halves, sum%units)
-  end subroutine exchange_sum
+    do k = 1, size(sums)
+      halves(:, k) = transfer(sums(k)%units, halves)
+    end do
+    call file%exchange(name//"/low", halves(1, :), [lowest, huge(lowest)])
+    call file%exchange(name//"/high", halves(2, :), [-2_int64**62, 2_int64**62 - 1])
+    do k = 1, size(sums)
+      sums(k)%units = transfer(halves(:, k), sums(k)%units)
+    end do
+  end subroutine exchange_sums
+
+  !> Writes or reads a column of `disks: columns`.
+  subroutine exchange_column(file, sim, k)
+    type(component_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: k
+    real(real64) :: range(2)
+    real(real64), allocatable :: values(:)
+    integer(int32), allocatable :: numbers(:)
+    integer(int64), allocatable :: long_numbers(:)
+
+    range = range_of(sim, k)
+    allocate (values, source=sim%values_of(k))
+    associate (name => "disks/"//trim(columns(k)%name))
+      select case (columns(k)%kind)
+      case ("real")
+        call file%exchange(name, values, range)
+      case ("int")
+        numbers = int(values, int32)
+        call file%exchange(name, numbers, int(range, int64))
+        values = numbers
+      case default                                 ! "long"
+        long_numbers = int(values, int64)
+        call file%exchange(name, long_numbers, int(range, int64))
+        values = long_numbers
+      end select
+    end associate
+    if (.not. file%writing) call sim%take_values(k, values)
+  end subroutine exchange_column
+
+  !> Lowest and highest value of a column.
+  pure function range_of(sim, k) result(range)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: k
+    real(real64) :: range(2)
+
+    select case (k)
+    case (species_column)
+      range = [1, size(sim%species)]
+    case (id_column)
+      range = [1, sim%n_disks()]
+    case (met_column)
+      range = [obstacle_code(sim%box%n_obstacles()), sim%n_disks()]
+    case (image_column, image_column + 1)
+      range = merge(columns(k)%range, 0.0_real64, sim%box%periodic(k - image_column + 1))
+    case default
+      range = columns(k)%range
+    end select
+  end function range_of
 
   !> Writes or reads how far the output has come.
   subroutine exchange_progress(file, progress)
@@ -302,7 +335,7 @@ contains
         allocate (values(product(extent)), stat=status)
       call file%hdf5%check(-abs(status), "be read: "//name)
       if (status /= 0) return
-      call file%exchange(name, values, sums)
+      call file%exchange(name, values, anything)
       samples%values = reshape(values, extent)
     end if
   end subroutine exchange_samples

@@ -15,8 +15,8 @@ module output
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, check_start, identify, is_file, lock, remove_checkpoints, &
     remove_temporaries, run_file, take_final_name, unfinished, unfinished_new
-  use run_input, only: run_input_t
-  use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
+  use settings, only: run_input_t
+  use samples, only: check_counts, event_series, event_width, frame_sample, frame_series, observable_sample, observable_series
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use signals, only: record_signals
@@ -64,7 +64,7 @@ contains
 
     call self%claim(path, error)
     if (allocated(error)) return
-    self%progress = progress_t(input%settings%output)
+    self%progress = progress_t(input%settings)
     if (force) then
       call identify(path, self%progress%replaced, problem)
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
@@ -171,11 +171,11 @@ contains
     self%input = input
     associate (track => self%h5md%track, settings => input%settings%output)
       track(frame_track)%counter = frame_counter
-      track(frame_track)%series = frame_series(int(sim%n_disks()), settings%single_precision, any(sim%box%periodic))
+      track(frame_track)%series = frame_series(sim, settings%single_precision)
       track(observable_track)%counter = sample_counter
       track(observable_track)%series = observable_series(observed(sim))
       track(event_track)%counter = event_counter
-      if (settings%event_log) track(event_track)%series = event_series()
+      if (settings%event_log) track(event_track)%series = event_series(input%settings%law%detailed)
     end associate
     rule = stop_rule_t(input%settings%stop, sim)
     capacities = [self%progress%frames%planned(rule%limits), self%progress%observables%planned(rule%limits), 0_int64]
@@ -188,7 +188,7 @@ contains
     integer(int64) :: bytes, capacities(n_tracks)
     type(output_t) :: output
 
-    output%progress = progress_t(input%settings%output)
+    output%progress = progress_t(input%settings)
     call output%plan(input, sim, capacities)
     bytes = planned_room(output%h5md%track, capacities, sim%n_disks())
   end function planned_bytes
@@ -254,7 +254,7 @@ contains
     type(event_log_t), intent(inout) :: log
 
     if (log%n == 0) return
-    call self%append(event_track, log%record(:, :log%n), sim)
+    call self%append(event_track, log%record(:event_width(self%input%settings%law%detailed), :log%n), sim)
     self%progress%events = self%progress%events + log%n
     call log%clear()
   end subroutine write_events

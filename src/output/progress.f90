@@ -5,7 +5,7 @@ module progress
   use h5md_file, only: n_tracks
   use run_files, only: no_file
   use sample_track, only: samples_t
-  use settings, only: output_settings_t
+  use settings, only: settings_t
   implicit none
   private
   public :: progress_t
@@ -29,13 +29,14 @@ contains
 
   !> The progress of a run that has written nothing yet.
   pure function new_progress(settings) result(progress)
-    type(output_settings_t), intent(in) :: settings
+    type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
 
-    associate (s => settings)
-      progress%frames = cadence_t(s%frames_every_time, s%frames_every_collisions, s%frames_every_events)
+    associate (s => settings%output, pairs => 0.5_real64*settings%n_disks())
+      progress%frames = cadence_t(s%frames_every_time, s%frames_every_collisions, s%frames_every_events, &
+        pairs*s%frames_every_collisions_per_disk)
       progress%observables = cadence_t(s%observables_every_time, s%observables_every_collisions, &
-        s%observables_every_events)
+        s%observables_every_events, pairs*s%observables_every_collisions_per_disk)
     end associate
   end function new_progress
 

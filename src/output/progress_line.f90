@@ -56,7 +56,7 @@ contains
     left = never
     if (self%share(last) > self%share(first)) left = (1 - self%share(last))*span/(self%share(last) - self%share(first))
     write (line, "(""t "",g0.6,""  "",f5.1,"" %  "",i0,"" collisions  "",a,"" per s  ETA "",a)") sim%time(), &
-      100*self%share(last), sim%collisions, short_number(rate), clock_text(left)
+      100*self%share(last), sim%tally%collisions, short_number(rate), clock_text(left)
     call self%show(trim(line))
   end subroutine report
 
@@ -70,7 +70,7 @@ contains
     k = modulo(self%n, window)
     self%clock(k) = seconds()
     self%share(k) = stop_rule%share(sim, self%clock(k) - self%started)
-    self%collisions(k) = sim%collisions
+    self%collisions(k) = sim%tally%collisions
     self%n = self%n + 1
   end subroutine remember
 

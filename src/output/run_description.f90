@@ -1,23 +1,26 @@
 !> What an output file holds once: its format and author, the box, the disks, every parameter, its provenance.
 module run_description
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
+  use checkpoint_contents, only: is_free
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
     parameters_group, provenance, species_counts, species_names
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, parameter_value_t, range_of
   use parameters, only: is_repeated, obstacle_groups, table
-  use run_input, only: run_input_t
+  use run_files, only: is_file, run_file, unfinished
+  use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: host_name
-  use texts, only: growing_text_t
+  use texts, only: growing_text_t, lower_case, text_t
   use version, only: program_version
   implicit none
   private
-  public :: describe_end, describe_run, describes
+  public :: describe_end, describe_run, describes, recall_overrides
 
   integer, parameter :: longest_attribute = 1000      !! values; HDF5 has no room for more than 64 kB
   integer, parameter :: longest_note = 500            !! letters kept for why the run ended
@@ -160,6 +163,52 @@ contains
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
 
+  !> Puts what the command line of a run had changed for good in front of what that of now changes, which counts. What
+  !> may change when a run goes on is as the input and the command line of now say. A file that cannot be read adds
+  !> nothing: whoever goes on from it says why.
+  subroutine recall_overrides(path, overrides)
+    character(len=*), intent(in) :: path                         !! of the output
+    type(text_t), allocatable, intent(inout) :: overrides(:)     !! GROUP.VARIABLE=VALUE of now; then those of both
+    type(hdf5_file_t) :: file
+    type(text_t), allocatable :: both(:)
+    character(len=:), allocatable :: source, text
+    character(len=1), parameter :: eol = new_line("a")
+    integer :: first, k, last, pass, n
+
+    source = run_file(path, unfinished)
+    if (.not. is_file(source)) source = path
+    if (.not. is_file(source)) return
+    call file%open(source, writable=.false.)
+    call file%fetch_text(parameters_group//"overrides", text)
+    call file%close()
+    do pass = 1, 2                                               ! counts, then takes
+      n = 0
+      first = 1
+      do while (first <= len(text))
+        last = first + index(text(first:)//eol, eol) - 2
+        if (.not. (is_free(name_in(text(first:last))) .or. &
+          any([(name_in(overrides(k)%text) == name_in(text(first:last)), k=1, size(overrides))]))) then
+          n = n + 1
+          if (pass == 2) both(n)%text = text(first:last)
+        end if
+        first = last + 2
+      end do
+      if (pass == 1) allocate (both(n + size(overrides)))
+    end do
+    do k = 1, size(overrides)
+      both(n + k)%text = overrides(k)%text
+    end do
+    call move_alloc(both, overrides)
+  end subroutine recall_overrides
+
+  !> The variable of an override.
+  pure function name_in(override) result(name)
+    character(len=*), intent(in) :: override
+    character(len=:), allocatable :: name
+
+    name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
+  end function name_in
+
   !> One variable; nothing if it has no value.
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
@@ -246,7 +295,11 @@ contains
           if (second == "") call file%put(path//trim(row%name), texts)
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
-          values = [(groups(g)%values(k)%reals, g=1, n)]
+          if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
+          values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! where it is not given
+          do g = 1, n
+            if (groups(g)%values(k)%is_set()) values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
+          end do
           if (row%size == 1) call file%put(path//trim(row%name), [n], values)
           if (row%size > 1) call file%put(path//trim(row%name), [row%size, n], values)
         end if

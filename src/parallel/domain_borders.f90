@@ -104,8 +104,7 @@ contains
         .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
         .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
     end associate
-    if (size(self%sim%image) > 0) yes = yes .and. self%sim%image(1, s) == other%sim%image(1, t) &
-      .and. self%sim%image(2, s) == other%sim%image(2, t)
+    if (yes .and. size(self%sim%extra) > 0) yes = .not. any(self%sim%extra(:, s) /= other%sim%extra(:, t))
   end function same_state
 
   !> Notes what is to be taken over from a neighbour's slot t.
@@ -128,7 +127,7 @@ contains
       news%home = other%home(t)
       news%cell = cell
       news%slot = s
-      if (size(self%sim%image) > 0) news%image = other%sim%image(:, t)
+      news%extra(:size(other%sim%extra, 1)) = other%sim%extra(:, t)
     end associate
   end subroutine note_news
 
@@ -189,7 +188,7 @@ contains
       disk%event_time = forever
     end associate
     self%home(s) = news%home
-    if (size(self%sim%image) > 0) self%sim%image(:, s) = news%image
+    self%sim%extra(:, s) = news%extra(:size(self%sim%extra, 1))
     call grid%insert(self%sim%tag(s), s, int(news%cell, int16))
     call grid%begin_track(self%sim%tag(s)%cell, s)
     n_waiting = n_waiting + 1

@@ -1,13 +1,13 @@
 !> The search of one domain: the cells of a part of the box, with the domain's own disks and copies of those around. It
 !> notes where they went and what they met, so that one can tell afterwards whether the copies did what the disks that
-!> they stand for did elsewhere; and it books only the collisions that are this domain's to count.
+!> they stand for did elsewhere; and it knows which collisions are this domain's to count.
 module domain_grid
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
   use cell_grid, only: cell_grid_t
-  use exact_sums, only: exact_sum_t
   use memory_hints, only: prefetch
-  use partners, only: n_sides, nothing
+  use disks, only: tag_t
+  use partners, only: nothing
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -33,9 +33,6 @@ module domain_grid
     integer(int32) :: safe_low(2) = 0, safe_high(2) = 0    !! beyond these the patch has an open end
     integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk came near this cell from its domain
     logical :: too_far = .false.                   !! an own disk came to the end of the patch
-    ! The counts and sums so far
-    integer(int64), private :: events = 0, collisions = 0, obstacle_collisions = 0, wall_collisions(n_sides) = 0
-    type(exact_sum_t), private :: virial, dissipated, wall_impulse(n_sides)
   contains
     procedure :: predict
     procedure :: predict_both
@@ -44,7 +41,7 @@ module domain_grid
     procedure :: begin_window
     procedure :: begin_track
     procedure :: drop_track
-    procedure :: keep_sums
+    procedure :: counts
     procedure :: could_have_met
     procedure :: owns
     procedure :: is_own
@@ -108,76 +105,48 @@ contains
     self%n_tracks = self%n_tracks - 1
   end subroutine drop_track
 
-  !> Takes the counts and sums of a simulation as booked.
-  subroutine keep_sums(self, sim)
-    class(domain_grid_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
+  !> Whether a collision of disk i counts in this domain: of two disks that with the lower id must be an own one.
+  pure function counts(self, tag, i, code) result(yes)
+    class(domain_grid_t), intent(in) :: self
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code             !! whom or what it meets
+    logical :: yes
 
-    self%events = sim%events
-    self%collisions = sim%collisions
-    self%virial = sim%virial
-    self%dissipated = sim%dissipated
-    self%wall_collisions = sim%wall_collisions
-    self%obstacle_collisions = sim%obstacle_collisions
-    self%wall_impulse = sim%wall_impulse
-  end subroutine keep_sums
+    if (code <= 0) then
+      yes = self%is_own(i)
+    else
+      yes = self%is_own(merge(i, code, tag(i)%id < tag(code)%id))
+    end if
+  end function counts
 
-  !> Predicts disk i. If it has just met a wall, that counts only if the disk is an own one.
+  !> Predicts disk i; a vacant slot has no event.
   subroutine predict(self, sim, i)
     class(domain_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
 
-    if (sim%tag(i)%id == 0) then                   ! a vacant slot
+    if (sim%tag(i)%id == 0) then
       sim%disk(i)%event_time = forever
       sim%disk(i)%partner = nothing
-      return
+    else
+      call self%cell_grid_t%predict(sim, i)
     end if
-    if (sim%events /= self%events) then
-      if (self%is_own(i)) then
-        call self%keep_sums(sim)
-      else
-        sim%events = self%events
-        sim%dissipated = self%dissipated
-        sim%wall_collisions = self%wall_collisions
-        sim%obstacle_collisions = self%obstacle_collisions
-        sim%wall_impulse = self%wall_impulse
-      end if
-    end if
-    call self%cell_grid_t%predict(sim, i)
   end subroutine predict
 
-  !> Predicts the disks i and j, which have just collided.
+  !> Predicts the disks i and j, which have just collided, and notes that for whoever has copies of them.
   subroutine predict_both(self, sim, i, j)
-    class(domain_grid_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-
-    if (self%track_of(i) + self%track_of(j) > 0) call note_collision(self, sim, i, j)
-    self%events = sim%events
-    self%collisions = sim%collisions
-    self%virial%units = sim%virial%units
-    self%dissipated%units = sim%dissipated%units
-    call self%cell_grid_t%predict_both(sim, i, j)
-    if (.not. self%roomy) return
-    call self%note(sim%tag(i)%cell, i)                  ! in cells that they have chosen again
-    call self%note(sim%tag(j)%cell, j)
-  end subroutine predict_both
-
-  !> Notes a collision of disks of which others may have copies. It counts where the one with the lower id is an own one.
-  subroutine note_collision(self, sim, i, j)
     class(domain_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
 
     if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, sim%disk(i)%clock)
     if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, sim%disk(j)%clock)
-    if (self%is_own(merge(i, j, sim%tag(i)%id < sim%tag(j)%id))) return
-    sim%events = self%events
-    sim%collisions = self%collisions
-    sim%virial%units = self%virial%units
-    sim%dissipated%units = self%dissipated%units
-  end subroutine note_collision
+    call self%cell_grid_t%predict_both(sim, i, j)
+    if (.not. self%roomy) return
+    call self%note(sim%tag(i)%cell, i)                  ! in cells that they have chosen again
+    call self%note(sim%tag(j)%cell, j)
+  end subroutine predict_both
 
   !> Adds a collision to a digest.
   elemental subroutine add_moment(digest, time)

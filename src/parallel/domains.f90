@@ -4,7 +4,7 @@
 module domains
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
-  use disks, only: disk_t, tag_t
+  use disks, only: disk_t, n_columns, n_fixed, tag_t
   use domain_grid, only: domain_grid_t, forever
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -17,7 +17,7 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: clear_sums, copy_of, domain_t, due_t, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
+  public :: copy_of, domain_t, due_t, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
   public :: next_due, news_t
 
   integer, parameter :: log_capacity = 1024
@@ -29,7 +29,7 @@ module domains
   type :: news_t
     type(disk_t) :: disk
     type(tag_t) :: tag
-    integer(int64) :: image(2) = 0
+    real(real64) :: extra(n_columns - n_fixed) = 0 !! the optional columns, as many as there are
     integer(int32) :: home = 0                     !! number of the disk in the whole simulation
     integer(int32) :: cell(2) = 0                  !! in this domain's patch, or beyond its ends
     integer(int32) :: slot = 0                     !! of the copy; 0: none
@@ -46,6 +46,7 @@ module domains
     integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
     type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
     integer(int64) :: turns = 0                    !! of the engine, in this window
+    real(real64) :: busy = 0.0_real64              !! how long its engine has been at work in this stride [s]
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
     integer(int32) :: n_news = 0
@@ -87,7 +88,7 @@ contains
       self%sim%disk(n) = sim%disk(i)
       self%sim%tag(n) = sim%tag(i)
       self%home(n) = i
-      if (any(sim%box%periodic)) self%sim%image(:, n) = sim%image(:, i)
+      self%sim%extra(:, n) = sim%extra(:, i)
     end do
     slots = self%sim%n_disks()
     do i = n + 1, slots
@@ -99,9 +100,11 @@ contains
     self%n_news = 0
     self%good = .true.
     self%sim%now = sim%now
+    self%sim%box%epoch = sim%epoch                 ! for its sides; what happens here is told by times since the epoch
     call self%engine%log%clear()
     call self%log%clear()
-    call clear_sums(self, sim)
+    self%sim%tally = sim%tally
+    call self%sim%tally%clear()
     select type (grid => self%engine%search)
     type is (domain_grid_t)
       call start(self, grid, n)
@@ -116,21 +119,19 @@ contains
     integer(int32) :: slots
 
     if (.not. allocated(self%sim%species)) then
-      self%sim%box = sim%box
-      self%sim%law = sim%law
-      self%sim%species = sim%species
-      if (allocated(sim%mass)) self%sim%mass = sim%mass
+      self%sim%given_t = sim%given_t
       self%sim%epoch_end = forever
       self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
       allocate (domain_grid_t :: self%engine%search)
+      self%engine%is_part = .true.
     end if
     slots = n + n/spare + spare_at_least
     if (allocated(self%home)) then
       if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
-      deallocate (self%sim%disk, self%sim%tag, self%sim%image, self%home)
+      deallocate (self%sim%disk, self%sim%tag, self%sim%extra, self%home)
     end if
     allocate (self%home(slots))
-    call self%sim%make_room(slots)
+    call self%sim%make_room(slots, like=sim)
   end subroutine make_room
 
   !> Builds cells and queue for the first n slots.
@@ -217,29 +218,6 @@ contains
     if (self%key(place) == id) slot = self%slot(place)
   end function copy_of
 
-  !> Nothing has been booked yet.
-  subroutine clear_sums(self, sim)
-    type(domain_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-
-    associate (own => self%sim)
-      own%events = 0
-      own%collisions = 0
-      own%wall_collisions = 0
-      own%obstacle_collisions = 0
-      own%virial = sim%virial
-      own%dissipated = sim%dissipated
-      own%wall_impulse = sim%wall_impulse
-      own%virial%units = 0
-      own%dissipated%units = 0
-      own%wall_impulse%units = 0
-    end associate
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      call grid%keep_sums(self%sim)
-    end select
-  end subroutine clear_sums
-
   !> Follows the domain, copies and all, to the end of a window; gives up after so many turns of the engine, or too long
   !> a time.
   subroutine move_on(self, t_end, turns)
@@ -252,6 +230,7 @@ contains
     integer(int64) :: left
 
     self%done = .false.
+    self%busy = 0
     if (.not. self%good) return                    ! there was no room for all copies
     began = seconds()
     limits%time = t_end
@@ -268,6 +247,7 @@ contains
       if (seconds() - began > longest_window) exit
     end do
     self%turns = self%turns + turns - left
+    self%busy = seconds() - began
   end subroutine move_on
 
   !> The next event.
@@ -325,16 +305,13 @@ contains
     end if
   end subroutine keep_log
 
-  !> Keeps those collisions that are counted here.
+  !> Keeps the collisions that the engine has listed.
   subroutine take_log(self)
     type(domain_t), intent(inout) :: self
     integer :: k
 
     do k = 1, self%engine%log%n
-      associate (record => self%engine%log%record(:, k))
-        if (copy_of(self, int(record(2), int32)) > 0) cycle
-        call self%log%append_record(record)
-      end associate
+      call self%log%append_record(self%engine%log%record(:, k))
     end do
     call self%engine%log%clear()
   end subroutine take_log
@@ -351,7 +328,7 @@ contains
         if (self%sim%tag(k)%id == 0 .or. .not. grid%is_own(k)) cycle
         sim%disk(self%home(k)) = self%sim%disk(k)
         sim%tag(self%home(k)) = self%sim%tag(k)
-        if (size(self%sim%image) > 0) sim%image(:, self%home(k)) = self%sim%image(:, k)
+        sim%extra(:, self%home(k)) = self%sim%extra(:, k)
       end do
     end select
   end subroutine gather

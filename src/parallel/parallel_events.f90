@@ -14,6 +14,7 @@ module parallel_events
   use partition, only: partition_t
   use simulation_state, only: simulation_t
   use system, only: seconds
+  use time_use, only: part_epochs, part_events, part_merging, spend_time_on
   implicit none
   private
   public :: parallel_events_t
@@ -24,7 +25,6 @@ module parallel_events
   !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   integer(int64), parameter :: shortest_spell = 5, longest_spell = 5*2**20   !! of the plain engine [events per disk]
-  real(real64), parameter :: rounding = 1.0e-12_real64
 
   !> Who has predicted the events.
   integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
@@ -46,6 +46,7 @@ module parallel_events
     integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
   contains
     procedure :: start
+    procedure :: renew
     procedure :: advance
     procedure :: most_domains
     procedure, private :: advance_plainly
@@ -71,6 +72,20 @@ contains
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
   end subroutine start
 
+  !> Only the plain engine can go on with its events; domains are filled again.
+  subroutine renew(self, sim, changed)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: changed(:)
+
+    self%idle = .false.
+    if (self%holder == plain_engine) then
+      call self%engine%renew(sim, changed)
+    else
+      self%holder = nobody
+    end if
+  end subroutine renew
+
   !> How many domains are worth their copies, and so how many threads find something to do.
   pure function most_domains(self, n_disks, periodic) result(n)
     class(parallel_events_t), intent(in) :: self
@@ -91,7 +106,8 @@ contains
     logical :: at_end
     integer :: outcome
 
-    if (limits%reached(sim) .or. self%log%is_full()) return
+    self%arrived = .false.
+    if (limits%reached(sim%tally) .or. self%log%is_full()) return
     outcome = left_alone
     if (worthwhile(self, sim, limits)) then
       at_end = sim%now >= sim%epoch_end .and. limits%time - sim%epoch > sim%epoch_end
@@ -103,12 +119,12 @@ contains
       goal = limits
       goal%time = min(limits%time - sim%epoch, sim%epoch_end)
       goal%events = min(limits%events, most_events(sim))
-      goal%dissipated = limits%dissipated - abs(limits%dissipated)*rounding
       if (goal%time > sim%now .and. .not. at_end) call self%visit(sim, goal, outcome)
+      if (outcome == kept .and. sim%now >= limits%time - sim%epoch) self%arrived = self%parts%is_past(sim%now)
     end if
     if (outcome == left_alone) then
       call self%advance_plainly(sim, limits, error)
-    else if (outcome == kept .and. sim%events >= most_events(sim)) then
+    else if (outcome == kept .and. sim%tally%events >= most_events(sim)) then
       call self%end_epoch(sim)
     end if
   end subroutine advance
@@ -118,6 +134,7 @@ contains
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
+    call spend_time_on(part_epochs)
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain)) &
       deallocate (self%parts%domain)               ! to leave room for sorting many
     call move_epoch(sim)
@@ -135,20 +152,22 @@ contains
     integer(int64) :: events
     real(real64) :: time
 
+    call spend_time_on(part_events)
     if (allocated(self%parts%domain)) deallocate (self%parts%domain)
     if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
     if (self%holder /= plain_engine) call self%engine%start(sim)
     self%holder = plain_engine
     goal = limits
-    if (sim%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
-    events = sim%events
+    if (sim%tally%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
+    events = sim%tally%events
     time = sim%time()
     call self%engine%log%take(self%log)
     call self%engine%advance(sim, goal, error)
     call self%log%take(self%engine%log)
     self%idle = self%engine%idle
-    if (sim%events - events >= sim%n_disks()) &
-      call self%parts%pace%learn(sim%events - events, goal%turns - self%engine%turns_left, sim%time() - time)
+    self%arrived = self%engine%arrived
+    if (sim%tally%events - events >= sim%n_disks()) &
+      call self%parts%pace%learn(sim%tally%events - events, goal%turns - self%engine%turns_left, sim%time() - time)
   end subroutine advance_plainly
 
   !> Whether several domains can be faster than the plain engine.
@@ -160,8 +179,8 @@ contains
     real(real64) :: least
 
     least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
-    yes = self%parts%wanted > 1 .and. sim%events >= self%plain_until .and. limits%events - sim%events > least &
-      .and. limits%collisions - sim%collisions > least
+    yes = self%parts%wanted > 1 .and. sim%tally%events >= self%plain_until .and. limits%events - sim%tally%events > least &
+      .and. limits%collisions - sim%tally%collisions > least
   end function worthwhile
 
   !> Lets the domains move on by some windows of time.
@@ -182,7 +201,7 @@ contains
       self%holder = nobody
       call self%parts%fill(sim, self%log%is_on(), good)
       if (.not. good) then
-        self%plain_until = sim%events + shortest_spell*sim%n_disks()
+        self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
         return
       end if
       self%holder = all_domains
@@ -194,17 +213,18 @@ contains
       if (seconds() - began > longest_visit) exit
     end do
     self%windows_done = self%windows_done + min(windows, self%patience)
+    call spend_time_on(part_merging)
     if (good .and. self%log%is_on()) call merge_logs(self%parts%domain, merged, good)
     call self%conclude(sim, good, outcome)
-    if (good .and. (sim%dissipated%value() + sum(self%parts%domain%sim%dissipated%value()) >= goal%dissipated &
-      .or. t - sim%last_advance < sim%blink)) then ! the plain engine finds the very event, or a collapse
+    if (good .and. (goal%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
+      ! the plain engine finds the very event, or a collapse
       outcome = left_alone
-      self%plain_until = sim%events + shortest_spell*sim%n_disks()
+      self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
     end if
     if (outcome == kept) then
       call self%parts%gather_all(sim, t)
       if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
-      if (all(self%parts%domain%engine%idle)) self%plain_until = sim%events + 1
+      if (all(self%parts%domain%engine%idle)) self%plain_until = sim%tally%events + 1
     else
       self%holder = nobody
     end if
@@ -235,7 +255,7 @@ contains
       if (shortening > shortest) return
       outcome = left_alone
       shortening = shortest
-      self%plain_until = sim%events + self%spell*sim%n_disks()
+      self%plain_until = sim%tally%events + self%spell*sim%n_disks()
       self%spell = min(2*self%spell, longest_spell)
     end associate
   end subroutine conclude

@@ -7,10 +7,13 @@ module partition
   use cell_grid, only: whole_box
   use domain_borders, only: refresh, verify
   use domain_cuts, only: domain_cuts_t
-  use domains, only: clear_sums, domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
+  use domains, only: domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
   use evolution, only: limits_t
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
+  use tally, only: tally_t
+  use time_use, only: note_busy, part_cuts, part_domains, part_filling, part_gathering, part_refreshing, part_verifying, &
+    spend_time_on
   implicit none
   private
   public :: partition_t
@@ -39,7 +42,9 @@ module partition
   contains
     procedure :: fill
     procedure :: run_window
+    procedure :: tally_now
     procedure :: left
+    procedure :: is_past
     procedure :: gather_all
     procedure, private :: window_end
     procedure, private :: expected
@@ -70,6 +75,7 @@ contains
     integer(int16), allocatable :: cell(:, :)
     integer(int32) :: i, k
 
+    call spend_time_on(part_cuts)
     whole = whole_box(sim)
     cut = .false.
     if (whole%small < maxval(sim%disk%radius)) return
@@ -88,6 +94,7 @@ contains
     end if
     if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
     if (.not. self%pace%events > 0) self%pace%events = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
+    call spend_time_on(part_filling)
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       associate (domain => self%domain(k))
@@ -125,6 +132,19 @@ contains
     events = 1.2_real64*length*self%pace%events + 100
   end function expected
 
+  !> What collisions have gathered, those in the domains since they were filled included.
+  pure function tally_now(self, sim) result(so_far)
+    class(partition_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(tally_t) :: so_far
+    integer(int32) :: k
+
+    so_far = sim%tally
+    do k = 1, self%cuts%n
+      call so_far%include(self%domain(k)%sim%tally)
+    end do
+  end function tally_now
+
   !> Events that may still come before a count is at its limit.
   pure function left(self, sim, goal) result(events)
     class(partition_t), intent(in) :: self
@@ -132,8 +152,8 @@ contains
     type(limits_t), intent(in) :: goal
     real(real64) :: events
 
-    events = min(real(goal%events - sim%events - sum(self%domain%sim%events), real64), &
-      real(goal%collisions - sim%collisions - sum(self%domain%sim%collisions), real64))
+    events = min(real(goal%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
+      real(goal%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
   end function left
 
   !> Runs one window in all domains, which first take over what came of the one before. It ends early at the limit of a
@@ -148,14 +168,16 @@ contains
     integer(int32) :: k
     real(real64) :: t_begin, t_end
 
-    events = sum(self%domain%sim%events)
+    events = sum(self%domain%sim%tally%events)
     t_begin = t
     t_end = self%window_end(sim, t, goal%time)
+    call spend_time_on(part_refreshing)
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       call refresh(self%domain(k))
     end do
     !$omp end parallel do
+    call spend_time_on(part_domains)
     self%domain%turns = 0
     do
       call self%stride(sim, goal, t, t_end)
@@ -163,6 +185,7 @@ contains
       if (.not. (good .and. t < t_end .and. self%left(sim, goal) > 0)) exit
       if (stop_requested()) exit
     end do
+    call spend_time_on(part_verifying)
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       call verify(self%domain, k)
@@ -170,7 +193,7 @@ contains
     !$omp end parallel do
     good = good .and. all(self%domain%good) .and. self%left(sim, goal) >= 0     ! else several at the last moment
     if (good) then
-      call self%pace%learn(sum(self%domain%sim%events) - events, sum(self%domain%turns), t - t_begin)
+      call self%pace%learn(sum(self%domain%sim%tally%events) - events, sum(self%domain%turns), t - t_begin)
     else
       self%widening = min(self%widening + 2, self%halo)
     end if
@@ -205,6 +228,7 @@ contains
       call move_on(self%domain(k), t, turns)
     end do
     !$omp end parallel do
+    call note_busy(sum(self%domain%busy))
   end subroutine stride
 
   !> Takes the next event, in the domains that expect it, or else goes to the end of the window: of simultaneous events
@@ -233,6 +257,21 @@ contains
     t = min(due(first)%time, t_end)
   end subroutine step
 
+  !> Whether all that happens up to a time has happened.
+  function is_past(self, t) result(yes)
+    class(partition_t), intent(inout) :: self
+    real(real64), intent(in) :: t                  !! since the epoch [time]
+    logical :: yes
+    type(due_t) :: due
+    integer(int32) :: k
+
+    yes = .true.
+    do k = 1, self%cuts%n
+      due = next_due(self%domain(k))
+      yes = yes .and. due%time > t
+    end do
+  end function is_past
+
   !> Brings the whole simulation to the present; the domains go on from there.
   subroutine gather_all(self, sim, now)
     class(partition_t), intent(inout) :: self
@@ -240,6 +279,7 @@ contains
     real(real64), intent(in) :: now                !! since the epoch [time]
     integer(int32) :: k
 
+    call spend_time_on(part_gathering)
     !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       call gather(self%domain(k), sim)
@@ -248,16 +288,8 @@ contains
     !$omp end parallel do
     sim%now = now
     do k = 1, self%cuts%n
-      associate (own => self%domain(k)%sim)
-        sim%events = sim%events + own%events
-        sim%collisions = sim%collisions + own%collisions
-        sim%wall_collisions = sim%wall_collisions + own%wall_collisions
-        sim%obstacle_collisions = sim%obstacle_collisions + own%obstacle_collisions
-        sim%virial%units = sim%virial%units + own%virial%units
-        sim%dissipated%units = sim%dissipated%units + own%dissipated%units
-        sim%wall_impulse%units = sim%wall_impulse%units + own%wall_impulse%units
-      end associate
-      call clear_sums(self%domain(k), sim)
+      call sim%tally%include(self%domain(k)%sim%tally)
+      call self%domain(k)%sim%tally%clear()
     end do
   end subroutine gather_all
 

@@ -1,18 +1,19 @@
-!> What moves. Disks are split by access: a record of one cache line, which every prediction reads, and a tag of half a
-!> line, which is needed only when a disk has an event of its own. Each begins with its state, which a checkpoint
-!> stores; what follows is derived, and rebuilt at every start.
+!> What moves, and one table of all numbers that a disk has. The numbers are kept by access: a record of one cache line,
+!> which every prediction reads; a tag of half a line, which is needed only when a disk has an event of its own; and
+!> columns that are there only where something needs them. What is derived is not in the table: it is rebuilt at every
+!> start.
 module disks
-  use kinds, only: int16, int32, int64, real64
+  use kinds, only: int16, int32, int64, never, real64
   implicit none
   private
-  public :: disk_t, tag_t, species_t
+  public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
   !> disks see it by extrapolation.
   type :: disk_t
     real(real64) :: x(2) = 0.0_real64           !! position at `clock` [length]
     real(real64) :: v(2) = 0.0_real64           !! velocity at `clock` [length/time]
-    real(real64) :: clock = 0.0_real64          !! time of the last own collision, since the epoch [time]
+    real(real64) :: clock = 0.0_real64          !! when x and v were set, since the epoch [time]
     real(real64) :: radius = 0.0_real64         !! [length]
     ! Derived: how often x, v have changed in this epoch, which reveals stale events; and the event expected next, written
     ! by the search.
@@ -38,5 +39,43 @@ module disks
     integer :: count = 0
     real(real64) :: mass = 1.0_real64           !! of each disk, or the largest [mass]
   end type species_t
+
+  !> A number that every disk has, or that it has only in some simulations: see `simulation_state: choose_columns`.
+  type :: column_t
+    character(len=16) :: name                   !! in checkpoints
+    character(len=4) :: kind                    !! in checkpoints: "real", "int", or "long" (whole numbers)
+    real(real64) :: range(2)                    !! lowest and highest value; 0, 0: depends on the simulation
+    logical :: is_moment = .false.              !! a time since the epoch
+    character(len=20) :: element = ""           !! of frames that have it; position, velocity and image have more to them
+    integer :: rate = 0                         !! number of the column by which it grows in time; 0: none
+  end type column_t
+
+  real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
+  real(real64), parameter :: clocks(2) = [-longest, longest]
+  real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
+  real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
+  real(real64), parameter :: sizes(2) = [1.0e-100_real64, 1.0e100_real64]
+  real(real64), parameter :: counts(2) = [0.0_real64, 2.0_real64**53]   !! exact as reals
+  real(real64), parameter :: periods(2) = [-counts(2), counts(2)]
+  real(real64), parameter :: anything(2) = [-never, never]
+  real(real64), parameter :: of_simulation(2) = 0.0_real64
+
+  !> The table. The first columns are in records and tags, the others are optional.
+  integer, parameter :: n_fixed = 10
+  integer, parameter, public :: clock_column = 5, radius_column = 6, species_column = 7, id_column = 8, met_column = 10
+  integer, parameter, public :: mass_column = 11, image_column = 12, contact_column = 14, spin_column = 15, angle_column = 16
+  type(column_t), parameter :: columns(*) = [ &
+    column_t("x1", "real", places), column_t("x2", "real", places), &
+    column_t("v1", "real", speeds), column_t("v2", "real", speeds), &
+    column_t("clock", "real", clocks, is_moment=.true.), &
+    column_t("radius", "real", sizes), &
+    column_t("species", "int", of_simulation), column_t("id", "int", of_simulation), &
+    column_t("collisions", "long", counts), column_t("met", "int", of_simulation), &
+    column_t("mass", "real", sizes), &                            ! other than that of the species [mass]
+    column_t("image1", "long", periods), column_t("image2", "long", periods), &     ! periods travelled
+    column_t("last_contact", "real", clocks, is_moment=.true.), & ! time of the last collision, for the TC model [time]
+    column_t("angular_velocity", "real", anything, element="angular_velocity"), &   ! [1/time]
+    column_t("orientation", "real", anything, element="orientation", rate=15)]      ! at `clock`, not wrapped [radian]
+  integer, parameter :: n_columns = size(columns)
 
 end module disks

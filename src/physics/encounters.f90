@@ -1,107 +1,112 @@
 !> What changes in the state when two disks, a disk and a wall, or a disk and a periodic side meet, with all counts
 !> and sums. Both dynamics use it.
 module encounters
-  use kinds, only: int32, real64
-  use box_geometry, only: wall_normal
-  use collisions, only: pair_impulse, still_in_contact, wall_rebound
-  use disks, only: disk_t
+  use kinds, only: int32, int64, real64
+  use collisions, only: pair_impulse, tangential_impulse
+  use disks, only: angle_column, image_column, mass_column
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
+  use images, only: image_t, images_t
   use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
-  use shapes, only: magnitude, nearest_image
+  use shapes, only: magnitude
   use simulation_state, only: simulation_t
+  use tally, only: dissipated, stress, virial, work
   use texts, only: written
+  use wall_hits, only: collide_wall, land, make_contact, spin_up
   implicit none
   private
-  public :: collide, collide_pair, encounter_text, pass_side, passes
+  public :: collide, collide_pair, encounter_text, land, pass_side, passes, turn
 
 contains
 
   !> Collides disk i at the time t with what `code` names, unless they are together already, and logs the collision if the
   !> log is on: the same entry whichever of two disks expected it.
-  subroutine collide(sim, i, code, t, log)
+  subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code           !! a disk (> 0), or a wall: see `box_geometry`
+    integer(int32), intent(in) :: code           !! a disk (> 0), a side or an obstacle: see `partners`
     real(real64), intent(in) :: t
+    logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout) :: log
-    real(real64) :: v(2)
-    integer(int32) :: first
+    real(real64) :: v(2), change(2)
+    integer(int32) :: first, second
 
     first = i
+    second = min(code, 0)
     if (code > 0) then
       if (are_together(sim, i, code, t)) then
         call keep_apart(sim, i, code)
         return
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
+      second = i + code - first
     end if
     v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
+    if (sim%law%rotation) call turn(sim, first, t)
     if (code > 0) then
-      call collide_pair(sim, i, code, t)
+      if (sim%law%rotation) call turn(sim, second, t)
+      call collide_pair(sim, i, code, t, counts)
+      if (sim%law%grip%is_rough()) &
+        call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
     else
-      call collide_wall(sim, i, code, t)
+      call collide_wall(sim, i, code, t, counts)
     end if
+    if (.not. counts) return
+    change = sim%mass_of(first)*(sim%disk(first)%v - v)
+    if (code > 0 .and. sim%law%detailed) call add_stress(sim, first, second, change)
+    if (code > 0 .and. sim%box%is_sheared()) call book_work(sim, first, second, change)
     if (.not. log%is_on()) return
     associate (impulse => sim%mass_of(first)*magnitude(sim%disk(first)%v - v))
       if (code > 0) then
-        call log%append(sim%epoch + t, min(sim%tag(i)%id, sim%tag(code)%id), &
-          max(sim%tag(i)%id, sim%tag(code)%id), impulse)
+        call log%append(sim%epoch + t, sim%tag(first)%id, sim%tag(second)%id, impulse, change)
       else
-        call log%append(sim%epoch + t, sim%tag(i)%id, code, impulse)
+        call log%append(sim%epoch + t, sim%tag(i)%id, code, impulse, change)
       end if
     end associate
   end subroutine collide
 
-  !> Advances a disk's own state to the time t.
-  pure subroutine land(disk, gravity, t)
-    type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: gravity(2), t
-    real(real64) :: s
-
-    s = t - disk%clock
-    disk%x = flight(disk%x, disk%v, gravity, s)
-    disk%v = flight_velocity(disk%v, gravity, s)
-    disk%clock = t
-    disk%stamp = disk%stamp + 1
-  end subroutine land
-
-  !> Whether disk i is still in contact at the time t, by the contact law.
-  pure function in_contact(sim, i, t) result(yes)
-    type(simulation_t), intent(in) :: sim
+  !> Turns disk i, whose clock is still to be set, to where it is at the time t.
+  pure subroutine turn(sim, i, t)
+    type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
-    logical :: yes
 
-    yes = still_in_contact(sim%law, sim%tag(i)%collisions, t - sim%disk(i)%clock)
-  end function in_contact
+    associate (angle => sim%extra(sim%extra_row(angle_column), i))
+      angle = angle + sim%spin(i)*(t - sim%disk(i)%clock)
+    end associate
+  end subroutine turn
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.
-  subroutine collide_pair(sim, i, j, t)
+  subroutine collide_pair(sim, i, j, t, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
+    logical, value :: counts                     !! in the tally
     real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
     integer(int32) :: si, sj
+    logical :: elastic
 
     si = sim%tag(i)%species
     sj = sim%tag(j)%species
     restitution = sim%law%restitution(si, sj)
     if (sim%law%contact_time > 0) then
-      if (in_contact(sim, i, t) .or. in_contact(sim, j, t)) restitution = 1
+      elastic = .false.
+      call make_contact(sim, i, t, elastic)
+      call make_contact(sim, j, t, elastic)
+      if (elastic) restitution = 1
     end if
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
-    if (any(sim%box%periodic)) dx = dx - nearest_image(dx, sim%box%periods())
     dv = sim%disk(j)%v - sim%disk(i)%v
+    if (any(sim%box%periodic)) call see_nearest(sim, t, dx, dv)
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (allocated(sim%mass)) then                          ! as in `mass_of`, with one test for both
-      mass_i = sim%mass(sim%tag(i)%id)
-      mass_j = sim%mass(sim%tag(j)%id)
+    if (sim%extra_row(mass_column) > 0) then               ! as in `mass_of`, with one test for both
+      mass_i = sim%extra(sim%extra_row(mass_column), i)
+      mass_j = sim%extra(sim%extra_row(mass_column), j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
@@ -112,11 +117,102 @@ contains
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
     sim%tag(j)%met = sim%tag(i)%id
-    sim%events = sim%events + 1
-    sim%collisions = sim%collisions + 1
-    call sim%virial%add(-q*distance2)
-    if (restitution < 1) call sim%dissipated%add(0.5_real64*(1 - restitution)*q*b)
+    if (.not. counts) return
+    sim%tally%events = sim%tally%events + 1
+    sim%tally%collisions = sim%tally%collisions + 1
+    call sim%tally%sum(virial)%add(-q*distance2)
+    if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
+
+  !> The tangential part of a collision of the rough disks i and j, whose velocities along the normal have changed already.
+  subroutine rub(sim, i, j, normal_impulse, counts)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: normal_impulse   !! [mass length/time]
+    logical, value :: counts                     !! in the tally
+    real(real64) :: along(2), dv(2), slip, impulse, mass_i, mass_j, reduced
+
+    associate (p => sim%disk(i), q => sim%disk(j), law => sim%law)
+      along = q%x - p%x
+      dv = q%v - p%v
+      call see_nearest(sim, p%clock, along, dv)
+      along = [along(2), -along(1)]/magnitude(along)             ! z x n, n from j to i
+      dv = -dv
+      slip = dot_product(dv, along) - (p%radius*sim%spin(i) + q%radius*sim%spin(j))
+      mass_i = sim%mass_of(i)
+      mass_j = sim%mass_of(j)
+      reduced = mass_i*mass_j/(mass_i + mass_j)
+      impulse = tangential_impulse(law%grip, law%inertia, reduced, slip, normal_impulse)
+      p%v = p%v + (impulse/mass_i)*along
+      q%v = q%v - (impulse/mass_j)*along
+      call spin_up(sim, i, -p%radius*impulse)
+      call spin_up(sim, j, -q%radius*impulse)
+      if (counts) call sim%tally%sum(dissipated)%add( &
+        -impulse*(slip + 0.5_real64*impulse*(1 + 1/law%inertia)/reduced))
+    end associate
+    call settle(sim, i, j)
+  end subroutine rub
+
+  !> Takes from two disks that have collided the approach that rounding has left, if any.
+  pure subroutine settle(sim, i, j)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64) :: dx(2), dv(2)
+
+    dx = sim%disk(j)%x - sim%disk(i)%x
+    dv = sim%disk(j)%v - sim%disk(i)%v
+    call see_nearest(sim, sim%disk(i)%clock, dx, dv)
+    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)
+  end subroutine settle
+
+  !> Books what the shear has done in a collision of the disks i and j, whose momentum changes by `change` and its negative:
+  !> nothing but if they met through the bottom or the top.
+  subroutine book_work(sim, i, j, change)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: change(2)        !! [mass length/time]
+    real(real64) :: dx(2), slip(2)
+
+    dx = sim%disk(j)%x - sim%disk(i)%x
+    slip = 0
+    call see_nearest(sim, sim%disk(i)%clock, dx, slip)
+    call sim%tally%sum(work)%add(slip(1)*change(1))
+    call settle(sim, i, j)
+  end subroutine book_work
+
+  !> Adds the change of momentum of disk i in a collision with disk j, times their distance.
+  subroutine add_stress(sim, i, j, change)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: change(2)        !! [mass length/time]
+    real(real64) :: r(2), slip(2)
+    integer :: a, b
+
+    r = sim%disk(i)%x - sim%disk(j)%x
+    slip = 0
+    call see_nearest(sim, sim%disk(i)%clock, r, slip)
+    do a = 1, 2
+      do b = 1, 2
+        call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
+      end do
+    end do
+  end subroutine add_stress
+
+  !> Turns the separation of two disks at the time t, and its rate, into those of the nearest image of the second.
+  pure subroutine see_nearest(sim, t, dx, dv)
+    type(simulation_t), intent(in) :: sim
+    real(real64), intent(in) :: t
+    real(real64), intent(inout) :: dx(2)         !! [length]
+    real(real64), intent(inout) :: dv(2)         !! [length/time]
+    type(images_t) :: images
+    type(image_t) :: image
+
+    if (all(abs(dx) < 0.5_real64*sim%box%periods())) return    ! nearly always
+    images = sim%images()
+    image = images%image(images%nearest_image(dx, t))
+    dx = dx + [image%shift(1) + image%slip*t, image%shift(2)]
+    dv(1) = dv(1) + image%slip
+  end subroutine see_nearest
 
   !> Whether the disks i and j, which touch at the time t, hit each other last and through the same image. No force acts
   !> between them: only rounding can have made them approach again, when one of them passed a periodic side.
@@ -125,15 +221,17 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical :: yes
+    type(images_t) :: images
     real(real64) :: then(2), dx(2)
 
     yes = sim%tag(i)%met == sim%tag(j)%id .and. sim%tag(j)%met == sim%tag(i)%id
     if (.not. yes) return
-    associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity, period => sim%box%periods())
+    images = sim%images()
+    associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity)
       then = q%x - p%x
       dx = flight(q%x, q%v, g, t - q%clock) - flight(p%x, p%v, g, t - p%clock)
       yes = .not. (p%clock < q%clock .or. p%clock > q%clock) &
-        .and. all(abs(nearest_image(then, period) - nearest_image(dx, period)) <= 0)
+        .and. all(abs(images%nearest_image(then, p%clock) - images%nearest_image(dx, t)) <= 0)
     end associate
   end function are_together
 
@@ -142,16 +240,18 @@ contains
   pure subroutine keep_apart(sim, i, j)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
-    real(real64) :: dx(2), dv(2), step, mass_i, mass_j
+    real(real64) :: dx(2), dv(2), slip, step, mass_i, mass_j
 
     associate (p => sim%disk(i), q => sim%disk(j))
       dx = q%x - p%x
-      dx = dx - nearest_image(dx, sim%box%periods())
+      dv = 0
+      call see_nearest(sim, p%clock, dx, dv)
+      slip = dv(1)
       mass_i = sim%mass_of(i)
       mass_j = sim%mass_of(j)
       step = max(epsilon(step)*maxval(abs([p%v, q%v]))/magnitude(dx)*(mass_i*mass_j/(mass_i + mass_j)), tiny(step))
       do
-        dv = q%v - p%v
+        dv = q%v - p%v + [slip, 0.0_real64]
         if (dx(1)*dv(1) + dx(2)*dv(2) >= 0) exit
         p%v = p%v - (step/mass_i)*dx
         q%v = q%v + (step/mass_j)*dx
@@ -172,50 +272,51 @@ contains
     if (is_side(code)) yes = sim%box%periodic(axis_of(code))
   end function passes
 
-  !> Moves disk i by one period through a periodic side. Its clock, the time of its last collision, stays.
-  subroutine pass_side(sim, i, code)
+  !> Moves disk i by one period through a periodic side at the time t. Its clock stays.
+  subroutine pass_side(sim, i, code, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
+    real(real64), intent(in) :: t
     integer :: axis, period
 
     axis = axis_of(code)
     period = sense_of(code)
+    if (axis == 2 .and. sim%box%is_sheared()) then
+      call pass_seam(sim, i, period, t)
+      return
+    end if
     associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
       d%stamp = d%stamp + 1
-      sim%image(axis, i) = sim%image(axis, i) + period
+      associate (image => sim%extra(sim%extra_row(image_column) + axis - 1, i))
+        image = image + period
+      end associate
     end associate
   end subroutine pass_side
 
-  !> Collides disk i with a side or an obstacle at the time t.
-  subroutine collide_wall(sim, i, code, t)
+  !> Moves disk i through the bottom or the top of a sheared box. What is inside is displaced, and as fast as the box is
+  !> when seen from there: no force acts.
+  subroutine pass_seam(sim, i, rows, t)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code
+    integer(int32), intent(in) :: i
+    integer, intent(in) :: rows                  !! 1 through the top, -1 through the bottom
     real(real64), intent(in) :: t
-    real(real64) :: normal(2), v(2), restitution, mass
-    integer(int32) :: k
+    type(images_t) :: images
+    real(real64) :: v, columns
 
-    restitution = sim%law%wall_restitution
-    if (sim%law%contact_time > 0) then
-      if (in_contact(sim, i, t)) restitution = 1
-    end if
-    call land(sim%disk(i), sim%box%gravity, t)
-    normal = wall_normal(sim%box, code, sim%disk(i)%x)
-    v = sim%disk(i)%v
-    sim%disk(i)%v = wall_rebound(v, normal, restitution, sim%law%wall_rule)
-    mass = sim%mass_of(i)
-    call sim%dissipated%add(0.5_real64*mass*(dot_product(v, v) - dot_product(sim%disk(i)%v, sim%disk(i)%v)))
-    sim%tag(i)%collisions = sim%tag(i)%collisions + 1
-    sim%tag(i)%met = merge(0, code, is_side(code))
-    sim%events = sim%events + 1
-    if (is_side(code)) then
-      k = wall_index(code)
-      sim%wall_collisions(k) = sim%wall_collisions(k) + 1
-      call sim%wall_impulse(k)%add(mass*dot_product(sim%disk(i)%v - v, normal))
-    else
-      sim%obstacle_collisions = sim%obstacle_collisions + 1
-    end if
-  end subroutine collide_wall
+    images = sim%images()
+    associate (d => sim%disk(i), row => sim%extra_row(image_column), length => sim%box%upper(1) - sim%box%lower(1))
+      v = d%v(1)
+      associate (periods => sim%extra(row:row + 1, i))
+        call images%climb(real(rows, real64), d%clock, d%x, d%v, periods)
+        columns = floor((flight(d%x(1), d%v(1), 0.0_real64, t - d%clock) - sim%box%lower(1))/length, int64)
+        d%x(1) = d%x(1) - columns*length
+        periods(1) = periods(1) + columns
+      end associate
+      d%stamp = d%stamp + 1
+      call sim%tally%sum(work)%add(0.5_real64*sim%mass_of(i)*(d%v(1) - v)*(d%v(1) + v))
+    end associate
+  end subroutine pass_seam
 
   !> Disk i, its partner and the time, for messages.
   pure function encounter_text(sim, i, code) result(text)

@@ -5,13 +5,15 @@ module event_log
   private
   public :: event_log_t, log_capacity
 
+  integer, parameter :: record_length = 6
   integer, parameter :: log_capacity = 8192     !! collisions, twice what is written at once
 
   !> A log without records is switched off. The dynamics should pause when it is full.
   type :: event_log_t
     integer :: n = 0                              !! collisions in the list
-    !> (4,:) Time since the start of the run, ids i and j in the order of the input, and |change of momentum|
-    !> [mass length/time]. Instead of j: 0, -1, -2, -3 the left, right, bottom, top side, -4, ... obstacles.
+    !> (6,:) Time since the start of the run, ids i and j in the order of the input, and the change of momentum of i: its
+    !> size and its components [mass length/time]. Instead of j: 0, -1, -2, -3 the left, right, bottom, top side, -4, ...
+    !> obstacles.
     real(real64), allocatable :: record(:, :)
   contains
     procedure :: is_on
@@ -33,7 +35,7 @@ contains
     integer, intent(in) :: capacity
     type(event_log_t) :: log
 
-    allocate (log%record(4, capacity))
+    allocate (log%record(record_length, capacity))
   end function new_event_log
 
   !> Whether collisions are to be listed.
@@ -54,23 +56,23 @@ contains
   end function is_full
 
   !> Lists a collision.
-  pure subroutine append(self, time, i, j, impulse)
+  pure subroutine append(self, time, i, j, impulse, change)
     class(event_log_t), intent(inout) :: self
     real(real64), intent(in) :: time
     integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: impulse
+    real(real64), intent(in) :: impulse, change(2)
 
-    call self%append_record([time, real(i, real64), real(j, real64), impulse])
+    call self%append_record([time, real(i, real64), real(j, real64), impulse, change])
   end subroutine append
 
   !> Lists a collision from another list. The list grows only if one time step needs more than the free half.
   pure subroutine append_record(self, record)
     class(event_log_t), intent(inout) :: self
-    real(real64), intent(in) :: record(4)
+    real(real64), intent(in) :: record(record_length)
     real(real64), allocatable :: longer(:, :)
 
     if (self%n == size(self%record, 2)) then
-      allocate (longer(4, 2*self%n))
+      allocate (longer(record_length, 2*self%n))
       longer(:, :self%n) = self%record
       call move_alloc(longer, self%record)
     end if

@@ -2,8 +2,11 @@
 !> that the collisions have gathered.
 module observables
   use kinds, only: int32, real64
-  use box_geometry, only: free_area
+  use box_geometry, only: free_area, surface_path
+  use drive, only: noise
+  use partners, only: n_sides
   use simulation_state, only: simulation_t
+  use tally, only: dissipated, drive_energy, heat, stress, surface_tally_t, virial, work
   implicit none
   private
   public :: observable_list_t, observed, own_names, total_energy
@@ -34,6 +37,13 @@ module observables
     real(real64) :: potential = 0.0_real64        !! [energy]
     real(real64) :: speed = 0.0_real64
     real(real64) :: momentum(2) = 0.0_real64
+    real(real64) :: rotational = 0.0_real64       !! kinetic [energy]
+    real(real64) :: own_kinetic = 0.0_real64      !! relative to the velocity profile of a sheared box [energy]
+    real(real64) :: own_momentum(2) = 0.0_real64  !! likewise
+    real(real64) :: energy = 0.0_real64           !! of all kinds, so exactly that it can be balanced; unless `is_driven`: 0
+    real(real64) :: lost = 0.0_real64             !! what rounding has taken from it
+  contains
+    procedure :: total
   end type sums_t
 
 contains
@@ -43,39 +53,63 @@ contains
     type(simulation_t), intent(in) :: sim
     type(observable_list_t) :: list
     type(sums_t) :: sums(0:size(sim%species))     ! 0: all
-    integer :: s
+    integer :: s, k
 
     call add_up(sim, sums)
-    call add_means(list, "all", sums(0))
+    call add_means(list, "all", sums(0), sim%law%rotation)
     do s = 1, size(sim%species)
-      call add_means(list, sim%species(s)%name, sums(s))
+      call add_means(list, sim%species(s)%name, sums(s), sim%law%rotation)
     end do
-    call list%add("total_energy", [sums(0)%kinetic + sums(0)%potential])
+    call list%add("total_energy", [sums(0)%total(sim%is_driven())])
     call list%add("momentum", sums(0)%momentum)
-    call list%add("pressure", [pressure(sim, sums(0)%kinetic)])
-    call list%add("virial", [sim%virial%value()])
-    call list%add("dissipated_energy", [sim%dissipated%value()])
-    call list%add("collisions", real([sim%collisions], real64), is_count=.true.)
-    call list%add("wall_collisions", real(sim%wall_collisions, real64), is_count=.true.)
-    call list%add("wall_impulse", sim%wall_impulse%value())
-    call list%add("obstacle_collisions", real([sim%obstacle_collisions], real64), is_count=.true.)
+    call list%add("pressure", [pressure(sim, sums(0)%own_kinetic)])
+    call list%add("virial", [sim%tally%total(virial)])
+    call list%add("dissipated_energy", [sim%tally%total(dissipated)])
+    if (sim%drive%is_on()) call list%add("drive_energy", [sim%tally%total(drive_energy)])
+    call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
+    associate (side => sim%tally%surface(:n_sides), obstacle => sim%tally%surface(n_sides + 1:))
+      call list%add("wall_collisions", real(side%collisions, real64), is_count=.true.)
+      call list%add("wall_impulse", abs([side(:2)%impulse(1)%value(), side(3:)%impulse(2)%value()]))
+      call list%add("obstacle_collisions", real([sum(obstacle%collisions)], real64), is_count=.true.)
+    end associate
+    if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
+    if (sim%box%highest_speed() > 0) call list%add("work", [sim%tally%total(work)])
+    if (sim%law%detailed) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
+    do k = 1, sim%box%n_surfaces()
+      if (sim%box%is_wall(k)) call add_surface(list, surface_path(sim%box, k), sim%tally%surface(k))
+    end do
   end function observed
 
+  !> What has happened at a wall: the impulse given to it, the energy that disks have gained there, and how often.
+  pure subroutine add_surface(list, path, surface)
+    type(observable_list_t), intent(inout) :: list
+    character(len=*), intent(in) :: path
+    type(surface_tally_t), intent(in) :: surface
+
+    call list%add(path//"/impulse", surface%impulse%value())
+    call list%add(path//"/energy", [surface%energy%value()])
+    call list%add(path//"/collisions", real([surface%collisions], real64), is_count=.true.)
+  end subroutine add_surface
+
   !> Means over a species, per disk. The temperature is kT in two dimensions: the kinetic energy relative to the
-  !> common motion.
-  pure subroutine add_means(list, group, sums)
+  !> common motion, and to the velocity profile of a sheared box.
+  pure subroutine add_means(list, group, sums, rotation)
     type(observable_list_t), intent(inout) :: list
     character(len=*), intent(in) :: group         !! name of the species
     type(sums_t), intent(in) :: sums
+    logical, intent(in) :: rotation               !! disks can turn
     real(real64) :: n, drift
 
     n = max(sums%n, 1.0_real64)
     drift = 0
-    if (sums%n > 0) drift = 0.5_real64*dot_product(sums%momentum, sums%momentum)/sums%mass
+    if (sums%n > 0) drift = 0.5_real64*dot_product(sums%own_momentum, sums%own_momentum)/sums%mass
     call list%add(group//"/kinetic_energy", [sums%kinetic/n])
     call list%add(group//"/potential_energy", [sums%potential/n])
     call list%add(group//"/mean_speed", [sums%speed/n])
-    call list%add(group//"/temperature", [max(sums%kinetic - drift, 0.0_real64)/n])
+    call list%add(group//"/temperature", [max(sums%own_kinetic - drift, 0.0_real64)/n])
+    if (.not. rotation) return
+    call list%add(group//"/rotational_energy", [sums%rotational/n])
+    call list%add(group//"/rotational_temperature", [2*sums%rotational/n])
   end subroutine add_means
 
   !> Adds an observable, with one or more components.
@@ -117,15 +151,21 @@ contains
   end function values
 
   !> Names below /observables that no species may have.
-  pure function own_names() result(names)
+  function own_names() result(names)
     character(len=64), allocatable :: names(:)
     type(simulation_t) :: empty
     type(observable_list_t) :: list
     integer :: k
 
     allocate (empty%species(0), empty%disk(0), empty%tag(0))
+    empty%drive%kind = noise
+    call empty%tally%make_room(n_sides)
+    empty%box%side%law%temperature = 1            ! but all that can be measured
+    empty%box%side%law%speed = 1
+    empty%law%detailed = .true.
     list = observed(empty)
-    allocate (names(list%n))
+    allocate (names(list%n + 1))
+    names(list%n + 1) = "walls"                   ! it has none
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)
@@ -140,19 +180,48 @@ contains
     type(sums_t) :: sums(0:size(sim%species))
 
     call add_up(sim, sums)
-    energy = sums(0)%kinetic + sums(0)%potential
+    energy = sums(0)%total(sim%is_driven())
   end function total_energy
+
+  !> Energy of all kinds.
+  pure function total(self, exact)
+    class(sums_t), intent(in) :: self
+    logical, intent(in) :: exact
+    real(real64) :: total
+
+    total = self%kinetic + self%potential + self%rotational
+    if (exact) total = self%energy + self%lost
+  end function total
+
+  !> Adds to the energy (Neumaier, Z. Angew. Math. Mech. 54, 39 (1974)): what disks are given shows in the last digits of
+  !> a sum over many.
+  pure subroutine add_energy(sums, term)
+    type(sums_t), intent(inout) :: sums
+    real(real64), intent(in) :: term
+    real(real64) :: new
+
+    new = sums%energy + term
+    if (abs(sums%energy) >= abs(term)) then
+      sums%lost = sums%lost + ((sums%energy - new) + term)
+    else
+      sums%lost = sums%lost + ((term - new) + sums%energy)
+    end if
+    sums%energy = new
+  end subroutine add_energy
 
   !> One pass over the disks. Heights count from the origin.
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     type(sums_t), intent(out) :: sums(0:)
-    real(real64) :: x(2), v(2), speed2, mass
+    real(real64) :: v(2), speed2, mass
+    logical :: falling, sheared, driven
     integer(int32) :: i
     integer :: s
 
+    falling = sim%box%falling()
+    sheared = sim%box%is_sheared()
+    driven = sim%is_driven()
     do i = 1, sim%n_disks()
-      x = sim%position(i)
       v = sim%velocity(i)
       mass = sim%mass_of(i)
       speed2 = dot_product(v, v)
@@ -160,9 +229,18 @@ contains
         own%n = own%n + 1
         own%mass = own%mass + mass
         own%kinetic = own%kinetic + 0.5_real64*mass*speed2
-        own%potential = own%potential - mass*dot_product(sim%box%gravity, x)
+        if (falling) own%potential = own%potential - mass*dot_product(sim%box%gravity, sim%position(i))
         own%speed = own%speed + sqrt(speed2)
         own%momentum = own%momentum + mass*v
+        if (sim%law%rotation) own%rotational = own%rotational + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
+        if (sheared) then
+          v = v - sim%box%stream(sim%position(i))
+          own%own_kinetic = own%own_kinetic + 0.5_real64*mass*dot_product(v, v)
+          own%own_momentum = own%own_momentum + mass*v
+        end if
+        if (driven) call add_energy(own, 0.5_real64*mass*speed2)
+        if (driven .and. falling) call add_energy(own, -mass*dot_product(sim%box%gravity, sim%position(i)))
+        if (driven .and. sim%law%rotation) call add_energy(own, 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2)
       end associate
     end do
     do s = 1, size(sim%species)
@@ -173,6 +251,15 @@ contains
         all%potential = all%potential + own%potential
         all%speed = all%speed + own%speed
         all%momentum = all%momentum + own%momentum
+        all%rotational = all%rotational + own%rotational
+        all%lost = all%lost + own%lost
+        call add_energy(all, own%energy)
+        if (.not. sheared) then
+          own%own_kinetic = own%kinetic
+          own%own_momentum = own%momentum
+        end if
+        all%own_kinetic = all%own_kinetic + own%own_kinetic
+        all%own_momentum = all%own_momentum + own%own_momentum
       end associate
     end do
   end subroutine add_up
@@ -181,11 +268,11 @@ contains
   !> distance over the pair collisions since the start.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: kinetic           !! of all disks [energy]
+    real(real64), intent(in) :: kinetic           !! of all disks, relative to the profile of a sheared box [energy]
     real(real64) :: pressure
 
     pressure = kinetic
-    if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%virial%value()/sim%time()
+    if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
     pressure = pressure/free_area(sim%box)
   end function pressure
 

@@ -5,12 +5,12 @@ module partners
   implicit none
   private
   public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, wall_index
-  public :: obstacle_code, obstacle_number, crossing, side_crossed, leaves_margin, nothing
+  public :: obstacle_code, obstacle_number, crossing, side_crossed, looks_again, nothing
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_obstacle = -n_sides
   integer(int32), parameter :: first_crossing = -2000000000
-  integer(int32), parameter :: leaves_margin = first_crossing - n_sides    !! a big disk: see `big_disks`
+  integer(int32), parameter :: looks_again = first_crossing - n_sides      !! the end of what was searched, within a cell
   integer(int32), parameter :: nothing = -huge(1_int32)
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 

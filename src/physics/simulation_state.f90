@@ -3,43 +3,48 @@
 module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
-  use partners, only: n_sides
   use collisions, only: contact_law_t
-  use disks, only: disk_t, species_t, tag_t
-  use exact_sums, only: exact_sum_t
+  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, n_fixed, species_t, &
+    spin_column, tag_t
+  use drive, only: drive_t
   use free_flight, only: flight, flight_velocity
+  use images, only: images_t
+  use tally, only: tally_t
   implicit none
   private
-  public :: simulation_t
+  public :: given_t, simulation_t
 
-  type :: simulation_t
-    ! Given by the input
+  !> Walls and kicks may give more than they commonly do, and nobody knows how much less until they act: units fine enough
+  !> for the energies before that leave room for the sums of 2**35 terms.
+  real(real64), parameter :: uncommon = 64, finer = 2.0_real64**(-30)
+
+  !> What the input gives, the same for all parts of a simulation.
+  type :: given_t
     type(box_t) :: box
     type(contact_law_t) :: law
     type(species_t), allocatable :: species(:)
-    real(real64), allocatable :: mass(:)          !! (n) by `tag%id`, if they are not those of the species [mass]
-    logical :: own_sizes = .false.                !! masses and radii are not those of the species: checkpoints have them
-    ! Stored in a checkpoint
+    integer(int64) :: seed = 1                    !! of random numbers drawn in the run
+    type(drive_t) :: drive
+    logical :: own_sizes = .false.                !! masses and radii are not those of the species
+  end type given_t
+
+  !> And what a checkpoint stores.
+  type, extends(given_t) :: simulation_t
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    integer(int64), allocatable :: image(:, :)    !! (2,n) periods travelled: true position = x + image*edges; (2,0) between walls
+    real(real64), allocatable :: extra(:, :)      !! (n_extra,n) the optional columns of `disks: columns` that are needed
+    integer :: extra_row(n_fixed + 1:n_columns) = 0   !! in which row of these a column is; 0: not there
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
     real(real64) :: epoch_end = 0.0_real64        !! when the epoch moves, since the epoch; 0: not known yet [time]
-    integer(int64) :: epoch_events = 0            !! `events` at the beginning of the epoch
+    integer(int64) :: epoch_events = 0            !! events at the beginning of the epoch
     ! A collapse is an endless series of events during which time does not advance.
     real(real64) :: blink = 0.0_real64            !! in which nothing moves visibly; 0: not known yet [time]
     real(real64) :: last_advance = 0.0_real64     !! when time had last advanced by more than that, since the epoch [time]
-    integer(int64) :: events_then = 0             !! `events` at that time
-    ! Counts and sums since the start of the run
-    integer(int64) :: events = 0                  !! collisions of any kind
-    integer(int64) :: collisions = 0              !! of pairs
-    integer(int64) :: wall_collisions(n_sides) = 0      !! left, right, bottom, top
-    integer(int64) :: obstacle_collisions = 0
-    type(exact_sum_t) :: wall_impulse(n_sides)    !! of |change of normal momentum| [mass length/time]
-    type(exact_sum_t) :: virial                   !! of impulse times distance over pair collisions [energy]
-    type(exact_sum_t) :: dissipated               !! kinetic energy lost in collisions [energy]
+    integer(int64) :: events_then = 0             !! events at that time
+    integer(int64) :: kicks = 0                   !! since the start of the run
+    type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
   contains
     procedure :: time
@@ -47,12 +52,23 @@ module simulation_state
     procedure :: make_room
     procedure :: mass_of
     procedure :: masses
-    procedure :: take_masses
+    procedure :: settle_masses
+    procedure :: image
+    procedure :: images => images_now
+    procedure :: has_column
+    procedure :: values_of
+    procedure :: values_now
+    procedure :: take_values
     procedure :: position
     procedure :: velocity
+    procedure :: spin
+    procedure :: inertia_of
     procedure :: kinetic_energy
+    procedure :: is_driven
     procedure :: start_sums
     procedure :: choose_units
+    procedure :: fastest_drive
+    procedure, private :: choose_columns
   end type simulation_t
 
 contains
@@ -74,13 +90,31 @@ contains
   end function n_disks
 
   !> Makes room for n disks.
-  pure subroutine make_room(self, n)
-    class(simulation_t), intent(inout) :: self    !! with its box
+  pure subroutine make_room(self, n, like)
+    class(simulation_t), intent(inout) :: self    !! with all that the input gives
     integer(int32), intent(in) :: n
+    class(simulation_t), intent(in), optional :: like   !! whose columns they are to have
 
+    call self%choose_columns()
+    if (present(like)) self%extra_row = like%extra_row
     allocate (self%disk(n), self%tag(n))
-    allocate (self%image(2, merge(n, 0, any(self%box%periodic))), source=0_int64)
+    allocate (self%extra(maxval(self%extra_row), n), source=0.0_real64)
   end subroutine make_room
+
+  !> Which of the optional columns the disks have.
+  pure subroutine choose_columns(self)
+    class(simulation_t), intent(inout) :: self
+    logical :: needed(n_fixed + 1:n_columns)
+    integer :: k
+
+    needed(mass_column) = self%own_sizes
+    needed(image_column:image_column + 1) = any(self%box%periodic)
+    needed(contact_column) = self%law%contact_time > 0
+    needed(spin_column) = self%law%rotation
+    needed(angle_column) = self%law%rotation .or. self%law%orientation
+    self%extra_row = [(count(needed(:k)), k=n_fixed + 1, n_columns)]
+    where (.not. needed) self%extra_row = 0
+  end subroutine choose_columns
 
   !> Mass of disk i.
   pure function mass_of(self, i) result(mass)
@@ -88,8 +122,8 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: mass                          !! [mass]
 
-    if (allocated(self%mass)) then
-      mass = self%mass(self%tag(i)%id)
+    if (self%extra_row(mass_column) > 0) then
+      mass = self%extra(self%extra_row(mass_column), i)
     else
       mass = self%species(self%tag(i)%species)%mass
     end if
@@ -104,20 +138,134 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Keeps masses of all disks, as few as possible.
-  pure subroutine take_masses(self, mass)
+  !> Gives the species the masses of their disks, which need no column if those of each species are equal.
+  pure subroutine settle_masses(self)
     class(simulation_t), intent(inout) :: self
-    real(real64), intent(in) :: mass(:)           !! (n) in the order of the input [mass]
-    integer :: s, first, last
+    real(real64) :: mass(size(self%disk))         ! [mass]
+    logical :: equal
+    integer :: s, row
 
-    last = 0
+    mass = self%masses()
+    equal = .true.
     do s = 1, size(self%species)
-      first = last + 1
-      last = last + self%species(s)%count
-      if (maxval(mass(first:last)) > minval(mass(first:last))) self%mass = mass
-      self%species(s)%mass = maxval(mass(first:last))
+      associate (own => self%tag%species == s)
+        self%species(s)%mass = maxval(mass, mask=own)
+        equal = equal .and. .not. minval(mass, mask=own) < self%species(s)%mass
+      end associate
     end do
-  end subroutine take_masses
+    row = self%extra_row(mass_column)
+    if (.not. equal .or. row == 0) return
+    self%extra = self%extra(pack([(s, s=1, size(self%extra, 1))], [(s /= row, s=1, size(self%extra, 1))]), :)
+    self%extra_row = merge(self%extra_row - 1, self%extra_row, self%extra_row > row)
+    self%extra_row(mass_column) = 0
+  end subroutine settle_masses
+
+  !> Periods that disk i has travelled: its true position is x + image*edges.
+  pure function image(self, i) result(periods)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    integer(int64) :: periods(2)
+
+    periods = 0
+    associate (row => self%extra_row(image_column))
+      if (row > 0) periods = int(self%extra(row:row + 1, i), int64)
+    end associate
+  end function image
+
+  !> The images of the box, for the clocks of this epoch.
+  pure function images_now(self) result(images)
+    class(simulation_t), intent(in) :: self
+    type(images_t) :: images
+
+    images = self%box%images(self%epoch)
+  end function images_now
+
+  !> Whether disks have column k of `disks: columns`.
+  pure function has_column(self, k) result(yes)
+    class(simulation_t), intent(in) :: self
+    integer, intent(in) :: k
+    logical :: yes
+
+    yes = k <= n_fixed
+    if (.not. yes) yes = self%extra_row(k) > 0
+  end function has_column
+
+  !> Values of column k of `disks: columns`.
+  pure function values_of(self, k) result(values)
+    class(simulation_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64) :: values(size(self%disk))
+
+    select case (columns(k)%name)
+    case ("x1")
+      values = self%disk%x(1)
+    case ("x2")
+      values = self%disk%x(2)
+    case ("v1")
+      values = self%disk%v(1)
+    case ("v2")
+      values = self%disk%v(2)
+    case ("clock")
+      values = self%disk%clock
+    case ("radius")
+      values = self%disk%radius
+    case ("species")
+      values = self%tag%species
+    case ("id")
+      values = self%tag%id
+    case ("collisions")
+      values = self%tag%collisions
+    case ("met")
+      values = self%tag%met
+    case ("mass")
+      values = self%masses()
+    case default
+      values = self%extra(self%extra_row(k), :)
+    end select
+  end function values_of
+
+  !> The same now: what grows in time has grown since the clock of its disk.
+  pure function values_now(self, k) result(values)
+    class(simulation_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(real64) :: values(size(self%disk))
+
+    values = self%values_of(k)
+    if (columns(k)%rate == 0) return
+    if (self%has_column(columns(k)%rate)) values = values + self%values_of(columns(k)%rate)*(self%now - self%disk%clock)
+  end function values_now
+
+  !> Sets the values of column k.
+  pure subroutine take_values(self, k, values)
+    class(simulation_t), intent(inout) :: self
+    integer, intent(in) :: k
+    real(real64), intent(in) :: values(:)         !! (n)
+
+    select case (columns(k)%name)
+    case ("x1")
+      self%disk%x(1) = values
+    case ("x2")
+      self%disk%x(2) = values
+    case ("v1")
+      self%disk%v(1) = values
+    case ("v2")
+      self%disk%v(2) = values
+    case ("clock")
+      self%disk%clock = values
+    case ("radius")
+      self%disk%radius = values
+    case ("species")
+      self%tag%species = int(values, int32)
+    case ("id")
+      self%tag%id = int(values, int32)
+    case ("collisions")
+      self%tag%collisions = int(values, int64)
+    case ("met")
+      self%tag%met = int(values, int32)
+    case default
+      self%extra(self%extra_row(k), :) = values
+    end select
+  end subroutine take_values
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
@@ -141,7 +289,26 @@ contains
     end associate
   end function velocity
 
-  !> Kinetic energy of all disks now.
+  !> Angular velocity of disk i.
+  pure function spin(self, i) result(omega)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    real(real64) :: omega                         !! [1/time]
+
+    omega = 0
+    if (self%extra_row(spin_column) > 0) omega = self%extra(self%extra_row(spin_column), i)
+  end function spin
+
+  !> Moment of inertia of disk i.
+  pure function inertia_of(self, i) result(inertia)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    real(real64) :: inertia                       !! [mass length**2]
+
+    inertia = self%law%inertia*self%mass_of(i)*self%disk(i)%radius**2
+  end function inertia_of
+
+  !> Kinetic energy of all disks now, of rotation too.
   pure function kinetic_energy(self) result(energy)
     class(simulation_t), intent(in) :: self
     real(real64) :: energy, v(2)
@@ -152,29 +319,58 @@ contains
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
+    if (.not. self%law%rotation) return
+    do i = 1, self%n_disks()
+      energy = energy + 0.5_real64*self%inertia_of(i)*self%spin(i)**2
+    end do
   end function kinetic_energy
+
+  !> Whether disks are given energy, so that nothing limits their speed.
+  pure function is_driven(self) result(yes)
+    class(simulation_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%box%gives_energy() .or. self%drive%is_on()
+  end function is_driven
 
   !> Notes the energy of the start and chooses how fine the sums are, unless that has been done.
   pure subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
 
-    if (self%dissipated%per_one > 0 .or. self%n_disks() == 0) return
+    if (self%tally%has_units() .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
     call self%choose_units()
   end subroutine start_sums
 
-  !> The units of the sums, from what a collision can contribute at most given the energy of the start. Nothing is lost
-  !> if it is more: disks that fall through periodic sides gain energy for ever.
+  !> How fast kicks make disks, on average over those of the species that get fastest; 0 without kicks.
+  pure function fastest_drive(self) result(speed)
+    class(simulation_t), intent(in) :: self
+    real(real64) :: speed                         !! [length/time]
+    integer :: s
+
+    speed = 0
+    do s = 1, size(self%species)
+      if (self%drive%reaches(s)) speed = max(speed, sqrt(self%drive%speed2(self%species(s)%mass)))
+    end do
+  end function fastest_drive
+
+  !> The units of the sums, from what a collision can contribute at most given the energy of the start, or what walls and
+  !> kicks commonly give to a disk. Nothing is lost if it is more: disks that fall through periodic sides gain energy for
+  !> ever.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
-    real(real64) :: energy, impulse, mass
+    real(real64), dimension(size(self%species)) :: mass, kicked    ! [mass, (length/time)**2]
+    real(real64) :: energy, impulse
+    integer :: s
 
-    mass = sum(self%species%count*self%species%mass)
-    energy = self%start_energy + mass*sum(abs(self%box%gravity)*self%box%edges())
-    impulse = sqrt(8*maxval(self%species%mass))*sqrt(energy)
-    call self%dissipated%choose_unit(energy)
-    call self%wall_impulse%choose_unit(impulse)
-    call self%virial%choose_unit(impulse*2*maxval(self%disk%radius))
+    mass = self%species%mass
+    kicked = merge(self%drive%speed2(mass), 0.0_real64, self%drive%reaches([(s, s=1, size(mass))]))
+    energy = self%start_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
+      + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
+    impulse = sqrt(8*maxval(mass))*sqrt(energy)
+    call self%tally%make_room(self%box%n_surfaces())
+    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven()) &
+      *[energy, impulse, impulse*2*maxval(self%disk%radius)])
   end subroutine choose_units
 
 end module simulation_state

@@ -41,8 +41,6 @@ module big_disks
     integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none
     type(listing_t), allocatable :: listing(:)
     integer(int32), private :: free = 0          !! first of the entries not in use
-    real(real64), private :: width(2) = 0.0_real64    !! from cell to cell [length]
-    real(real64), private :: half(2) = 0.0_real64     !! of a cell's extent [length]
   contains
     procedure :: start
     procedure :: number_of
@@ -79,8 +77,6 @@ contains
     self%count = size(self%disk, kind=int32)
     self%small = small
     if (self%count == 0) return
-    self%width = faces%width
-    self%half = 0.5_real64*(faces%width + faces%overlap)
     self%margin = 0.5_real64*minval(faces%width)
     if (allocated(self%ring)) deallocate (self%ring, self%centre, self%first, self%listing)
     allocate (self%ring(self%count), self%centre(2, self%count), self%first(n(1), n(2)), self%listing(0))
@@ -88,7 +84,7 @@ contains
     self%free = 0
     do k = 1, self%count
       allocate (self%ring(k)%at(0))
-      call self%register(sim, k)
+      call self%register(sim, k, faces)
     end do
   end subroutine start
 
@@ -104,17 +100,18 @@ contains
   end function number_of
 
   !> Moves the registration of the k-th big disk to where it is now.
-  subroutine register(self, sim, k)
+  subroutine register(self, sim, k, faces)
     class(big_disks_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: k
+    type(cell_faces_t), intent(in) :: faces
     integer :: m
 
     do m = 1, size(self%ring(k)%at)
       call unlist(self, self%ring(k)%at(m)%cell, k)
     end do
     self%centre(:, k) = sim%position(self%disk(k))
-    call find_ring(self, sim, k)
+    call find_ring(self, sim, k, faces)
     do m = 1, size(self%ring(k)%at)
       call list_in(self, self%ring(k)%at(m), k)
     end do
@@ -122,28 +119,31 @@ contains
 
   !> The cells that a small disk's centre can be in when it touches the k-th big disk: those that meet the
   !> annulus between the rim and one small radius outside it, both widened by the margin.
-  subroutine find_ring(self, sim, k)
+  subroutine find_ring(self, sim, k, faces)
     class(big_disks_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: k
+    type(cell_faces_t), intent(in) :: faces
     type(ring_cell_t), allocatable :: found(:)
-    real(real64) :: inner, outer, to_middle(2)
+    real(real64) :: inner, outer, centre(2), corner(2, 2), half(2)
     integer(int32) :: low(2), high(2), n(2), ix, iy, m, period(2)
 
     inner = sim%disk(self%disk(k))%radius - self%margin
     outer = inner + self%small + 2*self%margin
     n = shape(self%first)
-    low = floor((self%centre(:, k) - outer - sim%box%lower - self%half)/self%width + 0.5_real64) + 1
-    high = floor((self%centre(:, k) + outer - sim%box%lower + self%half)/self%width - 0.5_real64) + 1
-    low = merge(low, max(low, 1), sim%box%periodic)
-    high = merge(high, min(high, n), sim%box%periodic)
+    centre = self%centre(:, k) - sim%box%lower
+    half = 0.5_real64*(faces%width + faces%overlap)
+    low = floor((centre - outer - half)/faces%width + 0.5_real64) + 1
+    high = floor((centre + outer + half)/faces%width - 0.5_real64) + 1
+    low = merge(low, min(max(low, 1), n), sim%box%periodic)
+    high = merge(high, max(min(high, n), 1), sim%box%periodic)
     allocate (found(product(max(high - low + 1, 0))))
     m = 0
     do iy = low(2), high(2)
       do ix = low(1), high(1)
-        to_middle = abs(sim%box%lower + ([ix, iy] - 0.5_real64)*self%width - self%centre(:, k))
-        if (magnitude(max(to_middle - self%half, 0.0_real64)) > outer) cycle
-        if (magnitude(to_middle + self%half) < inner) cycle
+        call faces%rectangle([ix, iy], n, corner(:, 1), corner(:, 2))
+        if (magnitude(max(corner(:, 1) - centre, centre - corner(:, 2), 0.0_real64)) > outer) cycle
+        if (magnitude(max(abs(corner(:, 1) - centre), abs(corner(:, 2) - centre))) < inner) cycle
         period = floor(real([ix, iy] - 1, real64)/n)
         m = m + 1
         found(m) = ring_cell_t([ix, iy] - period*n, -period)

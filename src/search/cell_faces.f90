@@ -4,10 +4,12 @@
 !> disk may belong to any of them, best to the one that it leaves last. With wide cells this halves the crossings.
 module cell_faces
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: box_t, side_time
+  use box_geometry, only: box_t
+  use box_sides, only: side_time
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
-  use partners, only: crossing, is_wall, sense_of, side_crossed
+  use partners, only: crossing, is_wall, nothing, sense_of, side_crossed
+  use shapes, only: spare
   implicit none
   private
   public :: all_cells, cell_faces_t, patch_t
@@ -38,17 +40,19 @@ module cell_faces
     real(real64) :: place = 0.0_real64             !! of the face or side [length]
     real(real64) :: inset = 0.0_real64             !! in radii, from there to the line that the disk's centre reaches
     integer(int32) :: code = 0                     !! of the event: a side, or a crossing
+    logical :: struck = .false.                    !! on this side of the cell, or here, a side moves that may come into it
   end type line_t
 
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
     real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
-    logical :: falling = .false.                   !! disks fly on parabolas
+    logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
     type(box_t) :: box
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
     type(line_t), allocatable :: row(:, :)         !! (0:1,rows)
   contains
     procedure :: set
+    procedure :: rectangle
     procedure :: choose_cell
     procedure :: next
     procedure, private :: next_falling
@@ -130,10 +134,12 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%falling = box%falling()
+    self%falling = box%falling() .or. any(box%side%motion%travels())
     self%box = box
     call cut(self, 1, patch, self%column)
     call cut(self, 2, patch, self%row)
+    call find_struck(self, 1, patch%small, self%column)
+    call find_struck(self, 2, patch%small, self%row)
   end subroutine set
 
   !> The faces of columns (axis 1) or rows.
@@ -158,6 +164,34 @@ contains
       if (place == patch%whole(axis)) line(1, k) = line_t(self%box%upper(axis), -inset, high)
     end do
   end subroutine cut
+
+  !> Finds the columns (axis 1) or rows in which a side that moves may strike disks.
+  pure subroutine find_struck(self, axis, radius, line)
+    class(cell_faces_t), intent(in) :: self
+    integer, intent(in) :: axis
+    real(real64), intent(in) :: radius             !! of the largest disks in question [length]
+    type(line_t), intent(inout) :: line(0:, :)
+    real(real64) :: reach(2, 2)
+
+    reach = self%box%reach()
+    associate (side => self%box%side(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + radius)*(1 + spare))
+      line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= self%box%lower(axis) + within(1)
+      line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= self%box%upper(axis) - within(2)
+    end associate
+  end subroutine find_struck
+
+  !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move.
+  pure subroutine rectangle(self, cell, n, low, high)
+    class(cell_faces_t), intent(in) :: self
+    integer(int32), intent(in) :: cell(2)          !! of all those of the box
+    integer(int32), intent(in) :: n(2)             !! columns, rows of the box
+    real(real64), intent(out) :: low(2), high(2)   !! from its lower left corner [length]
+    real(real64) :: reach(2, 2)
+
+    reach = self%box%reach()
+    low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(reach(:, 1), 0.0_real64, cell == 1)
+    high = self%width*cell + 0.5_real64*self%overlap + merge(reach(:, 2), 0.0_real64, cell == n)
+  end subroutine rectangle
 
   !> Of the cells that contain the disk, the one that it leaves last.
   pure subroutine choose_cell(self, disk, now, cell)
@@ -276,7 +310,10 @@ contains
 
     g = box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
-    if (.not. abs(g) > 0) then
+    if (any(line%struck)) then
+      call next_moving(line, axis, box, disk, now, t, code)
+      return
+    else if (.not. abs(g) > 0) then
       t = line_time(line(up), disk, axis)
     else if (any(is_wall(line%code))) then
       t = falling_time(line(up), axis, box, disk, now)
@@ -300,6 +337,32 @@ contains
     end if
     code = line(up)%code
   end subroutine next_along
+
+  !> The same where a side that moves may come into the cell, whether it is a side of it or not.
+  pure subroutine next_moving(line, axis, box, disk, now, t, code)
+    type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
+    integer(int32), intent(in) :: axis
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(in) :: now
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: code
+    integer(int32) :: event(4), k, k_side
+    real(real64) :: t_k
+
+    k_side = 2 - 2*axis                            ! code of the lower side
+    event(:2) = merge([k_side, k_side - 1], [nothing, nothing], line%struck)
+    event(3:) = merge(nothing, line%code, line%code == event(:2))
+    t = never
+    code = line(0)%code
+    do k = 1, size(event)
+      if (event(k) == nothing) cycle
+      if (is_wall(event(k))) t_k = side_time(box, disk, event(k))
+      if (.not. is_wall(event(k))) t_k = falling_time(line(modulo(k - 1, 2)), axis, box, disk, now)
+      if (t_k < t) code = event(k)
+      t = min(t, t_k)
+    end do
+  end subroutine next_moving
 
   !> When a falling disk reaches a face or side. The root before `now`, when it came in, is not the one.
   pure function falling_time(line, axis, box, disk, now) result(t)

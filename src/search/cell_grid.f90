@@ -4,15 +4,17 @@
 module cell_grid
   use kinds, only: int16, int32, never, real64
   use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
-  use box_geometry, only: next_obstacle, next_side
+  use box_geometry, only: next_obstacle
+  use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
   use cell_scans, only: scan_around_edge, scan_cell, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
+  use images, only: images_t
   use neighbour_search, only: earliest_contact, latest_clock, neighbour_search_t, no_gravity, prospect_t
   use obstacle_lists, only: obstacle_lists_t
-  use partners, only: axis_of, is_wall, leaves_margin, nothing, sense_of, side_crossed
+  use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
   use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none
@@ -27,10 +29,10 @@ module cell_grid
     private
     type(patch_t), public :: patch                 !! the cells; chosen here unless they are only a part of the box
     logical, public :: is_part = .false.
-    type(cell_faces_t) :: faces                    !! of the cells, and the sides among them
+    type(cell_faces_t), public :: faces                    !! of the cells, and the sides among them
     logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
-    type(cell_contents_t) :: cells                 !! numbered row by row, with a ring of empty ones around
+    type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
   contains
     procedure :: build
@@ -40,7 +42,8 @@ module cell_grid
     procedure :: read_ahead
     procedure :: insert
     procedure :: take_out
-    procedure, private :: predict_with_care        ! bound, so that it is not inlined into the hot path
+    procedure :: predict_with_care                 ! bound, so that it is not inlined into the hot path
+    procedure :: change_cell
     procedure, private :: follow_big
   end type cell_grid_t
 
@@ -84,7 +87,7 @@ contains
     type(patch_t) :: patch
     real(real64) :: small, reach, width
 
-    small = largest_small_radius(sim%disk)
+    small = merge(maxval(sim%disk%radius), largest_small_radius(sim%disk), sim%box%is_sheared())
     reach = 2*small*(1 + spare)
     width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
     patch = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
@@ -134,29 +137,36 @@ contains
     integer :: m
 
     allocate (ring, source=self%big%ring(number)%at)
-    call self%big%register(sim, number)
+    call self%big%register(sim, number, self%faces)
     ring = [ring, self%big%ring(number)%at]
     do m = 1, size(ring)
       call mark(self, int(ring(m)%cell, int16))
     end do
   end subroutine follow_big
 
-  !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it, and
-  !> predicts there.
+  !> Moves disk i into the next cell, or notes where a big one is now, and predicts there.
   subroutine cross(self, sim, i, code)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code
+    integer(int32), intent(in) :: i, code
+
+    if (sim%disk(i)%radius > self%big%small) then
+      call self%follow_big(sim, self%big%number_of(i))
+    else
+      call change_cell(self, sim, i, code)
+    end if
+    call self%predict(sim, i)
+  end subroutine cross
+
+  !> Moves disk i into the cell beyond the face, over a periodic side into the first one behind it.
+  subroutine change_cell(self, sim, i, code)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
     integer(int32) :: side, axis
     integer(int16) :: cell(2)
     logical :: inside
 
-    if (sim%disk(i)%radius > self%big%small) then
-      call self%follow_big(sim, self%big%number_of(i))
-      call self%predict(sim, i)
-      return
-    end if
     side = code
     if (.not. is_wall(code)) side = side_crossed(code)
     axis = axis_of(side)
@@ -168,8 +178,7 @@ contains
     if (self%is_part) inside = self%patch%holds(cell)
     if (self%roomy .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
     call move(self, sim%tag(i), i, cell)
-    call self%predict(sim, i)
-  end subroutine cross
+  end subroutine change_cell
 
   !> Chooses the cell of disk i again after a collision.
   subroutine choose_cell(self, disk, tag, i)
@@ -215,8 +224,7 @@ contains
   subroutine read_ahead(self, sim, stage, disks)
     class(cell_grid_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: stage
-    integer(int32), intent(in) :: disks(:)
+    integer(int32), intent(in) :: stage, disks(:)
 
     call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
   end subroutine read_ahead
@@ -348,8 +356,8 @@ contains
       e = self%big%first(cell(1), cell(2))
     end associate
     do while (e > 0)
-      associate (listing => self%big%listing(e))
-        call scan_one(sim, self%big%disk(listing%number), listing%image*sim%box%edges(), near)
+      associate (listing => self%big%listing(e), images => sim%images())
+        call scan_one(sim, self%big%disk(listing%number), images%image(real(listing%image, real64)), near)
         e = listing%next
       end associate
     end do
@@ -363,7 +371,8 @@ contains
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
     real(real64) :: t_margin
-    integer(int32) :: number, ix, iy, m, reach(2)
+    type(images_t) :: images
+    integer(int32) :: number, m, image
 
     near%disk = i
     number = self%big%number_of(i)
@@ -372,20 +381,18 @@ contains
       near%time, near%partner)
     t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
       sim%box%gravity, self%big%margin, inside=.true.)
-    if (t_margin < near%time) near%partner = leaves_margin
+    if (t_margin < near%time) near%partner = looks_again
     near%time = min(near%time, t_margin)
-    reach = merge(1, 0, sim%box%periodic)
-    do iy = -reach(2), reach(2)
-      do ix = -reach(1), reach(1)
-        do m = 1, self%big%count
-          call scan_one(sim, self%big%disk(m), [ix, iy]*sim%box%edges(), near)
-        end do
+    images = sim%images()
+    do image = 1, images%count()
+      do m = 1, self%big%count
+        call scan_one(sim, self%big%disk(m), images%image(images%around(image)), near)
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
         call scan_cell(self%cells, sim, place%cell(1) + self%cells%stride*place%cell(2), &
-          -place%image*sim%box%edges(), near)
+          images%image(real(-place%image, real64)), near)
       end associate
     end do
   end subroutine find_event_of_big

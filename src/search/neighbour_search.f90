@@ -1,5 +1,6 @@
 !> The seam between the dynamics and the ways to find what a disk meets next; and the kernel that they share.
 module neighbour_search
+  use images, only: image_t
   use kinds, only: int32, never, real64
   use disks, only: disk_t, tag_t
   use free_flight, only: flight, flight_velocity
@@ -32,6 +33,7 @@ module neighbour_search
     procedure(predict_event), deferred :: predict
     procedure(cross_cells), deferred :: cross
     procedure :: predict_both
+    procedure :: counts
     procedure :: read_ahead
   end type neighbour_search_t
 
@@ -76,6 +78,17 @@ contains
     call self%predict(sim, j)
   end subroutine predict_both
 
+  !> Whether a collision of disk i counts in the part of a simulation that the search knows.
+  pure function counts(self, tag, i, code) result(yes)
+    class(neighbour_search_t), intent(in) :: self
+    type(tag_t), intent(in) :: tag(:)
+    integer(int32), intent(in) :: i
+    integer(int32), intent(in) :: code        !! whom or what it meets
+    logical :: yes
+
+    yes = .true.
+  end function counts
+
   !> Prefetches what the next predictions of some disks will read. Each stage follows the addresses that the
   !> stage before has brought into the cache.
   subroutine read_ahead(self, sim, stage, disks)
@@ -101,14 +114,14 @@ contains
   !> Most candidates fail one combined test: the root is not real, or not before the best so far, or not before the
   !> candidate's own event, when the candidate will predict again with the disk among its candidates. A root before t
   !> needs c < -2 b (t - late), here with a margin above rounding.
-  pure subroutine earliest_contact(disk, tag, near, now, gravity, known, shift)
+  pure subroutine earliest_contact(disk, tag, near, now, gravity, known, image)
     type(disk_t), intent(in) :: disk(0:*)     !! all disks, counted from 0
     type(tag_t), intent(in) :: tag(*)
     type(prospect_t), intent(inout) :: near   !! the disk itself is harmless among the candidates
     real(real64), value :: now                !! [time]
     real(real64), intent(in) :: gravity(2)
     integer(int32), value :: known            !! 0, `latest_clock`, `no_gravity`, or their sum
-    real(real64), intent(in), optional :: shift(2)  !! of the candidates' image [length]
+    type(image_t), intent(in), optional :: image   !! through which the candidates are seen
     real(real64) :: xi, yi, ui, vi, clock, ri, x, y, u, v, xj, yj, uj, vj, clock_j, rj, late, si, sj, dx, dy, du, dv
     real(real64) :: sigma2, b, c, disc, t_j, best, latest, from, margin, in_time
     integer(int32) :: k, n, j, partner
@@ -119,8 +132,7 @@ contains
     call read_state(disk(near%disk - 1), xi, yi, ui, vi, clock, ri)
     x = xi; y = yi; u = ui; v = vi; late = clock; best = near%time; partner = near%partner
     margin = margin_of_times*(abs(clock) + tiny(clock)/epsilon(clock)**2)
-    from = 2*clock - margin
-    n = near%n
+    from = 2*clock - margin; n = near%n
     do k = 1, n
       j = near%list(k)
       call read_state(disk(j), xj, yj, uj, vj, clock_j, rj)
@@ -138,8 +150,9 @@ contains
       dy = moved(yj, vj, gravity(2), sj, falling) - y
       du = sped_up(uj, gravity(1), sj, falling) - u
       dv = sped_up(vj, gravity(2), sj, falling) - v
-      if (present(shift)) dx = dx + shift(1)
-      if (present(shift)) dy = dy + shift(2)
+      if (present(image)) dx = dx + (image%shift(1) + image%slip*late)
+      if (present(image)) dy = dy + image%shift(2)
+      if (present(image)) du = du + image%slip
       sigma2 = (ri + rj)**2
       b = dx*du + dy*dv
       c = dx*dx + dy*dy - sigma2

@@ -4,6 +4,7 @@ module obstacle_lists
   use box_geometry, only: box_t, next_obstacle
   use cell_faces, only: cell_faces_t, patch_t
   use disks, only: disk_t, tag_t
+  use images, only: images_t
   use shapes, only: shape_t, spare
   use sorting, only: sort_by_count
   implicit none
@@ -65,7 +66,9 @@ contains
     type(cell_faces_t), intent(in) :: faces
     type(entries_t) :: entries
     integer(int32), allocatable :: place(:)
-    integer(int32) :: m, image_x, image_y, reach(2)
+    type(images_t) :: images
+    integer(int32) :: m
+    integer :: image
 
     if (allocated(self%first)) deallocate (self%first, self%list)
     if (box%n_obstacles() == 0) return
@@ -73,11 +76,9 @@ contains
     allocate (entries%cell(64), entries%obstacle(64))
     do m = 1, box%n_obstacles()
       associate (shape => box%obstacle(m)%shape)
-        reach = merge(1, 0, box%periodic .and. .not. shape%encloses)
-        do image_y = -reach(2), reach(2)
-          do image_x = -reach(1), reach(1)
-            call enter(shape, m, [image_x, image_y]*box%edges() - box%lower, patch, faces, entries)
-          end do
+        images = merge(images_t(), box%images(), shape%encloses)
+        do image = 1, images%count()
+          call enter(shape, m, images%shift(images%around(image)) - box%lower, patch, faces, entries)
         end do
       end associate
     end do
@@ -94,21 +95,23 @@ contains
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
     type(entries_t), intent(inout) :: entries
-    real(real64) :: half(2), room(2), to_shape(2)
+    real(real64) :: half(2), room(2), to_shape(2), corner(2, 2)
     integer(int32) :: low(2), high(2), here(2), ix, iy
 
     half = 0.5_real64*(faces%width + faces%overlap)*(1 + spare)
     to_shape = shape%middle + shift
     room = (half + shape%extent() + patch%small)*(1 + spare)
-    low = int(max(min(ceiling((to_shape - room)/faces%width + 0.5_real64), patch%whole + 1), 1), int32)
-    high = int(max(min(floor((to_shape + room)/faces%width + 0.5_real64), patch%whole), 0), int32)
+    low = int(max(min(ceiling((to_shape - room)/faces%width + 0.5_real64), patch%whole), 1), int32)
+    high = int(max(min(floor((to_shape + room)/faces%width + 0.5_real64), patch%whole), 1), int32)
     if (shape%encloses) low = 1
     if (shape%encloses) high = patch%whole
     do iy = low(2), high(2)
       do ix = low(1), high(1)
         here = modulo([ix, iy] - patch%first, patch%whole) + 1
         if (any(here > patch%n)) cycle
-        if (.not. shape%reaches(([ix, iy] - 0.5_real64)*faces%width - to_shape, half, patch%small)) cycle
+        call faces%rectangle([ix, iy], patch%whole, corner(:, 1), corner(:, 2))
+        if (.not. shape%reaches(0.5_real64*(corner(:, 1) + corner(:, 2)) - to_shape, &
+          0.5_real64*(corner(:, 2) - corner(:, 1))*(1 + spare), patch%small)) cycle
         entries%n = entries%n + 1
         if (entries%n > size(entries%cell)) then
           entries%cell = [entries%cell, entries%cell]

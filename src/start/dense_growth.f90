@@ -104,6 +104,7 @@ contains
     n = sum(species%count)
     sim%box = box
     sim%box%gravity = 0
+    sim%box%shear_rate = 0
     sim%species = species
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     call sim%make_room(int(n, int32))
@@ -205,8 +206,8 @@ contains
 
     call evolution%start(sim)
     to_come = int(length, int64)*sim%n_disks()
-    limits%collisions = sim%collisions + (to_come + 1)/2
-    limits%events = sim%events + 4*to_come              ! one may rattle in a hole between obstacles
+    limits%collisions = sim%tally%collisions + (to_come + 1)/2
+    limits%events = sim%tally%events + 4*to_come              ! one may rattle in a hole between obstacles
     limits%time = sim%time() + maxval(sim%box%edges())  ! few disks may never collide
     call evolution%advance(sim, limits, error)
     do i = 1, sim%n_disks()

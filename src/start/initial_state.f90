@@ -3,19 +3,23 @@
 !> does not change what the others draw.
 module initial_state
   use kinds, only: int32, real64
-  use errors, only: error_t
+  use box_geometry, only: box_t
+  use disks, only: mass_column, spin_column
+  use errors, only: error_t, exit_usage, fail
+  use kicks, only: orient
   use placement, only: place_disks
   use random_stream, only: random_stream_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
-  use starting_velocities, only: draw_velocities, remove_drift, scale_to_temperature
+  use starting_velocities, only: add_stream, draw_velocities, remove_drift, scale_to_temperature
   implicit none
   private
   public :: create_simulation, describe_system, restless_disk
 
-  integer, parameter :: purpose = 2                         !! of this module's random streams
+  real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
+  integer, parameter :: purpose = 2, purpose_of_spins = 6   !! of this module's random streams
 
 contains
 
@@ -28,20 +32,66 @@ contains
 
     call describe_system(settings, sim)
     call list_disks(sim)
+    call check_lengths(sim%box, settings%species%radius, error)
+    if (allocated(error)) return
+    if (sim%law%orientation) call orient(sim)
     call place_disks(settings%species, settings%run%seed, line, sim, error)
     if (allocated(error)) return
     call set_in_motion(settings, sim, error)
-    call sim%start_sums()
+    if (.not. allocated(error)) call check_speeds(sim, error)
+    if (.not. allocated(error)) call sim%start_sums()
   end subroutine create_simulation
 
+  !> Refuses lengths whose squares cannot be represented.
+  subroutine check_lengths(box, radius, error)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: radius(:)                   !! [length]
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (longest => maxval(abs([box%lower, box%upper])), shortest => minval(radius, mask=radius > 0))
+      if (longest > most .or. shortest < 1/most) call fail(error, exit_usage, "lengths from "//written(shortest)//" to " &
+        //written(longest)//": their squares are out of range; take another unit of length")
+    end associate
+  end subroutine check_lengths
+
+  !> Refuses a simulation in which a product of lengths, speeds and masses, of those that decide when and how disks collide,
+  !> cannot be represented: disks would fly through each other.
+  subroutine check_speeds(sim, error)
+    type(simulation_t), intent(in) :: sim
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: speed, longest, shortest, mass(2)
+    integer(int32) :: i
+
+    longest = maxval(abs([sim%box%lower, sim%box%upper]))
+    shortest = minval(sim%disk%radius)
+    mass = [huge(mass), 0.0_real64]
+    speed = 0
+    do i = 1, sim%n_disks()
+      mass = [min(mass(1), sim%mass_of(i)), max(mass(2), sim%mass_of(i))]
+      speed = max(speed, maxval(abs(sim%disk(i)%v)))
+    end do
+    speed = speed + sim%box%highest_speed() + sqrt(sim%box%highest_temperature()/mass(1))
+    speed = speed + sqrt(2*maxval(abs(sim%box%gravity)))*sqrt(longest)
+    if (.not. speed > 0) return
+    if (longest*speed > most .or. shortest*speed < 1/most .or. longest/speed > most .or. shortest/speed < 1/most) then
+      call fail(error, exit_usage, "lengths from "//written(shortest)//" to "//written(longest)//" with speeds up to " &
+        //written(speed)//": their products are out of range; take other units of length and time")
+    else if (mass(2)*speed > most/speed/sim%n_disks() .or. mass(1)*speed < 1/most/speed) then
+      call fail(error, exit_usage, "masses from "//written(mass(1))//" to "//written(mass(2))//" with speeds up to " &
+        //written(speed)//": their energies are out of range; take other units of mass and time")
+    end if
+  end subroutine check_speeds
+
   !> Box, contact law and species.
-  pure subroutine describe_system(settings, sim)
+  subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
     integer :: s
 
     sim%box = settings%box
     sim%law = settings%law
+    sim%seed = settings%run%seed
+    sim%drive = settings%drive
     sim%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file)
     allocate (sim%species(size(settings%species)))
     do s = 1, size(sim%species)
@@ -63,16 +113,18 @@ contains
         sim%tag(k)%id = k
       end do
     end do
+    if (sim%own_sizes) sim%extra(sim%extra_row(mass_column), :) = sim%species(sim%tag%species)%mass
   end subroutine list_disks
 
-  !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero.
+  !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero. In a sheared box rules
+  !> and temperatures are relative to its velocity profile; given velocities are not.
   subroutine set_in_motion(settings, sim, error)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(inout) :: error
     type(random_stream_t) :: stream
     real(real64) :: mass(size(sim%disk))
-    logical :: balanced
+    logical :: balanced, given
     integer :: s, first
 
     mass = sim%masses()
@@ -86,15 +138,46 @@ contains
       end associate
     end do
     if (balanced) call remove_drift(settings%species, sim)
+    if (sim%law%rotation) call draw_spins(settings, sim)
     first = 1
     do s = 1, size(settings%species)
       associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
-        if (species%exact_temperature >= 0 .and. .not. allocated(error)) &
+        given = species%velocities == "explicit" .or. species%velocities == "file"
+        if (species%exact_temperature >= 0 .and. .not. allocated(error)) then
+          if (given) call add_stream(sim%box, -1.0_real64, sim%disk(first:last))
           call scale_to_temperature(species, mass(first:last), sim%disk(first:last), error)
+          given = .false.
+        end if
+        if (.not. given) call add_stream(sim%box, 1.0_real64, sim%disk(first:last))
         first = last + 1
       end associate
     end do
   end subroutine set_in_motion
+
+  !> Angular velocities by the rules of the species; 'file' has brought them with the places.
+  subroutine draw_spins(settings, sim)
+    type(settings_t), intent(in) :: settings
+    type(simulation_t), intent(inout) :: sim
+    type(random_stream_t) :: stream
+    real(real64) :: normals(2)
+    integer(int32) :: i, s
+
+    s = 0
+    do i = 1, sim%n_disks()
+      if (sim%tag(i)%species /= s) then
+        s = sim%tag(i)%species
+        call stream%seed(settings%run%seed, [int(s), purpose_of_spins])
+      end if
+      associate (species => settings%species(s), omega => sim%extra(sim%extra_row(spin_column), i))
+        if (species%rotational_temperature >= 0) then
+          call stream%draw_normals(normals)
+          omega = sqrt(species%rotational_temperature/sim%inertia_of(i))*normals(1)
+        else if (abs(species%angular_velocity) > 0) then
+          omega = species%angular_velocity
+        end if
+      end associate
+    end do
+  end subroutine draw_spins
 
   !> Warns of a disk that starts so low above the floor that it would hardly do anything but bounce; empty if there is none.
   pure function restless_disk(sim) result(text)
@@ -108,6 +191,7 @@ contains
     text = ""
     do axis = 1, 2
       associate (g => sim%box%gravity(axis))
+        if (sim%box%side(2*axis - merge(0, 1, g > 0))%motion%is_on()) cycle     ! the height says little
         do i = 1, merge(sim%n_disks(), 0, abs(g) > 0)
           height = sim%disk(i)%x(axis) - sim%box%lower(axis) - sim%disk(i)%radius
           if (g > 0) height = sim%box%upper(axis) - sim%disk(i)%x(axis) - sim%disk(i)%radius

@@ -2,14 +2,15 @@
 !> and explicit disks beside each other. What is wrong is reported with the line of the input.
 module input_fit
   use kinds, only: pi, real64
-  use box_geometry, only: box_t, obstacle_t
+  use box_geometry, only: box_t, surface_t
+  use box_sides, only: bounds
   use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text
   use packing, only: packing_t
   use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
-  use position_file, only: radius_row
+  use position_file, only: angle_row, column_names, radius_row, spin_row
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use starting_disks, only: read_disks, resolution
@@ -37,11 +38,14 @@ contains
     if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
-    associate (box => settings%box)
+    associate (box => settings%box, law => settings%law)
       do k = 1, size(box%obstacle)
         call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
       end do
       call survey_files(groups(s(1):s(2)), settings%species, box, problems)
+      law%rotation = law%rotation .or. any(settings%species%spin_in_file)
+      law%orientation = law%orientation .or. any(settings%species%angle_in_file)
+      law%detailed = law%detailed .or. law%rotation
       species = settings%species
       alone = sum(species%count) == 1
       do k = 1, size(species)
@@ -55,7 +59,8 @@ contains
     end associate
   end subroutine check_fit
 
-  !> Takes from their files how many disks species have, and how large they are, where the input leaves that to the file.
+  !> Takes from their files whether disks turn, how many disks species have, and how large they are, where the input leaves
+  !> that to the file.
   subroutine survey_files(groups, species, box, problems)
     type(parameter_group_t), intent(inout) :: groups(:)       !! the species
     type(species_settings_t), intent(inout) :: species(:)
@@ -64,15 +69,20 @@ contains
     type(error_t), allocatable :: error
     real(real64), allocatable :: table(:, :)
     integer, allocatable :: rows(:)
+    logical :: there(size(column_names)), in_file
     integer :: k
 
     do k = 1, size(species)
       associate (s => species(k), group => groups(k))
         if (s%file == "" .or. group%faulty("file")) cycle
-        if (.not. (s%radius_in_file .or. (s%count == 0 .and. .not. (group%given("count") .or. &
-          group%given("packing_fraction"))))) cycle
-        call read_disks(species, k, box, table, rows, error)
-        if (allocated(error)) then
+        in_file = s%radius_in_file .or. (s%count == 0 .and. .not. (group%given("count") .or. group%given("packing_fraction")))
+        if (.not. in_file .and. (s%count == 0 .or. s%radius <= 0)) cycle
+        call read_disks(species, k, box, table, there, rows, error)
+        if (allocated(error) .and. .not. in_file) then          ! told when the disks are placed, if they are
+          deallocate (error)
+          s%spin_in_file = .false.
+          cycle
+        else if (allocated(error)) then
           call group%complain("file", error%message, problems)
           if (error%code == exit_files) problems%unreadable = problems%unreadable + 1
           cycle
@@ -80,6 +90,9 @@ contains
           call group%complain("file", s%file//" holds no disks of species """//s%name//'"', problems)
           cycle
         end if
+        s%spin_in_file = s%spin_in_file .and. there(spin_row)
+        s%angle_in_file = there(angle_row)
+        if (.not. in_file) cycle
         s%count = size(rows)
         call group%put_text("count", written(s%count))
         if (s%radius_in_file) s%radius = maxval(table(radius_row, :))
@@ -92,13 +105,15 @@ contains
   !> What an obstacle itself finds wrong with its place in the box.
   subroutine check_obstacle(group, obstacle, box, problems)
     type(parameter_group_t), intent(in) :: group
-    type(obstacle_t), intent(in) :: obstacle
+    type(surface_t), intent(in) :: obstacle
     type(box_t), intent(in) :: box
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: misfit              ! variable: what
     integer :: colon
 
-    misfit = obstacle%shape%misfit(box%lower, box%upper, box%periodic)
+    associate (beyond => box%reach())                     ! of sides that move
+      misfit = obstacle%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
+    end associate
     colon = index(misfit, ": ")
     if (colon > 0) call group%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
   end subroutine check_obstacle
@@ -139,20 +154,22 @@ contains
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: sound
     logical :: endless(2)
-    real(real64) :: lower, upper, farthest
+    real(real64) :: lower, upper, room, farthest, low(2), high(2)
 
+    call bounds(box, 0.0_real64, low, high)
     sound = .false.
     endless = spans(s%region, box)
     lower = s%region(2*axis - 1)
     upper = s%region(2*axis)
+    room = min(upper, high(axis)) - max(lower, low(axis))     ! less what sides out of their places take
     farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
     if (lower >= upper) then
       call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
-    else if (lower < box%lower(axis) .or. upper > box%upper(axis)) then
+    else if (lower < min(box%lower(axis), low(axis)) .or. upper > max(box%upper(axis), high(axis))) then
       call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
-    else if (.not. endless(axis) .and. 2*s%radius > (upper - lower)*(1 + rounding)) then
+    else if (.not. endless(axis) .and. 2*s%radius > room*(1 + rounding)) then
       call complain("radius", "a disk of diameter "//written(2*s%radius)// &
-        " does not fit in its region of width "//written(upper - lower))
+        " does not fit in its region of width "//written(room))
     else if (box%periodic(axis) .and. 2*together*s%radius > box%upper(axis) - box%lower(axis)) then
       call complain("radius", "a periodic box must be at least "//trim(merge("one diameter ", "two diameters", together == 1)) &
         //" wide: "//written(2*together*s%radius)//" > "//written(box%upper(axis) - box%lower(axis)))

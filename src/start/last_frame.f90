@@ -3,12 +3,12 @@ module last_frame
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
-  use h5md_layout, only: box_group, disk_mass, disk_radius, disk_species, frame_counter, position, species_names, &
-    value_of, velocity
+  use h5md_layout, only: angular_velocity, box_group, disk_mass, disk_radius, disk_species, frame_counter, orientation, &
+    position, species_names, value_of, velocity
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use parameters, only: largest, smallest
-  use position_file, only: mass_row, radius_row
+  use position_file, only: angle_row, mass_row, radius_row, spin_row
   use texts, only: counted, joined, written
   implicit none
   private
@@ -59,7 +59,7 @@ contains
   subroutine read_last_frame(path, name, table, there, chosen, error, box)
     character(len=*), intent(in) :: path
     character(len=*), intent(in) :: name                    !! of the species
-    real(real64), allocatable, intent(out) :: table(:, :)   !! (x, y, vx, vy, radius, mass; n)
+    real(real64), allocatable, intent(out) :: table(:, :)   !! (`position_file: column_names`,n)
     logical, intent(out) :: there(:)                        !! whether these are known
     integer, allocatable, intent(out) :: chosen(:)          !! (n) rows of the disks in the frame
     type(error_t), allocatable, intent(out) :: error
@@ -73,8 +73,12 @@ contains
     call choose(file, name, n, chosen, error)
     allocate (table(size(there), size(chosen)), source=0.0_real64)
     if (size(chosen) > 0 .and. .not. allocated(error)) then
-      call read_vectors(file, position//value_of, n, chosen, table(1:2, :))
-      call read_vectors(file, velocity//value_of, n, chosen, table(3:4, :))
+      call read_element(file, position//value_of, n, chosen, table(1:2, :))
+      call read_element(file, velocity//value_of, n, chosen, table(3:4, :))
+      there(spin_row) = file%length(angular_velocity//value_of) >= 0
+      there(angle_row) = file%length(orientation//value_of) >= 0
+      if (there(spin_row)) call read_element(file, angular_velocity//value_of, n, chosen, table(spin_row:spin_row, :))
+      if (there(angle_row)) call read_element(file, orientation//value_of, n, chosen, table(angle_row:angle_row, :))
       there(radius_row) = file%length(disk_radius) >= 0
       there(mass_row) = file%length(disk_mass) >= 0
       if (there(radius_row)) call read_numbers(file, disk_radius, n, chosen, table(radius_row, :))
@@ -125,30 +129,32 @@ contains
     end if
   end subroutine expect
 
-  !> Reads a vector of each chosen disk from the last frame.
-  subroutine read_vectors(file, name, n, chosen, vectors)
+  !> Reads numbers or vectors of the chosen disks from the last frame.
+  subroutine read_element(file, name, n, chosen, values)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name
     integer, intent(in) :: n                                !! disks in the file
     integer, intent(in) :: chosen(:)
-    real(real64), intent(inout) :: vectors(:, :)            !! (2,chosen)
+    real(real64), intent(inout) :: values(:, :)             !! (width,chosen)
     type(series_t) :: series
     integer(int64) :: frames(1), there
     real(real64), allocatable :: frame(:, :)
+    integer :: width
 
     frames = 0
-    allocate (frame(2, n))
+    width = size(values, 1)
+    allocate (frame(width, n))
     call expect(file, frame_counter, 1_int64)
     call file%fetch(frame_counter, 1, frames)
     if (file%length(name) < 0) call file%check(-1, "be read: "//name//" is missing")
-    there = file%length(name)/(2_int64*n)
+    there = file%length(name)/(int(width, int64)*n)
     if (frames(1) < 1 .or. frames(1) > there) call file%check(-1, "be read: "//frame_counter//" is "//written(frames(1)) &
       //", but "//name//" has room for "//counted(there, "frame")//" of "//counted(int(n, int64), "disk"))
-    series = series_t(name, rank=2, shape=[2, n])
+    series = series_t(name, rank=width, shape=merge([n, 1], [width, n], width == 1))
     call series%open(file)
     call series%read(file, frames(1), frame)
     call series%close()
-    if (.not. allocated(file%failure)) vectors = frame(:, chosen)
-  end subroutine read_vectors
+    if (.not. allocated(file%failure)) values = frame(:, chosen)
+  end subroutine read_element
 
 end module last_frame

@@ -1,9 +1,9 @@
 !> Disks being placed, and whether another one fits. Each species has its own grid of cells: its disks have much the
 !> same radius, so a search costs the same whatever the sizes of the others.
 module packing
+  use images, only: images_t
   use kinds, only: int32, real64
   use memory_hints, only: prefetch
-  use shapes, only: nearest_image
   use box_geometry, only: box_t
   implicit none
   private
@@ -49,7 +49,7 @@ module packing
 contains
 
   !> A packing without disks, with room for some.
-  pure function empty_packing(box, n_disks, n_species) result(packing)
+  function empty_packing(box, n_disks, n_species) result(packing)
     type(box_t), intent(in) :: box
     integer, intent(in) :: n_disks, n_species
     type(packing_t) :: packing
@@ -266,7 +266,7 @@ contains
 
     if (by < 0) then
       associate (shape => self%box%obstacle(-by)%shape)
-        yes = shape%covers(shape%from_nearest(centre, self%box%periods()), half, radius)
+        yes = shape%covers(shape%from_nearest(centre, self%box%images()), half, radius)
       end associate
     else
       corner = abs(self%separation(self%disk(by)%x, centre)) + half
@@ -279,9 +279,11 @@ contains
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: a(2), b(2)          !! [length]
     real(real64) :: d(2)
+    type(images_t) :: images
 
+    images = self%box%images()
     d = b - a
-    d = d - nearest_image(d, self%box%periods())
+    d = d + images%shift(images%nearest_image(d))
   end function separation
 
   !> The cell of a point, or the nearest one if the point is outside.

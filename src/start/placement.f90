@@ -4,15 +4,19 @@
 !> input; then 'random', the species with the largest disks first; then 'dense' and 'grown', where species
 !> with the same region grow together around the disks that are there already.
 module placement
+  use images, only: images_t
   use kinds, only: int32, int64, pi, real64
-  use box_geometry, only: box_t, obstacle_t
+  use box_geometry, only: box_t, surface_t
+  use box_sides, only: bounds
+  use collisions, only: wall_law_t
   use circles, only: new_circle
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: species_t
+  use disks, only: angle_column, mass_column, spin_column
   use errors, only: error_t, exit_usage, fail
   use known_places, only: add_known, misfit_t, misfit_text, offset
   use packing, only: packing_t
-  use position_file, only: mass_row, radius_row
+  use position_file, only: angle_row, column_names, mass_row, radius_row, spin_row
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
@@ -41,7 +45,6 @@ contains
     type(simulation_t), intent(inout) :: sim                !! with its box, and disks in the order of the input
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: packing
-    real(real64), allocatable :: mass(:)
     logical, dimension(size(species)) :: random, dense, together
     integer :: s, k
 
@@ -70,8 +73,7 @@ contains
       sim%disk(k)%x = packing%disk(k)%x
       sim%disk(k)%radius = packing%disk(k)%radius
     end do
-    call move_alloc(sim%mass, mass)
-    if (allocated(mass)) call sim%take_masses(mass)
+    if (sim%own_sizes) call sim%settle_masses()
   end subroutine place_disks
 
   !> Places a species whose positions are given, directly or by a rule.
@@ -99,7 +101,8 @@ contains
     if (.not. allocated(error)) call add_checked(packing, species, s, x, radius, rows, error)
   end subroutine place_fixed
 
-  !> Reads the disks of a species from its file. Masses, and velocities if they are wanted, go into the simulation.
+  !> Reads the disks of a species from its file. Masses, orientations, and velocities if they are wanted, go into the
+  !> simulation.
   subroutine take_disks(species, s, sim, x, radius, rows, error)
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
@@ -109,17 +112,26 @@ contains
     integer, allocatable, intent(out) :: rows(:)            !! as in `origin`
     type(error_t), allocatable, intent(out) :: error
     real(real64), allocatable :: table(:, :)
+    logical :: there(size(column_names))
     integer :: k
 
-    call read_disks(species, s, sim%box, table, rows, error)
+    call read_disks(species, s, sim%box, table, there, rows, error)
     if (allocated(error)) return
     x = table(1:2, :)
     radius = table(radius_row, :)
-    if (.not. allocated(sim%mass)) sim%mass = sim%masses()
-    sim%mass(offset(species, s) + 1:offset(species, s) + size(rows)) = table(mass_row, :)
     do k = 1, size(rows)
       if (species(s)%velocities == "file") sim%disk(offset(species, s) + k)%v = table(3:4, k)
     end do
+    if (sim%own_sizes) call take(mass_column, mass_row)
+    if (species(s)%spin_in_file) call take(spin_column, spin_row)
+    if (species(s)%angle_in_file) call take(angle_column, angle_row)
+  contains
+    !> Takes an optional column of the disks from a row of the table.
+    subroutine take(column, row)
+      integer, intent(in) :: column, row
+
+      sim%extra(sim%extra_row(column), offset(species, s) + 1:offset(species, s) + size(rows)) = table(row, :)
+    end subroutine take
   end subroutine take_disks
 
   !> Adds a species at known places, if they are free and in its region.
@@ -186,7 +198,7 @@ contains
     integer, intent(in) :: group(:)                         !! their numbers
     integer(int64), intent(in) :: seed
     class(status_line_t), intent(inout) :: line
-    type(simulation_t), intent(inout) :: sim                !! gets masses and velocities of a file
+    type(simulation_t), intent(inout) :: sim                !! gets masses and motion of a file
     type(error_t), allocatable, intent(out) :: error
     type(packing_t) :: small                                ! the same with the disks as they begin to grow
     type(species_t) :: member(size(group))
@@ -226,39 +238,40 @@ contains
     end do
   end subroutine place_densely
 
-  !> The region as a box, in which the disks that reach into it are obstacles, as are their images.
-  pure function growth_box(packing, region) result(box)
+  !> The region, as far as sides leave it, as a box, in which the disks that reach into it are obstacles, as are their images.
+  function growth_box(packing, region) result(box)
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
     type(box_t) :: box
-    type(obstacle_t), allocatable :: obstacle(:)
+    type(surface_t), allocatable :: obstacle(:)
     real(real64) :: centre(2), radius
-    integer :: k, i, j, n, pass, images(2)
+    type(images_t) :: images
+    integer :: k, i, n, pass
 
-    box%lower = region([1, 3])
-    box%upper = region([2, 4])
+    call bounds(packing%box, 0.0_real64, box%lower, box%upper)
+    box%lower = max(region([1, 3]), box%lower)
+    box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
-    images = merge(1, 0, packing%box%periodic)
+    images = packing%box%images()
     do pass = 1, 2                                          ! count, then fill
       n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
         radius = packing%disk(k)%radius
-        do j = -images(2), images(2)
-          do i = -images(1), images(1)
-            centre = packing%disk(k)%x + [i, j]*packing%box%edges()
-            if (any(centre < box%lower - radius .or. centre > box%upper + radius)) cycle
-            n = n + 1
-            if (pass == 1) cycle
-            obstacle(n)%name = "a disk"
-            allocate (obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
-          end do
+        do i = 1, images%count()
+          centre = packing%disk(k)%x + images%shift(images%around(i))
+          if (any(centre < box%lower - radius .or. centre > box%upper + radius)) cycle
+          n = n + 1
+          if (pass == 1) cycle
+          obstacle(n)%name = "a disk"
+          allocate (obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
         end do
       end do
       if (pass == 1) allocate (obstacle(n))
     end do
     do k = 1, packing%box%n_obstacles()
       obstacle(k) = packing%box%obstacle(k)
+      obstacle(k)%law = wall_law_t()                        ! elastic
     end do
     call move_alloc(obstacle, box%obstacle)
   end function growth_box

@@ -9,11 +9,11 @@ module position_file
   use texts, only: counted, joined, lower_case, place_of, shown, suggestion, written
   implicit none
   private
-  public :: column_names, radius_row, mass_row, read_positions
+  public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
 
-  !> What is known of a disk, in the order of the rows of a table.
-  character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "radius", "mass"]
-  integer, parameter :: radius_row = 5, mass_row = 6
+  !> What is known of a disk, in the order of the rows of a table. Radius and mass are the last: they are checked together.
+  character(len=*), parameter :: column_names(*) = [character(len=7) :: "x", "y", "vx", "vy", "omega", "angle", "radius", "mass"]
+  integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
   integer, parameter :: species_column = size(known_names)
   integer, parameter :: longest_line = 1024

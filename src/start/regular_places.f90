@@ -2,6 +2,7 @@
 module regular_places
   use kinds, only: real64
   use box_geometry, only: box_t
+  use box_sides, only: bounds
   use errors, only: error_t, exit_usage, fail
   use settings, only: species_settings_t
   use shapes, only: magnitude
@@ -21,17 +22,19 @@ contains
     yes = box%periodic .and. region([1, 3]) <= box%lower .and. region([2, 4]) >= box%upper
   end function spans
 
-  !> Corners of the rectangle in which the centres of disks lie that are wholly inside the region.
+  !> Corners of the rectangle in which the centres of disks lie that are wholly inside the region, and clear of sides that
+  !> start out of their places.
   pure subroutine centre_range(region, box, radius, lower, upper)
     real(real64), intent(in) :: region(4)           !! xlo, xhi, ylo, yhi [length]
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius              !! [length]
     real(real64), intent(out) :: lower(2), upper(2)
-    real(real64) :: inset(2)
+    real(real64) :: inset(2), low(2), high(2)
 
+    call bounds(box, 0.0_real64, low, high)
     inset = merge(0.0_real64, radius, spans(region, box))
-    lower = region([1, 3]) + inset
-    upper = max(region([2, 4]) - inset, lower)      ! a disk may fill its region but for rounding
+    lower = max(region([1, 3]), low) + inset
+    upper = max(min(region([2, 4]), high) - inset, lower)    ! a disk may fill its region but for rounding
   end subroutine centre_range
 
   !> A disk in the middle of each of nx x ny equal cells of the region, row by row from the bottom.

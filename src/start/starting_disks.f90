@@ -5,10 +5,10 @@ module starting_disks
   use bounds, only: first_outside
   use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
-  use h5md_layout, only: disk_mass, disk_radius, position, value_of, velocity
+  use h5md_layout, only: angular_velocity, disk_mass, disk_radius, orientation, position, value_of, velocity
   use last_frame, only: is_run, read_last_frame
   use parameters, only: largest, smallest
-  use position_file, only: column_names, mass_row, radius_row, read_positions
+  use position_file, only: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
   use settings, only: species_settings_t
   use texts, only: counted, written
   implicit none
@@ -20,16 +20,16 @@ module starting_disks
 contains
 
   !> Reads the disks of species s. Radii and masses are those of the input where it has them.
-  subroutine read_disks(species, s, box, table, rows, error)
+  subroutine read_disks(species, s, box, table, there, rows, error)
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
     type(box_t), intent(in) :: box
     real(real64), allocatable, intent(out) :: table(:, :)     !! (column_names,n)
+    logical, intent(out) :: there(:)                          !! (column_names) in the file
     integer, allocatable, intent(out) :: rows(:)              !! as in `origin`
     type(error_t), allocatable, intent(out) :: error
     character(len=40) :: names(size(species))
     character(len=:), allocatable :: of_species
-    logical :: there(size(column_names))
     integer :: k
 
     associate (me => species(s))
@@ -57,26 +57,23 @@ contains
   end subroutine read_disks
 
   !> Takes from the input what it has, and refuses what both have, or none; of a run the input may say otherwise.
-  pure subroutine join(species, there, rows, table, error)
+  subroutine join(species, there, rows, table, error)
     type(species_settings_t), intent(in) :: species
     logical, intent(in) :: there(:)                           !! (column_names) in the file
     integer, intent(in) :: rows(:)                            !! (n) as in `origin`
     real(real64), intent(inout) :: table(:, :)                !! (column_names,n)
     type(error_t), allocatable, intent(inout) :: error
     logical :: in_file(radius_row:mass_row)
-    character(len=len(column_names)) :: name
     integer :: row
 
     if (size(rows) == 0) return
     if (species%velocities == "file" .and. .not. there(3)) call fail(error, exit_usage, origin(species, rows, 1, 3) &
       //": there are no velocities; velocities = 'file' needs x y vx vy")
     in_file = [species%radius_in_file, species%mass_in_file]
+    if (species%velocities == "file" .and. .not. species%spin_in_file) call refuse_both(spin_row, &
+      trim(merge("angular_velocity      ", "rotational_temperature", species%rotational_temperature < 0)))
     do row = radius_row, mass_row
-      if (there(row) .and. .not. in_file(row) .and. .not. is_run(species%file)) then
-        name = column_names(row)
-        call fail(error, exit_usage, species%file//": has a column "//trim(name)//", but species."//species%name//"."//trim(name) &
-          //" is given, too; give only one of them")
-      end if
+      if (.not. in_file(row)) call refuse_both(row, trim(column_names(row)))
       if (there(row) .and. in_file(row)) cycle
       if (in_file(row) .and. row == radius_row) call fail(error, exit_usage, species%file &
         //": has no radius; give species."//species%name//".radius, or a column radius in the file")
@@ -85,6 +82,15 @@ contains
     if (species%is_base .and. .not. species%radius_in_file .and. any(abs(table(mass_row, :) - species%mass) > 0)) &
       call fail(error, exit_usage, species%file//": has masses other than 1; as other species are relative to """ &
       //species%name//""", give its mass")
+  contains
+    !> Refuses a column of a text whose numbers the input has as well.
+    subroutine refuse_both(row, variable)
+      integer, intent(in) :: row
+      character(len=*), intent(in) :: variable
+
+      if (there(row) .and. .not. is_run(species%file)) call fail(error, exit_usage, species%file//": has a column " &
+        //trim(column_names(row))//", but species."//species%name//"."//variable//" is given, too; give only one of them")
+    end subroutine refuse_both
   end subroutine join
 
   !> Refuses numbers that the input could not have either.
@@ -138,6 +144,10 @@ contains
         text = position//value_of
       case (3:4)
         text = velocity//value_of
+      case (spin_row)
+        text = angular_velocity//value_of
+      case (angle_row)
+        text = orientation//value_of
       case default
         text = disk_mass
         if (column == radius_row) text = disk_radius

@@ -1,6 +1,7 @@
 !> How disks start to move, by the rule of their species.
 module starting_velocities
   use kinds, only: int32, real64
+  use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
   use disks, only: disk_t
   use random_stream, only: random_stream_t
@@ -8,7 +9,7 @@ module starting_velocities
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: draw_velocities, remove_drift, scale_to_temperature
+  public :: add_stream, draw_velocities, remove_drift, scale_to_temperature
 
 contains
 
@@ -122,5 +123,18 @@ contains
       disk(i)%v = mean + sqrt(species%exact_temperature/temperature)*(disk(i)%v - mean)
     end do
   end subroutine scale_to_temperature
+
+  !> Adds the velocity profile of a sheared box, or takes it away.
+  pure subroutine add_stream(box, factor, disk)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: factor              !! 1 or -1
+    type(disk_t), intent(inout) :: disk(:)
+    integer :: i
+
+    if (.not. box%is_sheared()) return
+    do i = 1, size(disk)
+      disk(i)%v = disk(i)%v + factor*box%stream(disk(i)%x)
+    end do
+  end subroutine add_stream
 
 end module starting_velocities

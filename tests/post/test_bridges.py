@@ -108,7 +108,8 @@ def test_pandas_gets_all_observables(run):
     hits = table[[f"wall_collisions_{side}" for side in ("left", "right", "bottom", "top")]]
     np.testing.assert_array_equal(hits, run.observable("wall_collisions").value)
     names = {f"{kind}/{what}" for kind in ("all", *run.names) for what in ("mean_speed",)}
-    assert names < set(table) and len(table.columns) == len(run.observables) + 1 + 3 + 3
+    widths = [np.size(run.observable(name).value[0]) for name in run.observables]
+    assert names < set(table) and len(table.columns) == sum(widths)
 
 
 def test_csv_is_read_by_numpy(run):
@@ -122,3 +123,20 @@ def test_csv_is_read_by_numpy(run):
     )
     np.testing.assert_array_equal(table["time"], np.repeat(run.time[frames], run.count))
     assert set(table["species"]) == {"light", "heavy"}
+
+
+def test_what_else_disks_have_is_exported_too(ricochet, tmp_path):
+    result = ricochet(
+        *(ROOT / "input" / "rough.nml", "-o", "rough.h5", "--quiet"),
+        *("--set", "stop.collisions_per_disk=2"),
+    )
+    assert result.returncode == 0, result.stderr
+    run = read_run(tmp_path / "rough.h5")
+    table = np.genfromtxt(exported(run, "rough.csv", "--frames", "-1"), delimiter=",", names=True)
+    head, *lines = exported(run, "rough.xyz", "--frames", "-1").read_text().splitlines()[1:]
+    assert {"angular_velocity", "orientation"} == set(run.elements)
+    for k, name in enumerate(run.elements):
+        np.testing.assert_array_equal(table[name], run.element(name)[-1])
+        assert f":{name}:R:1:" in head
+        column = [float(line.split()[7 + k]) for line in lines]
+        np.testing.assert_array_equal(column, run.element(name)[-1])

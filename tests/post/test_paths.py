@@ -21,7 +21,15 @@ SYSTEMS = {
     "half": "&box boundary = 'periodic', 'wall' gravity = 0, -2 /\n" + SHAPES,
     "rough": "&contact restitution = 0.9 wall_restitution = 0.8 contact_time = 0.02 /\n" + SHAPES,
     "smooth": "&contact wall_restitution = 0.8 wall_rule = 'normal' /\n&box gravity = 0.3, -2 /\n",
+    "laws": "&side name = 'bottom' restitution = 0.5 rule = 'normal' /\n"
+    "&side name = 'left' restitution = 0.3 /\n" + SHAPES.replace("/", "restitution = 0.7 /", 1),
     "container": "&obstacle name = 'c' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n",
+    "grains": "&contact restitution = 0.9 tangential_restitution = 0.5 friction = 0.3\n"
+    "wall_rule = 'normal' /\n"
+    + SHAPES,
+    "driven": "&side name = 'left' temperature = 2 /\n"
+    "&side name = 'top' temperature = 1 speed = 3 /\n"
+    + SHAPES.replace("/", "temperature = 3 /", 1),
     "steps": "&run dynamics = 'steps' dt = 1e-4 /\n" + SHAPES,
 }
 
@@ -106,3 +114,12 @@ def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_
     position = np.array([[[0.2, 0.2], [0.2, 0.5]], [[0.3, 0.2], [0.2, 0.6]]])
     (turns,) = Paths(read_run(write_run(tmp_path / "a.h5", position, velocity))).along([0, 1])
     assert turns.guessed.tolist() == [False, True]
+
+
+def test_with_kicks_no_path_between_frames_is_known(ricochet, tmp_path):
+    drive = "&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n"
+    write_input(tmp_path, DISKS + drive + "&stop time = 1 / &output frames_every_time = 0.05 /\n")
+    assert ricochet("gas.nml", "-o", "run.h5", "--set=output.event_log=true").returncode == FINISHED
+    run = read_run(tmp_path / "run.h5")
+    for turns in Paths(run).along(list(range(run.frames))):
+        assert len(turns.disk) == 0 and turns.guessed.all()

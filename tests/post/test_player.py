@@ -71,6 +71,22 @@ def test_speeds_and_energies_are_those_of_the_frame(tmp_path, rng):
     assert facts["speeds"]["counts"][1][1] == counts.tolist()
 
 
+def test_the_pressure_is_that_of_the_run_if_there_are_enough_samples(tmp_path, rng):
+    pressure = np.linspace(1, 2, 1000)
+    for count in (1000, 2):
+        observables = {"collisions": np.zeros(count), "pressure": pressure[:count]}
+        times = {"observables": observables, "observable_time": np.arange(count)}
+        run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, **times))
+        shown = player.film(run, [0, 7], "speed", [])[0]["pressure"]
+        if count == 2:
+            assert shown is None
+        else:
+            assert len(shown["time"]) == 500 and shown["time"][-1] == 999
+            np.testing.assert_allclose(
+                shown["value"], np.interp(shown["time"], range(count), pressure), rtol=1e-6
+            )
+
+
 def test_speeds_beside_disks_at_rest_are_counted_by_factors(tmp_path, rng):
     """As around a crater: one bar of disks at rest beside a Maxwell curve would say nothing."""
     velocity = maxwell_velocities(rng, 5, 60) * np.array([1e-2, 1.0, 1.0])[np.arange(60) % 3, None]
@@ -142,6 +158,14 @@ def test_wrong_requests_are_answered_in_one_line(tmp_path, rng, capsys):
     ):
         assert run_script("player", path, *arguments) == 2
         assert words in capsys.readouterr().err
+
+
+def test_open_shows_the_film_in_the_browser(tmp_path, rng, monkeypatch, capsys):
+    visited = []
+    monkeypatch.setattr(player.webbrowser, "open", visited.append)
+    path = bouncing_gas(tmp_path / "gas.h5", rng)
+    assert run_script("player", path, "--open", "-o", tmp_path / "a film.html") == 0
+    assert visited == [(tmp_path / "a film.html").as_uri()]
 
 
 # --- in the browser ---
@@ -230,6 +254,15 @@ def test_no_sign_of_the_data_opens_a_tag(tmp_path, rng):
     text = player.page(run, player.texts(*player.film(run, [0, 1], "speed", [])))
     data = text.split('id="film">')[1].split("</script>")[0]
     assert "<" not in data and json.loads(data)["facts"]["species"][1]["name"] == "b</script>"
+
+
+def test_a_window_may_change_before_the_film_has_come(browser, tmp_path, rng):
+    run = read_run(bouncing_gas(tmp_path / "gas.h5", rng))
+    (tmp_path / "gas.html").write_text(player.page(run, None), encoding="utf-8")
+    browser.open(tmp_path / "gas.html")
+    browser.complaints()
+    browser.run("dispatchEvent(new Event('resize'))")
+    assert [line for line in browser.complaints() if "Uncaught" in line["message"]] == []
 
 
 def test_it_asks_nothing_of_the_network(opened):

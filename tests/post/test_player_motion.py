@@ -1,12 +1,8 @@
 """The player between frames: true time and paths, camera, events to come, a run that goes on."""
 
-import contextlib
 import http.client
 import json
-import random
 import signal
-import socket
-import struct
 import subprocess
 import sys
 import threading
@@ -16,6 +12,7 @@ import urllib.request
 import numpy as np
 import pytest
 
+from hostile import besiege, status_of
 from ricochet import read_run
 from ricochet.live import LOOK, Live, Server, handler
 from synthetic_run import ROOT, run_script, write_run
@@ -83,6 +80,86 @@ def test_disks_fly_along_their_true_paths(shown, browser, ricochet, tmp_path, bo
 
 
 @pytest.mark.parametrize("box", BOXES)
+@pytest.mark.parametrize("copies", [1, 3])
+def test_energies_counts_and_colours_follow_the_log(
+    shown, browser, ricochet, tmp_path, box, copies
+):
+    """A film of few frames with an event log against a run with many frames."""
+    text = BOXES[box] + FEW
+    if copies > 1:  # more disks than have all digits in the page
+        text = text.replace("count = 8", "count = 24").replace("0.05", "0.02")
+    run = shown(text, "output.frames_every_time=0.5", "output.event_log=.true.")
+    many = ricochet("gas.nml", "-o", "many.h5", "--set", "output.frames_every_time=0.03")
+    assert many.returncode == FINISHED
+    truth = read_run(tmp_path / "many.h5")
+    frames = list(range(1, truth.frames - 1, 2))
+    found = browser.run(
+        """return arguments[0].map(t => { show(t); return [
+          moment.kinetic, moment.potential ?? [0, 0], collisionsNow(),
+          ...Object.keys(codes).map(name => Array.from(codesNow(name))),
+        ]; })""",
+        truth.time[frames].tolist(),
+    )
+    pairs = run.events.time[run.events.j > 0]
+    tops = browser.run("return film.scales")
+    heights = -run.mass * (truth.unwrapped(frames) @ run.gravity)
+    worst = 1e-6 if copies == 1 else 2e-4
+    for k, (kinetic, potential, count, speed, displacement, hits) in enumerate(found):
+        frame = frames[k]
+        assert count == 2 * np.sum(pairs <= truth.time[frame]) / run.count
+        for s, kind in enumerate(run.by_species):
+            true = truth.kinetic_energy(frame)[kind.disks].mean()
+            assert kinetic[s] == pytest.approx(true, rel=worst, abs=worst)
+            height = heights[k, kind.disks].mean()
+            assert potential[s] == pytest.approx(height, rel=worst, abs=worst)
+        for codes, values, top in (
+            (speed, truth.speed(frame), tops["speed"][1]),
+            (displacement, truth.displacement(frame), tops["displacement"][1]),
+            (hits, np.log1p(truth.collisions[frame]), np.log1p(tops["collisions"][1])),
+        ):
+            gap = np.abs(np.array(codes) - 255 * np.minimum(1, values / top))
+            assert np.quantile(gap, 0.9) < 3
+
+
+def test_the_energies_are_drawn_as_steps_at_their_collisions(shown, browser):
+    """Not as a line from frame to frame: of one disk that hits the other long after the start."""
+    text = """&species name = 'a' position = 0.2, 0.5 radius = 0.05 velocity = 0.5, 0 /
+    &species name = 'b' position = 0.9, 0.5 radius = 0.05 /
+    &stop time = 1.35 /
+    """
+    shown(text, "output.event_log=.true.")
+    rows = browser.run("return energiesBetween(cursorAt)[0]")
+    assert len(rows) > 100
+    for time_of, (a, b), _ in rows:
+        assert {round(a, 9), round(b, 9)} == {0, 0.125} and (a > b) == (time_of < 1.2)
+
+
+@pytest.mark.parametrize("box", BOXES)
+def test_the_next_event_is_the_next_of_the_log(shown, browser, box):
+    run = shown(BOXES[box] + FEW, "output.frames_every_time=0.5", "output.event_log=.true.")
+    times = run.events.time[:40]
+    found = []
+    for _ in times:
+        browser.press("n")
+        found.append(browser.run("return moment.time"))
+    np.testing.assert_allclose(found, times, atol=1e-9)
+    browser.click("event")
+    assert browser.run("return moment.time") == pytest.approx(run.events.time[40])
+    browser.run("go(last())")
+    browser.press("n")
+    assert browser.run("return moment.time") == run.time[-1]
+
+
+def test_up_to_twenty_disks_have_numbers(shown, browser):
+    inked = """const { data } = marks.getImageData(across(X[0]) - 6, up(Y[0]) - 9, 12, 18);
+        return data.some(Boolean)"""
+    shown(FEW)
+    assert browser.run(inked) is True
+    shown(FEW.replace("count = 8", "count = 17").replace("0.05", "0.02"))
+    assert browser.run(inked) is False
+
+
+@pytest.mark.parametrize("box", BOXES)
 def test_the_first_event_to_come_is_the_next_that_happens(shown, browser, box):
     """What the page predicts from places and velocities, against the log of the program."""
     run = shown(BOXES[box] + FEW, "output.frames_every_time=0.5", "output.event_log=.true.")
@@ -118,9 +195,29 @@ def test_a_film_without_a_log_says_where_it_interpolates(shown, browser):
     shown(FEW)
     browser.run("go(1)")
     said = browser.run("return $('guess').textContent")
-    assert "fly straight instead of along their true paths" in said
+    assert "shows frames as they are" in said
     assert "output.event_log" in said
+    assert "Dots: frames." in browser.run("return $('guide').textContent")
     assert browser.run("return [coming.first, $('queue').children.length]") == [None, 0]
+
+
+def test_disks_with_unknown_paths_stand_as_in_the_frame(shown, browser):
+    """Straight flights would lead them away from the walls where they turn."""
+    run = shown("&box boundary = 'periodic', 'wall' /\n" + FEW)
+    browser.run("state.arrows = true; go(0.45 * last())")
+    found = browser.run("return [X, Y, VX, VY].map(values => Array.from(values))")
+    frame = browser.run("return moment.frame")
+    assert run.time[frame] == browser.run("return moment.shown") < browser.run("return moment.time")
+    np.testing.assert_allclose(np.transpose(found[:2]), run.position[frame], atol=1e-12)
+    turned = np.subtract(*(np.arctan2(y, x) for x, y in (found[2:], run.velocity[frame].T)))
+    assert np.abs(np.exp(1j * turned) - 1).max() < np.pi / 250
+    assert np.median(np.hypot(*found[2:]) - run.speed(frame)) < 0.02
+    assert browser.run("return moment.kinetic") == pytest.approx(
+        [run.kinetic_energy(frame)[kind.disks].mean() for kind in run.by_species], rel=1e-6
+    )
+    hits = run.collisions[frame].mean()
+    assert browser.run("return collisionsNow()") == pytest.approx(hits)
+    assert "collisions per disk, with walls" in browser.run("return $('clock').textContent")
 
 
 def test_time_is_that_of_the_run_whenever_frames_are_taken(browser, tmp_path):
@@ -148,7 +245,7 @@ def test_time_is_that_of_the_run_whenever_frames_are_taken(browser, tmp_path):
     assert browser.run(second) == pytest.approx(1)
     browser.run("$('pace').value = -2; $('pace').dispatchEvent(new Event('input'))")
     assert browser.run(second) == pytest.approx(0.01)
-    assert "0.01 (" in browser.run("return $('times').textContent")
+    assert "0.01 (0.01 time units per second)" in browser.run("return $('times').textContent")
 
 
 def test_disks_do_not_jump_through_a_periodic_box(browser, tmp_path):
@@ -241,6 +338,14 @@ def test_velocities_and_own_colours_show(gas, browser):
     plain = browser.run(marks)
     browser.press("v")
     assert browser.run(marks) != plain
+    rim = browser.run(  # arrows of one colour would be lost on disks of that colour
+        """const [r, g, b] = [1, 3, 5].map(k => parseInt(ink.stage.slice(k, k + 2), 16));
+        const { data } = marks.getImageData(0, 0, page.width, page.height);
+        for (let k = 0; k < data.length; k += 4)
+          if ([r, g, b, 255].every((part, c) => data[k + c] === part)) return true;
+        return false;"""
+    )
+    assert rim
     browser.run(
         """const input = document.querySelector('#legend input'); input.value = '#12fa34';
         for (const type of ['input', 'change']) input.dispatchEvent(new Event(type));"""
@@ -289,16 +394,46 @@ def test_box_and_controls_are_seen_without_scrolling(browser, tmp_path, size, ed
         if not tall:  # the lowest controls of a narrow, high box
             assert box["left"] >= 0 and box["right"] <= width, (name, box)
             assert box["top"] >= 0 and box["bottom"] <= height, (name, box)
-    assert browser.run(
-        """const shown = $('colour'), free = shown.cloneNode(true);
+    assert (
+        browser.run(
+            """const shown = $('colour'), free = shown.cloneNode(true);
         free.style.cssText = 'position: absolute; flex: none; width: auto; min-width: 0';
         shown.parentNode.append(free);
         const widths = [shown.offsetWidth, free.offsetWidth];
         free.remove();
         return widths[0] >= widths[1] ? '' : widths;"""
-    ) == "", "the words of the menu are cut"
+        )
+        == ""
+    ), "the words of the menu are cut"
     assert boxes[0][1]["height"] >= (110 if edges == (3, 1) or size == "upright" else 260)
     assert browser.complaints() == []
+
+
+def place_of(browser, name):
+    return browser.run("return $(arguments[0]).getBoundingClientRect().toJSON()", name)
+
+
+def test_the_histogram_is_seen_with_the_disks(gas, browser):
+    for size in ("lying", "upright"):
+        browser.resize(*SIZES[size])
+        browser.run("layout(); layout(); scrollTo(0, 0)")
+        disks, speeds, controls = (
+            place_of(browser, name) for name in ("stage", "histogram", "controls")
+        )
+        assert speeds["bottom"] < SIZES[size][1] and speeds["height"] > 70
+        if size == "lying":
+            assert speeds["left"] > disks["right"] and speeds["top"] < disks["bottom"]
+        else:
+            assert disks["bottom"] < speeds["top"] and speeds["bottom"] < controls["top"]
+
+
+def test_a_wide_screen_is_used(gas, browser):
+    browser.resize(1920, 1080)
+    browser.run("layout()")
+    boxes = [place_of(browser, name) for name in ("view", "histogram", "energy")]
+    assert max(box["right"] for box in boxes) > 1860
+    assert boxes[1]["width"] > 550 and boxes[1]["height"] > 220
+    assert boxes[2]["bottom"] < 1080
 
 
 @pytest.mark.check
@@ -373,6 +508,33 @@ def test_a_run_is_watched_while_it_goes_on(live, browser, tmp_path):
     assert "Live: the run is at t =" in browser.run("return $('live').textContent")
     assert run.poll() is None
     assert browser.complaints() == []
+
+
+def test_the_live_film_keeps_up_with_the_run_until_one_goes_elsewhere(live, browser):
+    run, _, address = live
+    browser.open(address)
+    wait_for(lambda: browser.run("return live.stamp !== ''"))
+    browser.run("window.requestAnimationFrame = draw => { window.draw = draw; }")
+    browser.run("play(false); play(true)")
+    first = browser.run("draw(0); return last()")
+    run.send_signal(signal.SIGCONT)
+    wait_for(lambda: browser.run("return last()") > first)
+    taken = browser.run("const t = moment.time; return (last() - t) / paceNow()")
+    assert 0.1 < taken <= 10  # the time since the answer before
+    browser.run(
+        """let now = performance.now() + 1e6;
+        for (let k = 0; k <= 1000; k++) draw(now += 10);"""
+    )
+    assert browser.run("return moment.time === last()")
+    assert "the film follows it" in browser.run("return $('live').textContent")
+    assert "collisions per disk" in browser.run("return $('clock').textContent")
+    browser.run("go(first())")
+    assert "End follows it" in browser.run("return $('live').textContent")
+    seen = browser.run("return last()")
+    wait_for(lambda: browser.run("return last()") > seen)
+    assert browser.run("return moment.time === first()")
+    browser.press("\ue010")  # end
+    assert browser.run("return [live.newest, state.playing]") == [True, True]
 
 
 def stop(run):
@@ -458,10 +620,10 @@ def test_the_show_of_a_run_that_is_killed_ends_and_says_so(live, tmp_path, capsy
     run.send_signal(signal.SIGSTOP)
     time.sleep(4 * LOOK)
     assert show.poll() is None
+    with urllib.request.urlopen(address + "film", timeout=PATIENCE) as reply:  # a page is there
+        assert json.load(reply)["end"] == ""
     run.kill()
-    with urllib.request.urlopen(address + "film", timeout=PATIENCE) as reply:
-        run.wait()
-        assert reply.status == 200
+    run.wait()
     with urllib.request.urlopen(address + "film", timeout=PATIENCE) as reply:
         assert json.load(reply)["end"] == "was killed or has crashed"
     out, err = show.communicate(timeout=PATIENCE)
@@ -484,32 +646,26 @@ def server(tmp_path):
     one.server_close()
 
 
-def status_of(port, request, reset=False):
-    """The status that the server answers to these bytes; 0 without an answer."""
-    answer = b""
-    with (
-        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection,
-        contextlib.suppress(ConnectionError),  # the server has not read all that was sent
-    ):
-        connection.sendall(request)
-        if reset:  # the connection breaks off
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            return 0
-        with contextlib.suppress(OSError):  # it has hung up already
-            connection.shutdown(socket.SHUT_WR)
-        while part := connection.recv(65536):
-            answer += part
-    assert answer == b"" or answer.startswith(b"HTTP/1.0 "), answer
-    return int(answer[9:12] or 0)
+def test_the_end_counts_as_told_when_it_has_been_sent(tmp_path, monkeypatch):
+    """Else the server could leave with its last answer half written."""
+    x = np.full((2, 3, 2), 0.5)
+    live = Live(read_run(write_run(tmp_path / "a.h5.part", x, x)), lambda run: {})
+    answers = handler(live, b"the page")
+    reply, told = answers.reply, []
 
+    def noted(self, *arguments):
+        told.append(live.delivered)
+        reply(self, *arguments)
 
-#: What requests are made of, good and bad.
-METHODS = b"GET GET GET get POST HEAD TRACE PRI \x16\x03\x01 G\0ET *".split()
-PATHS = rb"""/ /film /film?known=%ff% //film /../gas.nml * film ? http://[::1/film http://[/ //[::1
-    http://a:b:c/ http://127.0.0.1:PORT/film /LONG""".split()
-VERSIONS = rb"HTTP/1.0 HTTP/1.1 HTTP/0.9 HTTP/2.0 HTTP/1. HTTP/x.1 HTTP/-1.1 HTTP/9LONG.1 x".split()
-HEADERS = rb"Host: 127.0.0.1:PORT|Host: [::1|Host:|host|: a| folded|Expect: 100-continue|a: LONG|"
-PIECES = ([*METHODS, b"\xff"], [*PATHS, b"/\xff\0", b""], [*VERSIONS, b"\xff/1.1", b""])
+    monkeypatch.setattr(answers, "reply", noted)
+    with Server(("127.0.0.1", 0), answers) as one:
+        threading.Thread(target=one.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{one.server_address[1]}/film"
+        with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
+            assert json.load(answer)["end"] == "has stopped"
+        wait_for(lambda: live.delivered)
+        one.shutdown()
+    assert told == [False]
 
 
 @pytest.mark.parametrize("requests", [300, pytest.param(5000, marks=pytest.mark.check)])
@@ -519,19 +675,7 @@ def test_hostile_requests_are_refused_without_a_word(server, capfd, requests):
         assert status_of(server, f"GET {path} HTTP/1.1\r\n".encode() + host) == status, path
     assert status_of(server, b"GET / HTTP/2.0\r\n" + host) == 400
     assert status_of(server, b"GET /\r\n\r\n") == 403
-    rng = random.Random(31)
-    for _ in range(requests):
-        line = b" ".join(rng.choice(words) for words in PIECES)
-        lines = [line, *rng.choices(HEADERS.split(b"|"), k=rng.choice((0, 1, 2, 150)))]
-        request = rng.choice((b"\r\n", b"\n", b"\r")).join(lines) + b"\r\n\r\n"
-        if rng.random() < 0.3:  # damaged
-            place = rng.randrange(len(request))
-            request = request[:place] + rng.randbytes(rng.randrange(9)) + request[place + 1 :]
-        request = request.replace(b"PORT", str(server).encode())
-        request = request.replace(b"LONG", rng.choice((b"", b"9" * 70000)))
-        status = status_of(server, request, reset=rng.random() < 0.1)
-        assert status in (0, 200) or 400 <= status < 500, request
-        assert status != 200 or (request.startswith(b"GET /") and host[:-4] in request), request
+    besiege(server, requests)
     assert capfd.readouterr() == ("", "")
 
 

@@ -92,6 +92,20 @@ def test_excess_kurtosis(rng):
     assert statistics.excess_kurtosis(speed) == pytest.approx(0, abs=0.02)
 
 
+def test_the_noise_of_the_kurtosis_is_that_of_maxwellian_speeds(rng):
+    speeds_of_gases = np.sqrt(rng.exponential(size=(2000, 500)))
+    found = [statistics.excess_kurtosis(speed) for speed in speeds_of_gases]
+    assert np.std(found) == pytest.approx(statistics.kurtosis_noise(500), rel=0.1)
+
+
+def test_errors_are_written_with_two_digits():
+    assert statistics.to_error(0.0000123, 0.00031) == ("0.00001", "0.00031")
+    assert statistics.to_error(-1e-9, 0.2) == ("0.00", "0.20")
+    assert statistics.to_error(945.3, 12.4) == ("945", "12")
+    assert statistics.to_error(0.9512, 0.00999) == ("0.951", "0.010")
+    assert statistics.to_error(0.5, 0.0) == ("0.5", "0")
+
+
 def test_estimate_has_the_error_of_the_mean():
     mean, error = statistics.estimate([1.0, 2.0, 3.0, 4.0])
     assert (mean, error) == (2.5, pytest.approx(np.sqrt(5 / 3 / 4)))
@@ -196,6 +210,23 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monke
     assert "cool.h5: loses energy" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("system", "exact"),
+    [
+        ({}, True),
+        ({"periodic": (True, True)}, True),
+        ({"periodic": (True, False)}, False),
+        ({"parameters": {"box": {"gravity": [0.0, -1.0]}}, "names": ("disk",)}, False),
+        ({"periodic": (True, True), "mass": np.repeat([1.0, 2.0], 100)}, False),
+    ],
+)
+def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, system, exact):
+    """Gravity takes kinetic energy away and gives it back; a strip keeps one momentum of two."""
+    run = gas(tmp_path / "run.h5", rng, **system)
+    draw("speeds", run, "-o", tmp_path / "run.png")
+    assert (speeds.exact_law(read_run(run)) is not None) == exact
+
+
 def words_on(figure):
     """All texts of a figure, in one line."""
     parts = [text.get_text() for text in figure.findobj(plt.Text)]
@@ -280,12 +311,18 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
     np.testing.assert_allclose(curves.mean[:, 0], [1, 2 / 3, 4 / 3])
 
 
-def test_panels_of_cooling_share_a_time_axis(tmp_path):
+def test_curves_of_cooling_share_axes_and_fill_them(tmp_path):
     groups = [(xi, [cooled(tmp_path / f"{xi}.h5", xi, 3 * (1 - xi))]) for xi in (0.8, 0.9)]
     results = [cooling.cooling(members) for _, members in groups]
     figure = cooling.draw(groups, results)
-    first, second = figure.axes[:2]
-    assert first.get_shared_x_axes().joined(first, second) and len(figure.axes) == 5
+    assert len(figure.axes) == 3
+    for axes in figure.axes[:2]:
+        x, y = (
+            np.concatenate([getattr(line, f"get_{axis}data")() for line in axes.lines])
+            for axis in "xy"
+        )
+        low, high = np.log(axes.get_ylim())
+        assert np.max(x) == axes.get_xlim()[1] and np.ptp(np.log(y)) > 0.8 * (high - low)
 
 
 def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
@@ -453,6 +490,9 @@ def test_a_scan_of_one_parameter_is_one_column_that_says_what_varies(tmp_path):
     assert figure.axes[0].get_title("left") == "speed 5,  radius 5,  restitution 0.5"
     assert crater_scan.unused(keys, scans) == []
     assert len(figure.axes) == 2 and figure.axes[1].get_xlabel() == crater_scan.AXES["mass"]
+    assert "=" not in figure.get_suptitle().split("\n")[0].split(",", 1)[1]  # but for N
+    law = statistics.PowerLaw(1, 0.00012, 0, 0.00034)
+    assert crater_scan.power("speed", law) == ", $\\propto v^{0.00012\\pm0.00034}$"
 
 
 def test_captions_name_what_varies(tmp_path):
@@ -558,9 +598,25 @@ def test_windows_are_means():
 
 def test_thermalisation_time_ignores_a_passing_agreement():
     time = np.arange(8.0)
-    ratio = np.array([2, 1.05, 1.5, 1.2, 1.09, 1.0, 0.95, 1.3])
-    assert equipartition.thermalisation_time(time, np.ones(8), ratio) == 4
-    assert np.isnan(equipartition.thermalisation_time(time, np.ones(8), ratio + 1))
+    gap = np.array([2, 1.05, 1.5, 1.2, 1.09, 1.0, 0.95, 1.3]) - 1
+
+    def found(difference, error):
+        known = statistics.Estimate(difference, np.full(8, error))
+        return equipartition.thermalisation_time(time, known)
+
+    assert found(gap, 0.04) == 4
+    for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):
+        assert np.isnan(unknown)
+
+
+def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
+    """In equilibrium the energies of 30 disks pass through agreement again and again."""
+    path = falling(tmp_path / "run.h5", rng)
+    draw("equipartition", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    (row,) = csv.DictReader((tmp_path / "a.csv").open())
+    assert row["T_therm"] == "nan" and "take more runs" in capsys.readouterr().err
+    several = [read_run(falling(tmp_path / f"{k}.h5", rng, seed=k)) for k in range(2, 60)]
+    assert equipartition.approach(several, 2, 0.1).thermalisation == 1
 
 
 def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=15):
@@ -660,6 +716,9 @@ def test_total_change_of_the_energy(tmp_path, rng):
     assert energy.total_change(run)[1][-1] == pytest.approx(1e-4)
     assert energy.method(run) == "time steps, Δt = 0.004"
     wave = np.tile([1, -1, -1, 1], 100)
+    bottom = energy.draw([run]).axes[1]
+    (line,) = bottom.lines  # the largest change so far, not a block of noise
+    assert np.all(np.diff(line.get_ydata()) >= 0) and line.get_ydata()[-1] == pytest.approx(1e-4)
     drift, spread = energy.drift_and_spread(run.time, 0.1 * run.time + 5 * wave)
     assert drift == pytest.approx(10, rel=0.01) and spread == pytest.approx(5, rel=1e-3)
 
@@ -706,6 +765,26 @@ def test_runs_with_equal_seeds_are_compared(tmp_path, rng):
             missed.compare(runs, 2.0)
     with pytest.raises(RunError, match="before --skip 20"):
         missed.compare(steps + events, 20.0)
+
+
+def test_runs_by_steps_without_a_partner_are_named(tmp_path, rng, capsys):
+    paths = [tmp_path / f"{name}.h5" for name in ("events1", "steps1", "steps2", "steps3")]
+    for path in paths:
+        dynamics, seed = path.stem[:-1], int(path.stem[-1])
+        falling(path, rng, frames=50, dynamics=dynamics, seed=seed, hits=9 + seed)
+    draw("missed", *paths, "--skip", 2, "-o", tmp_path / "missed.png")
+    (said,) = (line for line in capsys.readouterr().err.splitlines() if "left out" in line)
+    assert said.endswith(f"{paths[2]}, {paths[3]}") and str(paths[1]) not in said
+
+
+def test_a_figure_of_one_pair_of_runs_says_so(tmp_path, rng):
+    runs = [
+        read_run(falling(tmp_path / f"{kind}.h5", rng, frames=50, dynamics=kind))
+        for kind in ("events", "steps")
+    ]
+    (axes,) = missed.draw(runs, missed.compare(runs, 2.0)).axes
+    labels = axes.get_legend_handles_labels()[1]
+    assert any(label.endswith("1 pair of runs") for label in labels)
 
 
 def test_equilibrium_values_are_means_after_skip(tmp_path, rng):
@@ -1013,7 +1092,9 @@ def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
     printed, said = capsys.readouterr()
     assert "nan" in printed and "no error of energy_left, temperature_ratio: it takes sev" in said
     draw("equipartition", falling(tmp_path / "f.h5", rng), "--within", 0, "-o", tmp_path / "b.png")
-    assert "v0 = 0.5: the energies never agree within 0 %" in capsys.readouterr().err
+    assert "v0 = 0.5: no T_therm; the difference of the energies is not known to 0" in (
+        capsys.readouterr().err
+    )
 
 
 def test_vector_figures_are_written_too(tmp_path, rng):

@@ -15,7 +15,7 @@ import melting
 import rates
 from ricochet import Events, diffusion, read_run, statistics, structure, thermodynamics
 from ricochet import hard_disks as hd
-from ricochet.drawing import values_of
+from ricochet.drawing import plt, values_of
 from synthetic_run import run_script, write_run
 from validation.estimators import force, hit_rate
 from validation.laws import cooling_ratio, luding, mixture_rates, mixture_z
@@ -195,7 +195,7 @@ def test_what_speaks_against_an_error_is_said(rng):
 @pytest.mark.parametrize(
     ("script", "system"),
     [
-        *((name, "walls") for name in ("rates", "correlations", "equation_of_state")),
+        *((name, "walls") for name in ("rates", "equation_of_state")),
         *((name, "obstacle") for name in ("melting", "coverage")),
     ],
 )
@@ -422,17 +422,40 @@ def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_pat
     assert {"vacf", "msd", "g", "S", "g6", "psi6_local", "psi6_global"} <= set(rows)
 
 
+def test_a_gas_that_cools_has_a_structure_and_no_diffusion(bulk, tmp_path, capsys):
+    table = tmp_path / "a.csv"
+    assert run_script("correlations", bulk[2], "-o", tmp_path / "a.png", "--csv", table) == 0
+    assert "loses energy, no equilibrium: no memory" in capsys.readouterr().err
+    rows = list(csv.DictReader(table.open()))
+    assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
+    run, edges = read_run(bulk[2]), correlations.bins(read_run(bulk[2]))["g"]
+    late = correlations.some(correlations.later(run, None, cool=True))
+    assert run.collisions_per_disk_at(run.time[late[0]]) > 14
+    g = structure.pair_correlation(run, late, edges)
+    found = np.array([[float(row[name]) for name in ("y", "error")] for row in rows
+                      if row["what"] == "g"])  # fmt: skip
+    assert np.all(found[:, 1] > 0) and np.mean(np.abs(found[:, 0] - g) < found[:, 1]) > 0.9
+
+
+def test_curves_of_several_runs_have_the_error_of_their_scatter(bulk):
+    run = read_run(bulk[0])
+    twice = correlations.analysed([run, run], None, cool=False)
+    for name in ("vacf", "msd", "a2", "g", "S", "D_velocities(t)", "D_displacement(t)"):
+        assert np.all(twice.curves[name].error == 0), name
+    assert np.isnan(correlations.analysed([run], None, cool=False).curves["vacf"].error).all()
+
+
 def test_what_is_no_gas_in_equilibrium_has_no_correlations(bulk, tmp_path, capsys):
     falling = {"box": {"gravity": [0.0, -1.0]}}
     x = np.full((20, 4, 2), 0.5)
     fall = write_run(tmp_path / "fall.h5", x, x, parameters=falling)
     radius = {"radius": [0.01, 0.01, 0.02, 0.02], "species": [1, 1, 2, 2], "names": ("a", "b")}
     mixed = write_run(tmp_path / "mixed.h5", x, x, **radius)
-    for script, words in (
-        ("correlations", ("elastic", "without gravity", "not equal disks")),
-        ("equation_of_state", ("not elastic", "falls", "not of one radius")),
+    for script, cool, words in (
+        ("correlations", [bulk[0], bulk[2]], ("draw them", "without gravity", "not equal disks")),
+        ("equation_of_state", [bulk[2]], ("not elastic", "falls", "not of one radius")),
     ):
-        for runs, word in zip(([bulk[2]], [fall], [bulk[0], mixed]), words, strict=True):
+        for runs, word in zip((cool, [fall], [bulk[0], mixed]), words, strict=True):
             assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
             said = capsys.readouterr().err
             assert said.startswith(f"{script}.py: {runs[-1]}: ") and said.count("\n") == 1
@@ -498,8 +521,21 @@ def test_scripts_draw(bulk, tmp_path):
             assert run_script(script, *runs, "-o", figure, "--csv", table) == 0
         assert figure.stat().st_size > 10000
         assert len(table.read_text().splitlines()) > 2
-    for script, runs in (("equation_of_state", bulk[2:]), ("rates", bulk[2:])):
-        assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+    assert run_script("equation_of_state", *bulk[2:], "-o", tmp_path / "no.png") == 2
+
+
+def test_a_gas_that_cools_has_free_paths_and_no_pressure(bulk, tmp_path, capsys):
+    table = tmp_path / "a.csv"
+    assert run_script("rates", bulk[2], "-o", tmp_path / "a.png", "--csv", table) == 0
+    assert "loses energy, no equilibrium" in capsys.readouterr().err
+    rows = {row["quantity"]: row["mean"] for row in csv.DictReader(table.open())}
+    assert not any(name.startswith("pressure") for name in rows)
+    run = read_run(bulk[2])  # a path does not know how fast it is flown: Enskog's length
+    eta, diameter = thermodynamics.packing(run), 2 * run.radius[0]
+    density = (run.count - 1) / np.prod(run.edges)
+    contact = (hd.simulated(eta) - 1) / (2 * eta)
+    enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
+    assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
 
 
 def test_rates_of_a_gas_agree_with_each_other(bulk):
@@ -514,11 +550,42 @@ def test_rates_of_a_gas_agree_with_each_other(bulk):
     assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
 
 
+def test_the_legend_of_the_pressure_hides_nothing_that_it_names(bulk):
+    run = read_run(bulk[0])
+    figure, axes = plt.subplots()
+    mean = rates.quantities(run)["pressure_virial"]
+    rates.draw_pressure(axes, [run], {"pressure_virial": mean}, 0.1 * run.time[-1])
+    figure.draw_without_rendering()
+    legend = axes.get_legend().get_window_extent().transformed(axes.transData.inverted())
+    assert legend.x0 > 0.1 * run.time[-1]
+    assert all(np.max(line.get_ydata()) < legend.y0 for line in axes.lines)
+
+
 def test_a_gas_cools_by_haff(bulk):
-    found = haff.means([read_run(bulk[2])])
+    found = haff.cooled([haff.energy_left(read_run(bulk[2]))], 0.9)
     for x, y, law in (
-        (found["time"], found["by_time"].mean, hd.haff_by_time),
-        (found["tau"], found["by_collisions"].mean, hd.haff_by_collisions),
+        (found.time, found.by_time.mean, hd.haff_by_time),
+        (found.tau, found.by_collisions.mean, hd.haff_by_collisions),
     ):
         early = law(x, 0.9) > 0.1
         np.testing.assert_allclose(y[early], law(x, 0.9)[early], rtol=0.2)
+
+
+@pytest.mark.parametrize("end", [25.0, None])
+def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
+    """Three per cent above the law, scattering by one; at half the rate after the end."""
+    tau, true = np.linspace(0, 60, 601), 1.03 * hd.haff_rate(0.9)
+    tracks = []
+    for factor in 1 + 0.01 * rng.normal(size=20):
+        lost = true * factor * np.minimum(tau, end or 60)
+        lost += 0.5 * true * np.maximum(tau - (end or 60), 0)
+        tracks.append((tau, tau, np.exp(-lost)))
+    found = haff.cooled(tracks, 0.9)
+    assert found.rate.mean == pytest.approx(true, abs=4 * found.rate.error)
+    assert found.rate.error == pytest.approx(0.01 * true / np.sqrt(20), rel=0.5)
+    local = found.local_rate.mean[100]
+    assert local == pytest.approx(true * (0.5 if end else 1), rel=0.01)
+    if end:
+        assert found.homogeneous_until == pytest.approx(end, abs=1)
+    else:
+        assert np.isnan(found.homogeneous_until)

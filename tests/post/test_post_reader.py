@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from ricochet import Obstacle, RunError, read_run
-from ricochet.drawing import draw_box, plt
+from ricochet.drawing import draw_box, plt, radius_marks
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
+from whole_runs import FINISHED, write_input
 
 
 @pytest.fixture
@@ -238,10 +239,44 @@ def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, caps
     assert film.stat().st_size > 0
 
 
-@pytest.mark.parametrize("script", SCRIPTS)
+@pytest.mark.parametrize("script", [*SCRIPTS, "lab"])
 def test_a_python_without_packages_is_told_where_they_are(script):
     command = [sys.executable, "-S", ROOT / "post" / f"{script}.py", "--help"]  # no site-packages
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 2 and run.stderr.count("\n") == 1
     assert run.stderr.startswith(f"{script}.py: ") and "has no numpy, h5py" in run.stderr
     assert f"{ROOT}/.venv/bin/python" in run.stderr
+
+
+def test_frames_have_a_shape_and_are_arrays_for_numpy(tmp_path):
+    x = np.arange(12.0).reshape(2, 3, 2)
+    run = read_run(write_run(tmp_path / "a.h5", x, x, collisions=np.ones((2, 3), int)))
+    assert run.position.shape == (2, 3, 2) and run.collisions.shape == (2, 3)
+    assert np.array_equal(run.position, x) and np.mean(run.velocity) == x.mean()
+    assert np.asarray(run.collisions, dtype=float).dtype == float
+
+
+def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(ricochet, tmp_path):
+    text = """&side name = 'left' temperature = 2 / &wall name = 'w' from = 0.2, 0.2 to = 0.4, 0.3 /
+    &contact tangential_restitution = 0.5 wall_rule = 'normal' /
+    &species count = 20 radius = 0.03 temperature = 1 rotational_temperature = 1 /
+    &stop time = 1 / &output frames_every_time = 0.1 event_log = .true. /"""
+    write_input(tmp_path, text)
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    run = read_run(tmp_path / "gas.h5")
+    assert set(run.elements) == {"angular_velocity", "orientation"}
+    energy = 0.5 * np.mean(run.inertia * run.angular_velocity[:] ** 2, axis=1)
+    assert run.observable("all/rotational_energy").value[-1] == pytest.approx(energy[-1])
+    assert run.orientation[-1].any() and not run.orientation[0].any()
+    assert {"sides/left/impulse", "walls/w/energy"} <= set(run.observables)
+    assert run.observable("walls/w/impulse").value.shape[1:] == (2,)
+    size = np.hypot(*run.events.momentum_change.T)
+    assert size == pytest.approx(run.events.impulse)
+    with pytest.raises(RunError, match="its frames have no wall_hits"):
+        run.element("wall_hits")
+    axes = plt.subplots()[1]
+    marks = radius_marks(axes, run, run.frames - 1)
+    dx, dy = np.transpose([b - a for a, b in marks.get_segments()])
+    assert np.hypot(dx, dy) == pytest.approx(run.radius)
+    turned = np.angle(np.exp(1j * (np.arctan2(dy, dx) - run.orientation[-1])))
+    assert turned == pytest.approx(0)

@@ -1,16 +1,42 @@
 """The notebook runs from its first cell to its last, and shows what it promises."""
 
+import json
+import re
+import subprocess
+import tomllib
+
 import pytest
 
+from ricochet import Run, packages
 from synthetic_run import ROOT
 
-pytestmark = pytest.mark.check
-nbclient = pytest.importorskip("nbclient")
+
+def test_one_command_installs_what_the_notebook_needs():
+    """Jupyter, its kernel, and what the cells and the methods that they call import."""
+    wanted = {"ipykernel", "jupyterlab", "pandas"}
+    lines = (ROOT / "requirements.txt").read_text().splitlines()
+    installed = {line.split("==")[0] for line in lines if re.search(r"==.*#.*\bnotebook\b", line)}
+    extras = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
+    assert installed == set(extras["optional-dependencies"]["notebook"]) == wanted
+    cells = json.loads((ROOT / "docs" / "tour.ipynb").read_text())["cells"]
+    code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+    imported = set(re.findall(r"^(?:import|from) (\w+)", code, re.M)) - {"ricochet"}
+    assert imported <= installed | set(packages.needed)
+    said = subprocess.run(["make", "-n", "notebook"], cwd=ROOT, capture_output=True, text=True)
+    assert ".ci/set-up demo notebook" in said.stdout and "docs/tour.ipynb" in said.stdout
+    assert "make notebook" in cells[0]["source"][-2] + cells[0]["source"][-1]
+
+
+def test_the_page_says_all_that_a_run_can_do():
+    page = (ROOT / "docs" / "output.md").read_text().partition("What a `Run` can do")[2]
+    names = {*Run.__dataclass_fields__, *(name for name in vars(Run) if name[0] != "_")}
+    assert [name for name in sorted(names) if not re.search(rf"`{name}\b", page)] == []
 
 
 @pytest.fixture(scope="module")
 def cells(program):
     """The code of each cell with what it shows: kinds of data and texts."""
+    nbclient = pytest.importorskip("nbclient")
     import nbformat
 
     notebook = nbformat.read(ROOT / "docs" / "tour.ipynb", as_version=4)
@@ -36,19 +62,23 @@ def showing(cells, code):
     return found
 
 
+@pytest.mark.check
 def test_every_figure_is_drawn(cells):
     drawn = [output for source, output in cells if "plt.subplots" in source]
     assert len(drawn) == 4 and all("image/png" in output for output in drawn)
 
 
+@pytest.mark.check
 def test_the_film_has_buttons(cells):
     assert "Animation(frames" in showing(cells, "animate(run")
 
 
+@pytest.mark.check
 def test_energy_is_conserved_and_mistakes_are_told(cells):
     assert float(showing(cells, "largest relative").split(":")[1]) < 1e-12
     assert "contact.restitution" in showing(cells, "except ricochet.ProgramError")
 
 
+@pytest.mark.check
 def test_no_cell_warns(cells):
     assert [source for source, output in cells if "Warning" in output] == []

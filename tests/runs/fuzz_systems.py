@@ -4,8 +4,9 @@
 
 Each system runs plainly; then on several threads, with another search and queue, and in parts
 that are stopped by a signal and resumed, each part in another way. All must end alike: with the
-same exit code, the same message and the same bytes. A system that is refused, or is too long for
-the plain run, says nothing.
+same exit code, the same message and the same bytes; and what the energy has changed by must be what
+the observables say was lost and given. A system that is refused, or is too long for the plain run,
+says nothing.
 """
 
 import random
@@ -23,12 +24,14 @@ import fuzzing
 sys.path[:0] = [str(fuzzing.ROOT / "tests"), str(fuzzing.ROOT / "tests" / "support")]
 
 from random_systems import System, random_system  # noqa: E402
-from whole_runs import FINISHED, STOPPED, USAGE, differences  # noqa: E402
+from whole_runs import FINISHED, PATIENCE, STOPPED, USAGE, differences, imbalance, within  # noqa: E402
 
 HARMLESS = {"same", "refused", "too long", "nothing to compare"}
-SECONDS_PLAIN, SECONDS = 10, 120  # a limit that only something endless meets
+SECONDS_PLAIN, SECONDS = 10, 200  # of processor time; the second only something endless takes
 MOST_PARTS = 12
 BYTES = 4_000_000_000
+BALANCE = 1e-12  # of the energy, what was lost, and what was given
+UNREAD = "stopped; the run is finished"  # a signal may come when all is done
 #: What does not belong to the results: what says how they were computed.
 ASIDE = re.compile(r"^/(parameters(/run@(search|queue)|/overrides)$|checkpoint/input)")
 
@@ -43,9 +46,10 @@ class Runs:
         (folder / "start.txt").write_text(system.start + "\n")
         (folder / "case.nml").write_text(system.text)
 
-    def begin(self, name: str, *options: str) -> subprocess.Popen:
+    def begin(self, name: str, seconds: int, *options: str) -> subprocess.Popen:
+        """Starts a run that may use so much processor time."""
         command = [
-            "prlimit",
+            *within(seconds),
             f"--as={BYTES}",
             self.program,
             "case.nml",
@@ -58,9 +62,9 @@ class Runs:
             command, cwd=self.folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
         )
 
-    def whole(self, name: str, seconds: float, *options: str) -> tuple[int, str]:
+    def whole(self, name: str, seconds: int, *options: str) -> tuple[int, str]:
         """Exit code and last message of a run."""
-        return ended(self.begin(name, *options), seconds)
+        return ended(self.begin(name, seconds, *options))
 
     def result(self, name: str) -> Path:
         """What a run left: its finished file, or that of one that broke off."""
@@ -72,25 +76,26 @@ class Runs:
         code, message = STOPPED, ""
         for part in range(MOST_PARTS):
             resume = ["--resume"] if (self.folder / "parts.chk.h5").exists() else []
-            process = self.begin("parts", *way(rng), *resume)
+            process = self.begin("parts", SECONDS, *way(rng), *resume)
             if part < MOST_PARTS - 1:
                 time.sleep(rng.uniform(0, 1.2) * plain_seconds)
                 process.send_signal(signal.SIGTERM)
-            code, message = ended(process, SECONDS)
+            code, message = ended(process)
             if code not in (STOPPED, -signal.SIGTERM):
                 break
         return code, message
 
 
-def ended(process: subprocess.Popen, seconds: float) -> tuple[int, str]:
-    """Exit code and last line of a process; `endless` if it does not end."""
+def ended(process: subprocess.Popen) -> tuple[int, str]:
+    """Exit code and last line of a process; `endless` if it has used its processor time."""
     try:
-        lines = process.communicate(timeout=seconds)[1].splitlines()
+        lines = process.communicate(timeout=PATIENCE)[1].splitlines()
     except subprocess.TimeoutExpired:
         process.kill()
-        process.communicate()
-        return -1, "endless"
-    lines = [line for line in lines if not line.startswith(("warning:", "note:"))]
+        lines = process.communicate()[1].splitlines()
+    if process.returncode == -signal.SIGKILL:
+        return process.returncode, "endless"
+    lines = [line for line in lines if not line.startswith(("warning:", "note:", UNREAD))]
     return process.returncode, lines[-1] if lines else ""
 
 
@@ -145,6 +150,10 @@ def judge(program: str, folder: Path, seed: str) -> tuple[str, str]:
         ]
         if found:
             return "differs", f"{name} {' '.join(options)}: {len(found)} {found[:6]}\n{system.text}"
+    if "'steps'" not in system.text and runs.result("plain").exists():
+        part = imbalance(runs.result("plain"))
+        if not part < BALANCE:
+            return "out of balance", f"by {part:g}\n{system.text}"
     return "same", ""
 
 

@@ -38,7 +38,7 @@ def run(description: str, fuzz: Callable, harmless: set[str], count: int) -> int
     """The command line of a fuzzer `fuzz(program, count, seed)`; the exit status."""
     parser = argparse.ArgumentParser(description=description.split("\n")[0])
     parser.add_argument("--count", type=int, default=count, help="number of cases (%(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="of the injuries (%(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="of the cases (%(default)s)")
     parser.add_argument(
         "--program",
         default=os.environ.get("RICOCHET", str(ROOT / "build" / "ricochet")),
@@ -46,5 +46,6 @@ def run(description: str, fuzz: Callable, harmless: set[str], count: int) -> int
     )
     options = parser.parse_args()
     verdicts = fuzz(str(Path(options.program).resolve()), options.count, options.seed)
-    print(", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items())))
+    found = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
+    print(f"{Path(sys.argv[0]).name} --count {options.count} --seed {options.seed}: {found}")
     return 0 if set(verdicts) <= harmless else 1

@@ -8,12 +8,11 @@ import pytest
 from synthetic_run import ROOT
 
 VALGRIND = """#!/bin/sh
-case "$*" in *collisions=40000*) n=40000 ;; *) n=140000 ;; esac
-echo "==1== Collected : $((1000000 + n * {}))" >&2
+echo "==1== Collected : $((100000 * {}))" >&2
 """
 
 
-@pytest.mark.parametrize(("per_collision", "code"), [(2150, 0), (2185, 1), (0, 1)])
+@pytest.mark.parametrize(("per_collision", "code"), [(2080, 0), (2120, 1), (0, 1)])
 def test_the_gate_on_instructions(program, tmp_path, per_collision, code):
     (tmp_path / "valgrind").write_text(VALGRIND.format(per_collision))
     (tmp_path / "valgrind").chmod(0o755)

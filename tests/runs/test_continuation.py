@@ -236,3 +236,21 @@ def test_a_run_that_breaks_off_leaves_its_last_state(ricochet, tmp_path):
         assert file["events/committed"][()] == observables["wall_collisions/value"][-1].sum()
         assert observables["total_energy/time"][-1] == times[-1]
         assert file["provenance"].attrs["note"].decode() == run.stderr.strip()
+
+
+def test_a_run_knows_its_overrides(ricochet, tmp_path):
+    """Stop rules and cadences are as the command says; the rest is as it was, in the same words."""
+    write_input(tmp_path)
+    fixed = ["run.seed=8", "species.heavy.mass=7", "Contact.restitution=0.9", "run.title=a = b"]
+    sets = [f"--set={word}" for word in fixed]
+    assert ricochet("gas.nml", "-o", "whole.h5", *sets, "--set=stop.time=2").returncode == FINISHED
+    first = ["gas.nml", "-o", "gas.h5"]
+    assert ricochet(*first, *sets, "--set=stop.wall_clock=1e-9").returncode == STOPPED
+    run = ricochet(*first, "--resume", "--set=species.heavy.mass=8")
+    assert run.returncode == USAGE and "species.heavy.mass" in one_line(run)
+    for time in (1, 2):  # a stopped one, then a finished one
+        options = ["--set=run.title=a = b", f"--set=stop.time={time}"]
+        run = ricochet(*first, "--resume", *options)
+        assert run.returncode == FINISHED, run.stderr
+    found = differences(tmp_path / "whole.h5", tmp_path / "gas.h5")
+    assert found == []

@@ -1,6 +1,7 @@
 """The pages say what is there: current reference, no dead links, commands that exist."""
 
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 from synthetic_run import ROOT, write_run
+from whole_runs import differences
 
 PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
@@ -100,11 +102,70 @@ def test_procedures_that_the_page_where_names_exist():
     assert missing == []
 
 
+def called(build, *words, cwd):
+    """The (module, procedure) pairs that a run of a program built with --coverage calls."""
+    for counts in build.glob("*.gcda"):
+        counts.unlink()
+    subprocess.run([build / "ricochet", *words], cwd=cwd, capture_output=True)
+    gcov = ["gcov", "--json-format", "--stdout", *sorted(build.glob("*.gcda"))]
+    lines = subprocess.run(gcov, cwd=build, capture_output=True, check=True).stdout.splitlines()
+    files = [file for line in lines for file in json.loads(line)["files"]]
+    return {
+        (Path(file["file"]).stem, re.sub(r"^__\w+?_MOD_|\.\d+$", "", function["name"]))
+        for file in files
+        for function in file["functions"]
+        if function["execution_count"] > 0
+    }
+
+
+@pytest.mark.check
+def test_procedures_that_the_page_where_names_are_called_in_its_examples(tmp_path):
+    if not shutil.which("gcov"):
+        pytest.skip("gcov counts the calls")
+    build = tmp_path / "build"
+    flags = "OPT=-O0 --coverage -Wno-maybe-uninitialized"
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    make = ["make", "-j2", flags, f"BUILD={build}", "all"]
+    subprocess.run(make, cwd=ROOT, env=environment, check=True, capture_output=True)
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    rows = re.findall(
+        r"^\| (.+) \| (.+) \| (`.+`) \|$", (ROOT / "docs" / "where.md").read_text(), re.M
+    )
+    assert len(rows) > 40
+    calls, missing = {}, []
+    for question, answer, cell in rows:
+        examples = re.findall(r"`([^`]+)`", cell)
+        for example in examples:
+            if example not in calls:
+                first, *options = example.split()
+                name = first if first.startswith("-") else f"input/{first}"
+                known = (tmp_path / "runs" / first).with_suffix(".h5").exists()
+                force = ["--force"] * (known and "--resume" not in options)
+                calls[example] = called(build, name, *options, *force, cwd=tmp_path)
+        seen = set().union(*(calls[example] for example in examples))
+        for file, procedure in re.findall(r"`(?:\w+/)?(\w+)(?:\.c)?: (\w+)`", answer):
+            if (file, procedure) not in seen:
+                missing.append(f"{question}: {file}: {procedure}")
+    assert missing == []
+
+
 @pytest.mark.parametrize("folder", sorted(p.parent.name for p in ROOT.glob("src/*/README.md")))
 def test_every_module_is_introduced_in_its_folder(folder):
     page = (ROOT / "src" / folder / "README.md").read_text()
     modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
+
+
+@pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
+def test_every_folder_says_which_tests_protect_it(folder):
+    """After "Protected by" its README names files, or folders, in tests/."""
+    page = (ROOT / "src" / folder / "README.md").read_text()
+    _, protected, words = page.partition("Protected by")
+    named = re.findall(r"`(?:tests/)?([\w/]+(?:\.\w+)?)`", words.partition("\n\n")[0])
+    assert protected and named
+    there = {str(path.relative_to(ROOT / "tests")) for path in ROOT.glob("tests/**/*")}
+    there |= {name.rpartition("/")[2] for name in there}
+    assert [name for name in named if name not in there] == []
 
 
 def test_modules_that_keep_a_promise_exist():
@@ -135,16 +196,55 @@ def test_options_that_are_named_exist(program):
                     assert option in known, f"{page.name}: {line}"
 
 
+def test_the_numbers_of_the_tasks_are_those_of_their_tables():
+    pages = script_in_docs("tasks_page")
+    page = (ROOT / "docs" / "tasks.md").read_text()
+    numbers = json.loads((ROOT / "docs" / "tasks.json").read_text())
+    assert pages.filled(page, numbers) == page, "make it anew: python docs/tasks_page.py"
+    other = {name: (mean + 1, error) for name, (mean, error) in numbers.items()}
+    assert pages.filled(page, other) != page
+
+
+@pytest.mark.check
+def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatch):
+    """Those that take no minute; from other trajectories, within their errors."""
+    (tmp_path / "runs").mkdir()
+    for script in (ROOT / "runs").glob("*.sh"):
+        shutil.copy(script, tmp_path / "runs")
+    for name in ("input", "post"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    environment = {**os.environ, "PYTHON": sys.executable, "RICOCHET": str(program)}
+    for study in ("mixture", "cooling"):
+        subprocess.run([tmp_path / f"runs/{study}.sh"], env=environment, check=True)
+    pages = script_in_docs("tasks_page")
+    monkeypatch.setattr(pages, "TABLES", tmp_path / "runs" / "figures")
+    known = json.loads((ROOT / "docs" / "tasks.json").read_text())
+    found = pages.mixture() | pages.cooling()
+    for name in known.keys() & found.keys():
+        (mean, error), (before, before_error) = found[name], known[name]
+        assert abs(mean - before) <= 4 * np.hypot(error or 1e-9, before_error or 1e-9), name
+
+
 def test_make_lists_its_targets_in_one_screen_and_suggests_them():
     def make(target):
         return subprocess.run(["make", target], capture_output=True, text=True, cwd=ROOT)
 
     screen = make("help").stdout.splitlines()
     assert len(screen) <= 24 and max(map(len, screen)) <= 80
-    for target in ("demo", "test", "figures", "check", "bench", "lint", "docs", "clean"):
+    names = ("demo", "test", "unit-tests", "figures", "check", "bench", "lint", "docs", "clean")
+    for target in names:
         assert any(line.startswith(f"  make {target} ") for line in screen)
     wrong = make("tset")
     assert wrong.returncode == 2 and "no file tset; did you mean test?" in wrong.stderr
+
+
+def test_workflows_take_fixed_actions_and_may_only_read():
+    for workflow in ROOT.glob(".github/workflows/*.yml"):
+        text = workflow.read_text()
+        actions = re.findall(r"uses: *(.*)", text)
+        fixed = [action for action in actions if re.search(r"@[0-9a-f]{40} # v\d", action)]
+        assert actions == fixed
+        assert "\npermissions:\n  contents: read\n" in text
 
 
 def test_every_script_of_post_is_in_the_list():
@@ -170,10 +270,10 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     code = "\n".join(line[4:] for line in section.splitlines() if line.startswith("    "))
     assert "from ricochet import read_run" in code and "import h5py" in code
     (tmp_path / "runs").mkdir()
-    still = np.zeros((2, 3, 2))
+    x = np.random.default_rng(1).uniform(size=(2, 30, 2))
     names = "all/kinetic_energy", "total_energy", "pressure"
     energies = {name: [0.0, 0.0] for name in names}
-    write_run(tmp_path / "runs" / "gas.h5", still, still, observables=energies)
+    write_run(tmp_path / "runs" / "gas.h5", x, x, observables=energies)
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
     assert (tmp_path / "runs" / "gas.png").exists()
@@ -191,10 +291,14 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
     assert len(set(energies)) == 3 and all(0 < energy < 250 for energy in energies)
 
 
-def test_the_package_has_the_version_of_the_program(program):
+def test_there_is_one_version(program):
+    """That of the program; the newest section of the changes and its date are those to cite."""
     said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     project = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
-    assert said.split()[1].strip(",") == project["version"]
+    page, cited = ((ROOT / name).read_text() for name in ("CHANGELOG.md", "CITATION.cff"))
+    version, date = re.search(r"^## ([\d.]+) \((.*)\)$", page, re.M).groups()
+    assert said.split()[1] == project["version"] == version
+    assert f"\nversion: {version}\ndate-released: {date}\n" in cited
 
 
 def completed(program, *words):
@@ -217,6 +321,7 @@ def test_completion_knows_options_variables_values_and_files(program):
         *completed(program, "--explain", "con")
     }
     assert completed(program, "--explain", "stop.wa") == ["stop.wall_clock"]
+    assert completed(program, "--set", "drive.k") == ["drive.kind=", "drive.keep_momentum="]
     assert completed(program, "input/gas.nml", "--set", "run.s") == ["run.seed=", "run.search="]
     assert completed(program, "--set", "run.queue", "=", "he") == ["heap"]
     assert completed(program, "--set", "run.queue", "=") == ["calendar", "heap"]
@@ -226,6 +331,16 @@ def test_completion_knows_options_variables_values_and_files(program):
     assert named == ["species.projectile.velocities=", "species.projectile.velocity="]
     placement = ["--set", "species.bed.placement", "="]
     assert completed(program, "input/crater.nml", *placement, "d") == ["dense"]
+
+
+def test_completion_knows_ensembles(program, tmp_path):
+    (tmp_path / "ricochet").symlink_to(program)
+    ensemble = tmp_path / "ricochet-ensemble"
+    ensemble.symlink_to(ROOT / "runs" / "ensemble.sh")
+    assert completed(ensemble, "--se") == ["--seeds", "--set"]
+    assert completed(ensemble, "input/gas") == ["input/gas.nml"]
+    assert completed(ensemble, "--scan", "species.mass") == ["species.mass="]
+    assert completed(ensemble, "--scan", "run.queue", "=", "he") == ["heap"]
 
 
 def code_after(text: str, start: int) -> tuple[str, int]:
@@ -249,8 +364,8 @@ def replace_lines(text: str, old: str, new: str) -> str:
 
 
 def carry_out_recipes(page: str, root: Path) -> int:
-    """Makes the changes to src/ that a page describes: a new file, `after` and `change`."""
-    path = r"[Ii]n\s+`(src/[\w/]+\.f90)`"
+    """Makes the changes to the sources that a page describes: a new file, `after` and `change`."""
+    path = r"[Ii]n\s+`((?:src|post)/[\w/]+\.(?:f90|py))`"
     for found in re.finditer(r"`(src/[\w/]+\.f90)`, a new file:", page):
         (root / found[1]).write_text(code_after(page, found.end())[0])
     steps = list(re.finditer(rf"{path}, (after|change)\n", page))
@@ -263,21 +378,45 @@ def carry_out_recipes(page: str, root: Path) -> int:
     return len(steps)
 
 
+def look_at_blocks(run, folder):
+    """The block is on the pages of Python; paths are known that meet it more than once."""
+    more = ["--set", "contact.wall_rule=normal", "--force"]
+    subprocess.run([*run, *more], cwd=folder, check=True)
+    code = """if True:
+        from ricochet import read_run
+        from ricochet.paths import Paths
+        run = read_run("all.h5")
+        assert run.walls.shape == (4, 2, 2) and (run.walls.mean((0, 1)) == (1, 0.5)).all()
+        turns = [turn for turn in Paths(run).along(range(0, run.frames, 50))]
+        assert not any(turn.guessed.any() for turn in turns)
+        assert sum(len(turn.time) for turn in turns) == (run.events[0] <= run.time[300]).sum() > 200
+    """
+    environment = {**os.environ, "PYTHONPATH": str(folder / "post")}
+    subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, check=True)
+    for script, figure in (("player", "all.html"), ("snapshot", "all.png")):
+        command = [sys.executable, folder / f"post/{script}.py", "all.h5", "-o", figure]
+        subprocess.run(command, cwd=folder, env=environment, check=True)
+
+
 def test_the_recipes_of_the_page_on_extending_work(tmp_path):
-    for name in ("src", "Makefile", "tests", ".ci"):
+    for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
     steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)
     assert steps >= 14
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    made = subprocess.run(build, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert made.returncode == 0, made.stdout + made.stderr
+    law = ["tests=tests/unit/test_observables.pf", "unit-tests"]
+    for goal in ([], law):  # laws hold for what is new, too
+        made = subprocess.run(
+            build + goal, cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert made.returncode == 0, made.stdout + made.stderr
     (tmp_path / "all.nml").write_text(
         """&box upper = 2, 1 / &run dynamics = 'ideal' /
         &block name = 'brick' centre = 1, 0.5 sides = 0.5, 0.5 /
         &species count = 50 radius = 0.02 speed = 1 region = 0, 0.7, 0, 1 /
-        &contact wall_rule = 'rough' wall_restitution = 1 / &stop time = 3 /
+        &contact wall_rule = 'sticky' wall_restitution = 1 / &stop time = 3 /
         &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
     )
     run = [tmp_path / "build" / "ricochet", "all.nml", "-o", "all.h5", "--quiet"]
@@ -290,4 +429,32 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
         assert file["parameters/block/sides"][:].tolist() == [[0.5, 0.5]]
     assert np.hypot(*np.moveaxis(np.maximum(outside, 0), -1, 0)).min() > 0.02 - 1e-9
     assert fastest[0] == pytest.approx(1) and (np.diff(fastest) <= 1e-15).all()
-    assert fastest[-1] < 1  # rough walls take the tangential velocity
+    assert fastest[-1] < 1  # sticky walls take the tangential velocity
+    look_at_blocks(run, tmp_path)
+    gas = """&species count = 3000 packing_fraction = 0.3 temperature = 1 /
+        &contact restitution = 1 wall_restitution = 0.5 / &stop wall_hits = 1500 /
+        &side name = 'bottom' elastic_below = 1e9 /
+        &output frames_every_collisions = 10000 observables_every_collisions = 10000 /"""
+    (tmp_path / "gas.nml").write_text(gas)
+    for name, *options in (
+        ("plain",),
+        ("cores", "--set=run.threads=2"),
+        ("parts", "--set=stop.wall_hits=600"),
+        ("parts", "--resume"),
+    ):
+        command = [run[0], "gas.nml", "-o", f"{name}.h5", "--quiet", *options]
+        subprocess.run(command, cwd=tmp_path, check=True)
+    for other in ("cores", "parts"):
+        found = differences(tmp_path / "plain.h5", tmp_path / f"{other}.h5")
+        assert [name for name in found if "parameters" not in name] == []
+    more = [run[0], "gas.nml", "-o", "plain.h5", "--resume"]
+    ended = subprocess.run(more, cwd=tmp_path, capture_output=True, text=True)
+    assert ended.returncode == 3 and "such as --set stop.wall_hits=3000" in ended.stderr
+    with h5py.File(tmp_path / "plain.h5") as file:
+        exchanged = file["observables/exchanged_impulse/value"][:]
+        hits = file["particles/disks/wall_hits/value"][:]
+        sides = [file[f"observables/sides/{name}/energy/value"][-1] for name in ("bottom", "top")]
+        assert sides[0] == pytest.approx(0, abs=1e-9) and sides[1] < -1  # elastic, and not
+        assert file["observables/wall_collisions/value"][-1].sum() == 1500
+        assert exchanged[0] == 0 and exchanged[-1] > 0
+        assert (hits.sum(1) == file["observables/wall_collisions/value"][:].sum(1)).all()

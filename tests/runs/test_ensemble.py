@@ -3,6 +3,8 @@
 With the program itself: neither faults nor the order of the work show in the results.
 """
 
+import contextlib
+import fcntl
 import os
 import random
 import shutil
@@ -77,6 +79,18 @@ def ensemble(lab, *options, seconds=None):
         capture_output=True,
         text=True,
         timeout=PATIENCE,
+    )
+
+
+def test_a_system_without_flock_is_told_the_package(lab, tmp_path):
+    for tool in ("dirname", "nproc"):
+        (tmp_path / tool).symlink_to(shutil.which(tool))
+    few = environment(lab) | {"PATH": str(tmp_path)}
+    words = [shutil.which("bash"), *command(lab, "--seeds", "1")]
+    done = subprocess.run(words, env=few, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (
+        2,
+        "ensemble.sh: needs flock (package util-linux)\n",
     )
 
 
@@ -221,6 +235,74 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
         sorted(lines[-1].split()[0] for lines in starts(lab).values())
         == ["anew"] * 4 + ["resumed"] * 2
     )
+
+
+# Read by a shell at its start: TERM comes just before the command MOMENT, or the MOMENTth one of a
+# shell. One that meets a worker goes to the launcher as well.
+AT_A_COMMAND = """if [[ $0 == */ensemble.sh ]]; then
+set -T
+trap 'if [[ $BASH_COMMAND == "$MOMENT" || $((++commands_so_far)) == "$MOMENT" ]] &&
+  mkdir "$LAB/sent" 2>/dev/null; then
+  kill -TERM "$BASHPID"
+  [[ $BASHPID == $$ ]] || kill -TERM $$
+fi' DEBUG
+fi
+"""
+#: The commands behind `&`, and one just before it.
+NARROW_MOMENTS = ["child=$!", "workers+=($!)", 'arguments+=(--set "${rest%% --set *}")']
+RANDOM_MOMENTS = [str(random.Random(1).randrange(10, 500)) for _ in range(200)]
+
+
+@pytest.mark.parametrize(
+    "moment",
+    [
+        *NARROW_MOMENTS,
+        *RANDOM_MOMENTS[:10],
+        *(pytest.param(moment, marks=pytest.mark.check) for moment in RANDOM_MOMENTS[10:]),
+    ],
+)
+def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
+    """To the launcher; also to a worker just when it starts a member."""
+    assert moment.isdigit() or moment in SCRIPT.read_text()
+    (lab / "hold").touch()
+    (lab / "at_a_command").write_text(AT_A_COMMAND)
+    variables = {"BASH_ENV": str(lab / "at_a_command"), "MOMENT": moment, "LAB": str(lab)}
+    run = subprocess.run(
+        command(lab, "--seeds", "1-3", "-j", "2"),
+        env=environment(lab) | variables,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (lab / "sent").exists() and run.returncode == 75, run.stderr
+    assert not living(lab)
+    (lab / "hold").unlink()
+    assert ensemble(lab, "--seeds", "1-3").returncode == 0
+
+
+def living(lab) -> list[str]:
+    """Commands of processes that name the folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            line = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
+            found += [line] * (str(lab) in line)
+    return found
+
+
+def test_nothing_is_written_while_another_command_remembers_its_members(lab):
+    """However long it takes."""
+    (lab / "out").mkdir()
+    door = os.open(lab / "out", os.O_RDONLY)
+    fcntl.flock(door, fcntl.LOCK_EX)
+    process = subprocess.Popen(
+        command(lab, "--seeds", "1"), env=environment(lab), stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(3)
+    written = list((lab / "out").iterdir())
+    os.close(door)
+    said = process.communicate(timeout=PATIENCE)[1]
+    assert written == [] and process.returncode == 0, said
 
 
 def test_two_copies_share_the_members(lab):

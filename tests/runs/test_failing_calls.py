@@ -1,4 +1,4 @@
-"""Each system call of a run fails, once or from then on: one line, and nothing is lost."""
+"""Each system call of a run fails, or is met by a signal: one line, and nothing is lost."""
 
 import os
 import re
@@ -17,6 +17,7 @@ from whole_runs import (
     USAGE,
     committed,
     differences,
+    filled_pipe,
     is_beginning,
     one_line,
     write_input,
@@ -92,7 +93,9 @@ def started(*command, folder):
 
 def traced(program, folder, option, *what):
     """The run under strace, which writes to the file `trace`."""
-    strace = ["strace", "-f", "--seccomp-bpf", "-y", "-o", "trace", *what]
+    strace = ["strace", "-f", "-y", "-o", "trace", *what]
+    if not any(":signal=" in word for word in what):  # with it strace 6.1 sends none
+        strace.insert(1, "--seccomp-bpf")
     return started(*strace, program, *COMMAND, option, folder=folder)
 
 
@@ -104,12 +107,12 @@ def positions(stage, option, call, first="gas.nml") -> range:
     return range(sum(k < begin for k in calls) + 1, len(calls) + 1)
 
 
-def outcome(program, stage, option, call, inject) -> str:
-    """What is wrong after a run in which calls failed; empty if nothing is."""
-    folder = stage / f"{option} {inject}"
+def outcome(check, program, stage, option, call, inject) -> str:
+    """What is wrong after a run in which something happened to a call; empty if nothing is."""
+    folder = stage / f"{option} {call} {inject}"
     copy_folder(stage / option, folder)
     try:
-        check_outcome(program, stage, folder, option, call, inject)
+        check(program, stage, folder, option, call, inject)
     except (AssertionError, OSError, KeyError) as problem:
         return f"{option} {inject}: {problem}"
     finally:
@@ -132,7 +135,7 @@ def timeless(path) -> bytes:
     return content
 
 
-def check_outcome(program, stage, folder, option, call, inject):
+def check_after_failure(program, stage, folder, option, call, inject):
     earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     assert run.returncode in (FINISHED, USAGE, FILES), (run.returncode, run.stderr)
@@ -160,14 +163,77 @@ def check_outcome(program, stage, folder, option, call, inject):
 @pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
 def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step):
     cases = [
-        (program, stage, option, call, f"inject={call}:error={way[0]}:when={position}{way[1]}")
+        (option, f"inject={call}:error={way[0]}:when={position}{way[1]}")
         for option in OPTIONS
         for position in positions(stage, option, call)[::step]
         for way in (way.partition("+")[:2] for way in WAYS[call])
     ]
+    assert problems(check_after_failure, program, stage, call, cases) == []
+
+
+def problems(check, program, stage, call, cases) -> list[str]:
+    """What is wrong in any of the cases, each an option and an injection."""
+
+    def problem(case):
+        option, inject = case
+        return outcome(check, program, stage, option, call, inject)
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = [problem for problem in pool.map(lambda case: outcome(*case), cases) if problem]
-    assert not found, "\n".join(found)
+        return [found for found in pool.map(problem, cases) if found]
+
+
+def check_after_signal(program, stage, folder, option, call, inject):
+    """Stopped with a checkpoint, finished, or not begun; never something between."""
+    before = contents_of(folder)
+    run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
+    trace = (folder / "trace").read_text()
+    if "--- SIGTERM" not in trace:  # what the system tells of itself takes more calls at times
+        made = len(re.findall(rf"^\d+ +{call}\(", trace, re.MULTILINE))
+        assert made < int(inject.rpartition("=")[2]), "no signal was sent"
+        assert run.returncode == FINISHED
+    left = contents_of(folder)
+    if run.returncode == FINISHED:
+        assert set(left) == {"gas.nml", "gas.h5"}
+        assert same_results(stage, folder / "gas.h5")
+        return
+    assert run.returncode == STOPPED, (run.returncode, run.stderr)
+    assert left.get("gas.h5") == before.get("gas.h5"), "the earlier result is another"
+    if "nothing is lost" in one_line(run):
+        assert left == before
+    else:
+        again = started(program, *COMMAND, "--resume", folder=folder)
+        assert again.returncode == FINISHED, again.stderr
+        assert same_results(stage, folder / "gas.h5")
+
+
+def contents_of(folder) -> dict[str, bytes]:
+    """Files by name."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
+
+
+@pytest.mark.parametrize("call", WAYS)
+@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
+def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stage, call, step):
+    """Also in the last moments, when the file gets its name and the summary is printed."""
+    cases = []
+    for option in OPTIONS:
+        numbers = positions(stage, option, call)
+        chosen = sorted({*numbers[::step], *numbers[-2:]})
+        cases += [(option, f"inject={call}:signal=SIGTERM:when={number}") for number in chosen]
+    assert problems(check_after_signal, program, stage, call, cases) == []
+
+
+def test_a_signal_just_before_the_summary_is_not_lost(program, stage):
+    """A summary that nobody reads does not keep the run: here TERM comes with the last unlock."""
+    folder = stage / "unread"
+    copy_folder(stage / "--force", folder)
+    inject = f"inject=unlink:signal=SIGTERM:when={positions(stage, '--force', 'unlink')[-1]}"
+    strace = ["strace", "-f", "-o", "trace", "-e", "trace=unlink", "-e", inject]
+    with filled_pipe() as inlet:
+        command = [*strace, program, *COMMAND, "--force"]
+        run = subprocess.run(command, cwd=folder, stdout=inlet, timeout=PATIENCE, check=False)
+    assert run.returncode == FINISHED
+    assert same_results(stage, folder / "gas.h5")
 
 
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])

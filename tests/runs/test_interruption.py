@@ -25,6 +25,7 @@ from whole_runs import (
     committed,
     differences,
     ended_soon,
+    filled_pipe,
     frames_in,
     has_ended,
     heeds,
@@ -324,6 +325,42 @@ def test_a_signal_does_not_wait_until_all_pairs_are_compared(
     assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
 
 
+def test_a_slow_disk_does_not_slow_the_run_down(program, tmp_path):
+    """A run that waits for its checkpoints takes as many steps between them as another.
+
+    The disk takes twice as long as the run means to compute between two looks at the clock; the
+    run is over after a few dozen checkpoints, not after one at each collision.
+    """
+    library = tmp_path / "slow.so"
+    code = """#include <unistd.h>
+    int fsync(int d) { static int n; (void)d; usleep(60000); if (++n > 300) _exit(9); return 0; }"""
+    compiler = ["gcc", "-x", "c", "-shared", "-fPIC", "-o", library, "-"]
+    subprocess.run(compiler, input=code, text=True, check=True)
+    text = "&species count = 10 radius = .01 speed = 1 / &stop events = 20000 /"
+    write_input(tmp_path, text + "&output checkpoint_every = 1e-9 /")
+    environment = {**os.environ, "LD_PRELOAD": str(library)}
+    command = [program, "gas.nml", "-o", "gas.h5", "--quiet"]
+    assert subprocess.run(command, cwd=tmp_path, env=environment).returncode == FINISHED
+
+
+def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
+    """Sixty pairs collide one after the other, each with a sample, and rest; one disk flies on."""
+    pairs = "".join(f"0.1, {y}, {0.2 + y / 100}, {y}, " for y in range(1, 61))
+    speeds = "1, 0, -1, 0, " * 60
+    text = f"""&box upper = 1, 62 /
+    &species name = 'pairs' count = 120 radius = 0.01 position = {pairs} velocity = {speeds} /
+    &species name = 'other' count = 1 radius = 0.01 position = 0.5, 61 velocity = 1, 0 /
+    &contact restitution = 0 wall_restitution = 1 /
+    &stop events = 1000000000000 /
+    &output observables_every_collisions = 1 /"""
+    write_input(tmp_path, text)
+    process = started("gas.nml", "-o", "gas.h5", "--quiet")
+    let_work(process, 0.5)
+    process.send_signal(signal.SIGUSR1)
+    wait_for((tmp_path / "gas.chk.h5").exists)
+    assert frames_in(tmp_path / "gas.h5.part", "observables") == 61
+
+
 @pytest.mark.check
 @pytest.mark.parametrize("dynamics", ["'events'", "'steps' dt = 1e-5"])
 def test_a_million_disks_stop_in_time(started, tmp_path, dynamics):
@@ -342,24 +379,18 @@ def test_a_million_disks_stop_in_time(started, tmp_path, dynamics):
 
 def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
     """Whoever reads its standard output may have stopped reading."""
-    outlet, inlet = os.pipe()
-    os.set_blocking(inlet, False)
-    with contextlib.suppress(BlockingIOError):  # it is full
-        while True:
-            os.write(inlet, b"x" * 4096)
-    os.set_blocking(inlet, True)
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
     command = [program, "gas.nml", "-o", "gas.h5"]
-    process = subprocess.Popen(
-        command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        wait_for(lambda: (tmp_path / "gas.h5").exists() and is_asleep(process.pid))
-        assert "finished" in stopped_in_time(process)
-    finally:
-        process.kill()
-    os.close(inlet)
-    os.close(outlet)
+    with filled_pipe() as inlet:
+        process = subprocess.Popen(
+            command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            wait_for(lambda: (tmp_path / "gas.h5").exists() and is_asleep(process.pid))
+            assert "the run is finished" in ended_soon(process, signal.SIGTERM)
+            assert process.returncode == FINISHED
+        finally:
+            process.kill()
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):

@@ -63,6 +63,8 @@ CHOICES = {
         " precision = 'single' / &stop events = 4000 /",
         "mixed": "&output frames_every_collisions = 50 frames_every_time = 0.3"
         " observables_every_time = 0.1 / &stop collisions_per_disk = 80 /",
+        "per disk": "&output frames_every_collisions_per_disk = 3.3"
+        " observables_every_collisions_per_disk = 0.7 / &stop collisions_per_disk = 80 /",
         "ends": "&stop time = 20 /",
     },
 }

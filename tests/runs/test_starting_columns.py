@@ -147,6 +147,73 @@ def test_a_run_from_the_last_frame_of_another_has_its_disks(ricochet, tmp_path, 
     assert (equal.radius[108:] == one.radius[108:]).all()
 
 
+SPINNING = INPUT + "&contact tangential_restitution = 0.3 friction = 0.2 restitution = 0.9 /"
+
+
+@pytest.fixture
+def spins(tmp_path, bed):
+    """The bed with a spin and a direction of each disk."""
+    rng = np.random.default_rng(8)
+    bed |= {"angular_velocity": rng.normal(size=COUNT), "orientation": rng.uniform(-9, 9, COUNT)}
+    write_start(tmp_path / "bed.txt", **bed)
+    return bed
+
+
+def turning(path):
+    """Angular velocities and orientations of all frames."""
+    with h5py.File(path) as file:
+        disks = file["particles/disks"]
+        return {name: disks[f"{name}/value"][:] for name in ("angular_velocity", "orientation")}
+
+
+@pytest.mark.parametrize("text", [INPUT, SPINNING])
+def test_spins_and_directions_arrive_to_the_last_digit(ricochet, tmp_path, spins, text):
+    """They let disks turn, smooth ones too; whether the input has the sizes does not matter."""
+    write_input(tmp_path, text)
+    finished(ricochet, "gas.h5")
+    found, there = turning(tmp_path / "gas.h5"), by_species(spins)
+    for name in ("angular_velocity", "orientation"):
+        assert (found[name][0] == there[name]).all()
+    kept = (found["angular_velocity"] == there["angular_velocity"]).all()
+    assert kept == (text == INPUT)
+
+
+def test_a_file_says_nothing_of_spins_where_the_input_says_how_disks_start(
+    ricochet, tmp_path, spins
+):
+    """Then directions are those of the file all the same, as places are."""
+    rest = [f"--set=species.{name}.velocities=rest" for name in ("bed", "stone")]
+    finished(ricochet, "gas.h5", "--set=stop.time=1", *rest)
+    with h5py.File(tmp_path / "gas.h5") as file:
+        assert "angular_velocity" not in file["particles/disks"]
+        angle = file["particles/disks/orientation/value"]
+        assert (angle[:] == by_species(spins)["orientation"]).all()
+
+
+def test_a_run_from_the_last_frame_of_a_rough_one_turns_as_it_did(ricochet, tmp_path, spins):
+    write_input(tmp_path, SPINNING)
+    finished(ricochet, "gas.h5")
+    write_input(tmp_path, SPINNING.replace("bed.txt", "gas.h5"))
+    finished(ricochet, "next.h5")
+    one, other = turning(tmp_path / "gas.h5"), turning(tmp_path / "next.h5")
+    assert all((one[name][-1] == other[name][0]).all() for name in one)
+    finished(ricochet, "new.h5", "--set", "species.bed.angular_velocity=0")
+    new = turning(tmp_path / "new.h5")["angular_velocity"][0]
+    assert (new[:108] == 0).all()  # what the input says counts
+    assert (new[108:] == one["angular_velocity"][-1, 108:]).all()
+
+
+def test_a_run_with_the_spins_of_a_file_goes_on(ricochet, tmp_path, spins):
+    write_start(tmp_path / "bed.txt", **(spins | {"radius": None, "mass": None}))
+    sizes = [f"--set=species.{name}.radius=0.01" for name in ("bed", "stone")]
+    finished(ricochet, "whole.h5", *sizes)
+    part = ricochet("gas.nml", "-o", "part.h5", "--quiet", "--set=stop.wall_clock=1e-9", *sizes)
+    assert part.returncode == STOPPED
+    finished(ricochet, "part.h5", "--resume", *sizes)
+    assert not [name for name in differences(tmp_path / "whole.h5", tmp_path / "part.h5")
+                if "wall_clock" not in name and "overrides" not in name]  # fmt: skip
+
+
 def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):
     bed["radius"] *= 1.25
     write_start(tmp_path / "bed.txt", **bed)
@@ -190,6 +257,8 @@ def test_maxwell_velocities_belong_to_the_mass_of_each_disk(ricochet, tmp_path):
         ("x y radios\n.1 .1 .1", 'no column is called "radios"; did you mean "radius"?'),
         ("x y radius radius\n", "bed.txt:1: the column radius is named twice"),
         ("X y x\n", "bed.txt:1: the column x is named twice"),
+        ("x y radius omega\n.1 .1 .1 inf", 'bed.txt:2: "inf" is not a number'),
+        ("x y radius angle\n.1 .1 .1 1e200", 'bed.txt:2: "1e200" is out of range'),
         ("x y z\n.1 .1 .1", 'bed.txt:1: no column is called "z"; known: x, y, vx'),
         (
             "ID x y z vx vy vz radius mass species\n",
@@ -234,11 +303,22 @@ def test_what_is_wrong_in_a_starting_file_is_told_with_its_line(
             "bed.txt: has a column mass, but species.gas.mass is given, too",
         ),
         ("velocities = 'rest' count = 3", "bed.txt: 1 disk, but species.count is 3"),
+        (
+            "angular_velocity = 1",
+            "bed.txt: has a column omega, but species.gas.angular_velocity is given, too",
+        ),
+        (
+            "rotational_temperature = 1",
+            "omega, but species.gas.rotational_temperature is given, too",
+        ),
         ("velocities = 'file'", "bed.txt:2: there are no velocities; velocities = 'file' needs"),
     ],
 )
 def test_input_and_file_do_not_contradict_each_other(ricochet, tmp_path, species, says):
-    (tmp_path / "bed.txt").write_text("x y radius mass\n.5 .5 .1 3\n")
+    spin = " omega vx vy", " 1 0 0"
+    if "velocities" in species:
+        spin = "", ""
+    (tmp_path / "bed.txt").write_text("x y radius mass{}\n.5 .5 .1 3{}\n".format(*spin))
     text = f"&species name = 'gas' file = 'bed.txt' {species} / &stop time = 1 /"
     write_input(tmp_path, text)
     run = ricochet("gas.nml")
@@ -334,3 +414,38 @@ def test_arrays_that_are_no_disks_are_refused(tmp_path, arrays, says):
     with pytest.raises(ValueError, match="^" + says.replace("(", r"\(").replace(")", r"\)")):
         write_start(tmp_path / "bed.txt", **arrays)
     assert not (tmp_path / "bed.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("velocities", "given"),
+    [
+        ("'maxwell' temperature = 1", {"orientation": 0.5}),
+        ("'file'", {"velocity": (1.0, 0.5), "angular_velocity": 3.0}),
+    ],
+)
+def test_a_run_goes_on_only_with_what_its_file_gave_the_disks(
+    ricochet, tmp_path, velocities, given
+):
+    """Whether disks turn, or have a direction, may be known from the file alone."""
+    write_input(
+        tmp_path,
+        f"""&species file = 'start.txt' count = 3 radius = 0.05 mass = 1 velocities = {velocities} /
+        &box boundary = 'periodic', 'wall' /
+        &stop events = 30 /""",
+    )
+    place = [(0.2, 0.2), (0.5, 0.5), (0.8, 0.7)]
+    given = {name: np.broadcast_to(value, (3, *np.shape(value))) for name, value in given.items()}
+    path = write_start(tmp_path / "start.txt", place, **given)
+    finished(ricochet, "whole.h5")
+    stop = ["--set", "stop.wall_clock=1e-9"]
+    assert ricochet("gas.nml", "-o", "parts.h5", *stop).returncode == STOPPED
+    path.rename(tmp_path / "kept.txt")
+    for there in ((), [{"velocity": np.ones((3, 2))}]):
+        for other in there:
+            write_start(path, place, **other)
+        for name, longer in {"parts.h5": [], "whole.h5": ["--set", "stop.events=60"]}.items():
+            run = ricochet("gas.nml", "-o", name, "--resume", *longer)
+            assert run.returncode == FILES and "species.file" in one_line(run), run.stderr
+    (tmp_path / "kept.txt").replace(path)
+    finished(ricochet, "parts.h5", "--resume")
+    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []

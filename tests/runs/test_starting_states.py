@@ -212,10 +212,9 @@ def test_a_disk_that_would_only_bounce_is_warned_of(ricochet, tmp_path, height, 
     assert ("warning: disk 1 starts" in run.stderr) == warned
 
 
-def test_a_gas_that_has_cooled_down_says_so_in_its_file(ricochet, tmp_path):
-    text = GAS.replace(
-        "&stop collisions_per_disk = 5", "&contact restitution = 0.5 / &stop time = 1e90"
-    )
+@pytest.mark.parametrize("loss", ["restitution = 0.5", "tangential_restitution = 0"])
+def test_a_gas_that_has_cooled_down_says_so_in_its_file(ricochet, tmp_path, loss):
+    text = GAS.replace("&stop collisions_per_disk = 5", f"&contact {loss} / &stop time = 1e90")
     write_input(
         tmp_path, text.replace("count = 150", "count = 2").replace("count = 50", "count = 2")
     )

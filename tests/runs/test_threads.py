@@ -6,7 +6,9 @@ import re
 import resource
 import shutil
 import subprocess
+import sys
 import tempfile
+import time
 from pathlib import Path
 
 import h5py
@@ -73,7 +75,8 @@ SYSTEMS = {
     "aligned": [
         WALLS,
         GAS.format(0.2, "lattice").replace("temperature = 1", "velocities = 'uniform'"),
-        "&stop collisions_per_disk = 4 / &output frames_every_events = 3001" + LOG,
+        "&stop collisions_per_disk = 4 / &output frames_every_events = 3001"
+        " observables_every_collisions_per_disk = 0.037" + LOG,
     ],
 }
 
@@ -298,3 +301,40 @@ def test_the_threads_are_those_of_the_last_part(program, gas):
         assert done.returncode == FINISHED, done.stderr
         with h5py.File(gas / "many.h5") as file:
             assert file["provenance"].attrs["threads"] == expected
+
+
+def test_random_systems_find_a_program_whose_result_depends_on_the_queue(program, tmp_path):
+    """`make check` runs many of them; here a stand-in stops early with one of the queues."""
+    liar = tmp_path / "liar"
+    liar.write_text(
+        f"""#!/bin/sh
+case "$*" in *queue=heap*) exec {program} "$@" --set stop.events=3 ;; esac
+exec {program} "$@"
+"""
+    )
+    liar.chmod(0o755)
+    script = Path(__file__).parent / "fuzz_systems.py"
+    command = [sys.executable, script, "--count", "4", "--seed", "3", "--program"]
+    run = subprocess.run([*command, liar], capture_output=True, text=True, check=False)
+    assert run.returncode == 1 and "--count 4 --seed 3: " in run.stdout
+    assert "differs" in run.stderr and "&species" in run.stderr
+    run = subprocess.run([*command, program], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_who_asks_is_told_where_the_wall_clock_went(program, gas, threads, monkeypatch):
+    """Every moment belongs to one part, from the first to the last."""
+    option = f"--set=run.threads={threads}"
+    assert run(program, gas, "plain.h5", option).stderr == ""
+    monkeypatch.setenv("RICOCHET_TIMES", "1")
+    began = time.monotonic()
+    told = run(program, gas, "times.h5", option)
+    elapsed = time.monotonic() - began
+    parts = dict(re.findall(r"^(.*?) +([\d.]+) s +[\d.]+ %$", told.stderr, re.M))
+    waiting = parts.pop("waiting, of the events in domains", None)
+    assert (waiting is None) == ("* events in domains" not in parts) == (threads == 1)
+    whole = sum(map(float, parts.values()))
+    own = float(re.search(r"wall_time = (.*)", told.stdout)[1])
+    assert own - 0.01 < whole < elapsed + 0.01  # of rounded numbers
+    assert differences(gas / "times.h5", gas / "plain.h5") == []

@@ -3,8 +3,11 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import sysconfig
+import venv
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,8 @@ import pytest
 from whole_runs import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
+#: What pages lead to and no install brings: see there in a clone.
+SOURCES = {"src", "runs", "tests", "CONTRIBUTING.md"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
   use funit
@@ -24,8 +29,8 @@ end module test_it
 """
 
 
-def started(*arguments) -> subprocess.Popen:
-    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+def started(*arguments, **more) -> subprocess.Popen:
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name} | more
     return subprocess.Popen(
         ["make", *map(str, arguments)],
         cwd=ROOT,
@@ -36,8 +41,8 @@ def started(*arguments) -> subprocess.Popen:
     )
 
 
-def make(*arguments) -> subprocess.CompletedProcess:
-    process = started(*arguments)
+def make(*arguments, **more) -> subprocess.CompletedProcess:
+    process = started(*arguments, **more)
     out, err = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
@@ -66,6 +71,32 @@ def test_what_did_not_change_is_not_built_again(small, tmp_path):
     (tmp_path / "suites" / "test_it.pf").write_text(SUITE.format(2))
     again = make(*small)
     assert again.returncode == 2 and "Failures: 1" in again.stdout
+
+
+def test_a_build_that_is_killed_while_it_links_is_finished_by_the_next(small, tmp_path):
+    """An empty program, newer than its objects, must not pass for a finished one."""
+    killer = tmp_path / "compiler"
+    killer.write_text("""#!/bin/sh
+case "$*" in
+*" -o "*/unit_tests*)
+  printf '' > "$(echo "$*" | sed 's/.* -o \\([^ ]*\\) .*/\\1/')"
+  pid=$PPID builders=
+  while grep -qE '^(sh|make|flock)$' /proc/$pid/comm; do
+    builders="$pid $builders"
+    pid=$(cut -d ' ' -f 4 /proc/$pid/stat)
+  done
+  kill -KILL $builders ;; # the first of them first, so that it sees no other end
+*) exec gfortran "$@" ;;
+esac
+""")
+    killer.chmod(0o755)
+    compiler = tmp_path / "link"
+    compiler.symlink_to(killer)
+    assert make(*small, f"FC={compiler}").returncode == -signal.SIGKILL
+    compiler.unlink()
+    compiler.symlink_to(shutil.which("gfortran"))
+    again = make(*small, f"FC={compiler}")
+    assert again.returncode == 0 and " OK" in again.stdout, again.stdout + again.stderr
 
 
 @pytest.mark.skipif(not PFUNIT_DIR, reason="PFUNIT_DIR names no pFUnit")
@@ -124,6 +155,22 @@ def files_in(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if not path.is_dir()]
 
 
+def test_a_film_takes_one_command(program, tmp_path):
+    (tmp_path / "my gas.nml").write_text(
+        "&species count = 20 radius = 0.01 temperature = 1 /\n&stop time = 9e9 /\n"
+    )
+    (tmp_path / "browse").write_text('#!/bin/sh\necho "$1" > "$0.txt"\n')
+    (tmp_path / "browse").chmod(0o755)
+    film = tmp_path / "films"
+    choices = [f"INPUT={tmp_path}/my gas.nml", f"FILM={film}", "SET=stop.time=1 output.event_log=T"]
+    environment = {"BROWSER": str(tmp_path / "browse")}
+    done = make("film", f"BUILD={program.parent}", *choices, **environment)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "browse.txt").read_text().strip() == (film / "my gas.html").as_uri()
+    done = make("film")
+    assert done.returncode != 0 and "make film INPUT=input/crater.nml" in done.stderr
+
+
 def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
     place = [f"DESTDIR={tmp_path / 'root'}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
@@ -136,6 +183,11 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
     script = installed / "share/ricochet/post/energy.py"
     done = ran(sys.executable, script, "here/seed_1.h5", "-o", "energy.png", cwd=tmp_path)
     assert done.returncode == 0 and (tmp_path / "energy.png").exists(), done.stderr
+    path = f"{Path(sys.executable).parent}:{environment['PATH']}"
+    done = ran(
+        installed / "bin/ricochet-lab", "--help", cwd=tmp_path, env=environment | {"PATH": path}
+    )
+    assert done.returncode == 0 and "--no-open" in done.stdout, done.stderr
     assert make("uninstall", *place).returncode == 0
     assert files_in(tmp_path / "root") == []
 
@@ -214,6 +266,59 @@ def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_p
     assert files_in(build) == [Path(copy)]
 
 
+def test_what_the_manual_pages_speak_of_is_installed(tmp_path):
+    """All places in them are absolute, and every command says that it is the one it is called."""
+    place, root = [f"DESTDIR={tmp_path}", "PREFIX=/usr"], tmp_path / "usr"
+    assert make("install", *place).returncode == 0
+    pages = sorted(path.name for path in (root / "share/man/man1").iterdir())
+    assert pages == ["ricochet-ensemble.1", "ricochet.1"]
+    version = ran(root / "bin/ricochet", "--version").stdout.split()[1]
+    for name in pages:
+        page = root / "share/man/man1" / name
+        text = page.read_text().replace("\\-", "-")
+        assert f'"Ricochet {version}"' in text and f".SH NAME\n{page.stem} - " in text
+        named = set(re.findall(r"(?<![\w/])/usr/[\w./-]*\w", text))
+        assert len(named) >= 3
+        assert [name for name in named if not (tmp_path / name[1:]).exists()] == []
+        assert not re.search(r"(?<![\w/])(input|post|docs|share)/", text)
+        commands = re.findall(r"\bricochet-\w[\w-]*", text)
+        assert [name for name in commands if not (root / "bin" / name).exists()] == []
+        if shutil.which("man"):
+            assert ran("man", "--warnings", "-l", page).stderr == ""
+    assert (root / "share/doc/ricochet/LICENSE").exists()
+    links = [
+        (page, link)
+        for page in (root / "share/doc/ricochet").rglob("*.md")
+        for link in re.findall(r"\]\((?!\w+:|#)([^)\s#]+)", page.read_text())
+    ]
+    lost = {link for page, link in links if not (page.parent / link).exists()}
+    assert {link.removeprefix("../").split("/")[0] for link in lost} <= SOURCES
+    assert make("uninstall", *place).returncode == 0
+    assert files_in(tmp_path) == [] and not (root / "share/doc/ricochet").exists()
+
+
+def test_pip_brings_package_commands_and_inputs(program, tmp_path):
+    """Into an environment that sees the packages of this one, without a network."""
+    environment = tmp_path / "venv"
+    venv.create(environment, symlinks=True)
+    python = environment / "bin/python"
+    (packages,) = environment.glob("lib/python*/site-packages")
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
+    alone = ["--no-deps", "--no-index", "--no-build-isolation", "--quiet"]
+    pip = [sys.executable, "-m", "pip", "--python", python, "install", *alone]
+    ran(*pip, ROOT / "post", check=True)
+    commands = {path.name for path in (environment / "bin").glob("ricochet-*")}
+    scripts = {path.stem for path in ROOT.glob("post/*.py")} - {"hatch_build"}
+    assert commands == {f"ricochet-{name.replace('_', '-')}" for name in scripts}
+    code = "import ricochet; print(ricochet.__file__)"
+    assert ran(python, "-c", code, cwd=tmp_path).stdout.startswith(str(packages))
+    inputs = packages / "ricochet/input"
+    done = ran(program, inputs / "lab.nml", "-o", "lab.h5", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    done = ran(environment / "bin/ricochet-player", "lab.h5", "-o", "lab.html", cwd=tmp_path)
+    assert done.returncode == 0 and (tmp_path / "lab.html").exists(), done.stderr
+
+
 def test_the_manual_page_explains_every_variable(tmp_path):
     assert make("install", f"PREFIX={tmp_path}").returncode == 0
     page = (tmp_path / "share/man/man1/ricochet.1").read_text().replace("\\-", "-")
@@ -227,14 +332,24 @@ def test_the_manual_page_explains_every_variable(tmp_path):
         ):
             missing.append(f"{group}.{found[1]}")
     assert missing == [] and ".B run.seed\n" in page
-    if shutil.which("man"):
-        assert ran("man", "--warnings", "-l", tmp_path / "share/man/man1/ricochet.1").stderr == ""
 
 
 def test_a_folder_that_cannot_be_installed_to_is_refused_in_one_line():
     done = make("install", "PREFIX=here")
     assert done.returncode == 2 and "write folders that begin with /" in done.stderr
     assert len(done.stderr.splitlines()) == 2  # the second is that of make
+
+
+@pytest.mark.parametrize("script", [".ci/set-up", "src/install.sh", "runs/ensemble.sh"])
+def test_scripts_that_need_a_later_bash_say_so(tmp_path, script):
+    """As if this bash were an old one: they do nothing before they have looked."""
+    text = (ROOT / script).read_text()
+    limit = re.search(r"BASH_VERSINFO.*>= (404)\b", text).span(1)
+    copy = tmp_path / "script"
+    copy.write_text(f"{text[: limit[0]]}99999{text[limit[1] :]}")
+    done = ran("bash", copy, cwd=tmp_path)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert "bash 4.4 or newer is needed" in done.stderr
 
 
 @pytest.mark.check

@@ -2,7 +2,8 @@
 module test_systems
   use kinds, only: dp => real64, int32, int64, never
   use all_pairs, only: all_pairs_t
-  use box_geometry, only: box_t, obstacle_gap, obstacle_t
+  use box_geometry, only: box_t, obstacle_gap, surface_t
+  use box_sides, only: bounds
   use cell_grid, only: cell_grid_t
   use circles, only: new_circle
   use disks, only: disk_t, tag_t
@@ -12,10 +13,12 @@ module test_systems
   use random_stream, only: random_stream_t
   use segments, only: new_segment
   use shapes, only: shape_t
+  use side_motion, only: side_motion_t
   use simulation_state, only: simulation_t
+  use tally, only: dissipated
   implicit none
   private
-  public :: add_obstacle, few_disks, system, systems, prepare, evolve, difference
+  public :: add_obstacle, few_disks, system, systems, every_system, prepare, evolve, difference
   public :: total_energy, momentum, angular_momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, disk_named, time_to_contact
 
@@ -28,6 +31,11 @@ module test_systems
     "periodic inelastic contact", "periodic pegs dilute", "periodic giant mixture", &
     "walls giants dilute", "walls giants gravity", "periodic giants dilute inelastic contact", &
     "walls slants mixture", "channel gravity slants inelastic contact", "periodic slants pegs dilute"]
+  !> Those whose sides move, and with them all.
+  character(len=*), parameter :: shaken_systems(*) = [character(len=40) :: "walls shaken", &
+    "walls shaken gravity mixture", "channel shaken gravity inelastic contact", "walls shaken bed dilute", &
+    "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity"]
+  character(len=*), parameter :: every_system(*) = [systems, shaken_systems]
 
 contains
 
@@ -40,8 +48,8 @@ contains
     type(simulation_t) :: sim
     integer(int32) :: i, n
     n = size(radius, kind=int32)
-    allocate (sim%disk(n), sim%tag(n), sim%species(n), sim%law%restitution(n, n))
-    allocate (sim%image(2, n), source=0_int64)
+    allocate (sim%species(n), sim%law%restitution(n, n))
+    call make_room(sim, n)
     sim%law%restitution = 1
     do i = 1, n
       sim%disk(i)%x = x(2*i - 1:2*i)
@@ -55,10 +63,21 @@ contains
     end do
   end function few_disks
 
+  !> Makes room for n disks, with columns for what a test may switch on later.
+  pure subroutine make_room(sim, n)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: n
+    type(simulation_t) :: rich
+    rich%box%periodic = .true.
+    rich%law%contact_time = 1
+    call rich%make_room(0)
+    call sim%make_room(n, like=rich)
+  end subroutine make_room
+
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
   !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the first
-  !> disk hits; `inelastic`; `smooth` walls; `contact` time; `few`, `dilute` or `dense`.
+  !> disk hits; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
   function system(words, seed, scale) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
@@ -88,10 +107,16 @@ contains
     if (has("inelastic")) then
       sim%law%restitution = reshape([0.9_dp, 0.8_dp, 0.7_dp, 0.8_dp, 0.95_dp, 0.6_dp, 0.7_dp, 0.6_dp, &
         0.5_dp], [3, 3])
-      sim%law%wall_restitution = 0.85_dp
+      sim%box%side%law%restitution = 0.85_dp
     end if
-    sim%law%wall_rule = merge(2, 1, has("smooth"))
+    sim%box%side%law%rule = merge(2, 1, has("smooth"))
     if (has("contact")) sim%law%contact_time = 0.01_dp
+    if (has("shaken")) then                       ! far, fast, and on the spot; all from their places
+      sim%box%side(3)%motion = side_motion_t(kind=3, amplitude=0.5_dp, period=4.0_dp)
+      if (.not. sim%box%periodic(1)) sim%box%side(2)%motion = side_motion_t(kind=2, amplitude=0.03_dp, period=0.25_dp, &
+        phase=0.5_dp)
+      sim%box%side(4)%motion = side_motion_t(kind=4, strike=0.5_dp)
+    end if
     call fill_lattice(sim, spacing, radius, count([has("giant"), has("giants")]), stream)
     if (has("bed")) call lay_to_rest(sim%disk(2:))
     sim%start_energy = sim%kinetic_energy()
@@ -115,8 +140,9 @@ contains
     end if
     if (index(words, "round") > 0) call add_obstacle(sim%box, "round", new_circle([0.5_dp, 1.5_dp], 0.98_dp, .true.))
     if (index(words, "slants") > 0) then
-      call add_obstacle(sim%box, "short", new_segment([-1.2_dp, 1.0_dp], [-0.6_dp, 1.4_dp]))
-      call add_obstacle(sim%box, "long", new_segment([0.2_dp, 1.9_dp], [1.9_dp, 1.1_dp]))
+      ! so far from sides that are shaken that no disk is crushed
+      call add_obstacle(sim%box, "short", new_segment([-1.2_dp, 1.2_dp], [-0.6_dp, 1.6_dp]))
+      call add_obstacle(sim%box, "long", new_segment([0.2_dp, 1.9_dp], [1.6_dp, 1.3_dp]))
     end if
   end subroutine add_obstacles
 
@@ -125,7 +151,7 @@ contains
     type(box_t), intent(inout) :: box
     character(len=*), intent(in) :: name
     class(shape_t), intent(in) :: shape
-    type(obstacle_t), allocatable :: more(:)
+    type(surface_t), allocatable :: more(:)
     integer :: m, n
 
     n = box%n_obstacles()
@@ -134,6 +160,7 @@ contains
       more(m) = box%obstacle(m)
     end do
     more(n + 1)%name = name
+    more(n + 1)%law = box%side(1)%law
     allocate (more(n + 1)%shape, source=shape)
     call move_alloc(more, box%obstacle)
   end subroutine add_obstacle
@@ -148,6 +175,8 @@ contains
     type(random_stream_t), intent(inout) :: stream
     type(disk_t) :: disk
     type(tag_t) :: tag
+    type(disk_t), allocatable :: disks(:)
+    type(tag_t), allocatable :: tags(:)
     real(dp) :: jitter(2), site(2), room
     integer(int32) :: ix, iy, n(2)
     integer :: k
@@ -177,7 +206,12 @@ contains
         sim%tag = [sim%tag, tag]
       end do
     end do
-    allocate (sim%image(2, merge(size(sim%disk), 0, any(sim%box%periodic))), source=0_int64)
+    disks = sim%disk
+    tags = sim%tag
+    deallocate (sim%disk, sim%tag)
+    call make_room(sim, size(disks, kind=int32))
+    sim%disk = disks
+    sim%tag = tags
   end subroutine fill_lattice
 
   pure subroutine lay_to_rest(disk)
@@ -195,7 +229,7 @@ contains
     yes = .true.
     do k = 1, sim%box%n_obstacles()
       associate (shape => sim%box%obstacle(k)%shape)
-        yes = yes .and. .not. shape%covers(shape%from_nearest(site, sim%box%periods()), [0.0_dp, 0.0_dp], radius)
+        yes = yes .and. .not. shape%covers(shape%from_nearest(site, sim%box%images()), [0.0_dp, 0.0_dp], radius)
       end associate
     end do
     do k = 1, size(sim%disk)
@@ -246,25 +280,23 @@ contains
     character(len=:), allocatable :: text
     integer(int32) :: i
     text = ""
-    if (a%events /= b%events) text = "events"
-    if (a%collisions /= b%collisions) text = "collisions"
+    if (a%tally%events /= b%tally%events) text = "events"
+    if (a%tally%collisions /= b%tally%collisions) text = "collisions"
     if (a%epoch_events /= b%epoch_events .or. a%events_then /= b%events_then) text = "an event that counts"
-    if (any(a%wall_collisions /= b%wall_collisions)) text = "wall collisions"
-    if (a%obstacle_collisions /= b%obstacle_collisions) text = "obstacle collisions"
-    if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_advance, &
-      a%virial%value(), a%dissipated%value(), a%wall_impulse%value()], &
-      [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, &
-      b%virial%value(), b%dissipated%value(), b%wall_impulse%value()]))) text = "a time or a sum"
-    if (size(a%image) /= size(b%image)) text = "room for periods"
+    if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_advance, a%tally%sum%value()], &
+      [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, b%tally%sum%value()]))) text = "a time or a sum"
+    associate (s => a%tally%surface, t => b%tally%surface)
+      if (any(s%collisions /= t%collisions)) text = "collisions with walls"
+      if (any(differ([s%impulse(1)%value(), s%impulse(2)%value(), s%energy%value()], &
+        [t%impulse(1)%value(), t%impulse(2)%value(), t%energy%value()]))) text = "a sum of a wall"
+    end associate
+    if (any(a%extra_row /= b%extra_row)) text = "columns of the disks"
     do i = 1, a%n_disks()
       if (text /= "") return
       associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
         if (s%id /= t%id) text = "order of the disks"
         if (s%collisions /= t%collisions) text = "counts of a disk"
-        if (size(a%image) > 0) then
-          if (any(a%image(:, i) /= b%image(:, i))) text = "periods of a disk"
-        end if
-        if (any(differ([p%x, p%v, p%clock, p%radius], [q%x, q%v, q%clock, q%radius]))) &
+        if (any(differ([p%x, p%v, p%clock, p%radius, a%extra(:, i)], [q%x, q%v, q%clock, q%radius, b%extra(:, i)]))) &
           text = "state of a disk"
       end associate
     end do
@@ -282,7 +314,7 @@ contains
     type(simulation_t), intent(in) :: sim
     real(dp) :: energy
     integer(int32) :: i
-    energy = sim%kinetic_energy() + sim%dissipated%value()
+    energy = sim%kinetic_energy() + sim%tally%total(dissipated)
     do i = 1, sim%n_disks()
       energy = energy - mass(sim, i)*dot_product(sim%box%gravity, sim%position(i))
     end do
@@ -323,9 +355,10 @@ contains
   !> concerned; negative if any overlap.
   pure function tightest_gap(sim) result(gap)
     type(simulation_t), intent(in) :: sim
-    real(dp) :: gap, x(2), dx(2)
+    real(dp) :: gap, x(2), dx(2), low(2), high(2)
     integer(int32) :: i, j, m
     gap = never
+    call bounds(sim%box, sim%now, low, high)
     do i = 1, sim%n_disks()
       x = sim%position(i)
       associate (r => sim%disk(i)%radius)
@@ -333,7 +366,7 @@ contains
           dx = separation(sim%box, x, sim%position(j))
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
-        gap = min(gap, minval(merge(never, min(x - sim%box%lower, sim%box%upper - x) - r, sim%box%periodic))/(2*r))
+        gap = min(gap, minval(merge(never, min(x - low, high - x) - r, sim%box%periodic))/(2*r))
         do m = 1, sim%box%n_obstacles()
           gap = min(gap, obstacle_gap(sim%box, m, x, r)/(2*r))
         end do

@@ -280,7 +280,7 @@ def unequal_before_flag(*runs: Run) -> int:
     for run, plain in zip(runs[::2], runs[1::2], strict=True):
         first = int(np.argmax(flagged(run)))
         logs = zip(run.events, plain.events, strict=True)
-        unequal += sum(int(np.sum(a[:first] != b[:first])) for a, b in logs)
+        unequal += sum(int(np.sum(a[:first] != b[:first])) for a, b in logs if a is not None)
         compared += first
     if compared < 100:
         raise ValueError(f"only {compared} collisions before the first elastic ones")

@@ -1,6 +1,9 @@
 """Measurements that several sections share: pure functions of a run."""
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ricochet import Run
@@ -11,6 +14,11 @@ from ricochet.thermodynamics import steps
 def over_runs(measure, runs: tuple[Run, ...]) -> Estimate:
     """The mean of a measurement over independent runs, with the error from their scatter."""
     return estimate([measure(run) for run in runs])
+
+
+def over(measure: Callable[[Run], ArrayLike]) -> Callable[..., Estimate]:
+    """The same as a function of the runs."""
+    return lambda *runs: over_runs(measure, runs)
 
 
 def middle(measure, runs: tuple[Run, ...]) -> np.ndarray:

@@ -31,7 +31,7 @@ def written(value: object) -> str:
 def gas(count: int, *, seed: int = 1, stop: dict, output: dict | None = None, **more) -> str:
     """`count` equal disks, speeds sqrt 2, so kT = 1 between walls.
 
-    `more` goes to the group that knows the name: box, contact, run, or else the species.
+    `more` goes to the group of that name, such as box or contact, or else to the species.
     """
     species = {"name": "gas", "count": count, "speed": ROOT_2}
     groups = {"run": {"seed": seed}, "box": {}, "species": species, "contact": {}}
@@ -39,7 +39,7 @@ def gas(count: int, *, seed: int = 1, stop: dict, output: dict | None = None, **
         groups["box"].update(PERIODIC)
     for key, value in more.items():
         if isinstance(value, dict):
-            groups[key].update(value)
+            groups.setdefault(key, {}).update(value)
         else:
             species[key] = value
     if "temperature" in species:

@@ -59,3 +59,20 @@ def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
         return rates[1] - rates[0]
 
     return float(brentq(difference, 0.1, 10.0, xtol=1e-13))
+
+
+def noise_kurtosis(xi: float) -> float:
+    """a2 of a gas that noise heats, van Noije and Ernst, Granular Matter 1, 57 (1998)."""
+    return 16 * (1 - xi) * (1 - 2 * xi**2) / (185 - 153 * xi + 30 * (1 - xi) * xi**2)
+
+
+def sheared_grains(xi: float) -> tuple[float, float, float]:
+    """Shear rate, stress -P_xy and P_yy of a dilute inelastic gas in steady uniform shear.
+
+    In units of nu = 2 sqrt(pi) n sigma sqrt(T / m), the pressure and the pressure; Santos, Garzo
+    and Dufty, Phys. Rev. E 69, 061303 (2004), in two dimensions: the moments relax with beta nu,
+    and zeta nu is the rate of cooling.
+    """
+    beta, zeta = (1 + xi) / 2 * (1 - (1 - xi) / 4), (1 - xi**2) / 2
+    rate = math.sqrt(zeta / beta) * (beta + zeta)
+    return rate, zeta / rate, beta / (beta + zeta)

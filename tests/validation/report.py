@@ -28,6 +28,7 @@ equation, KR Kolafa and Rottner (2006).
 | P12 | billiards: a round container, Sinai's, a light disk around a heavy one |
 | P13 | symmetries: conservation, reversal, boosts, scaling, no overlaps |
 | P14 | velocity correlations and diffusion |
+| P15 | thermal walls, rough disks, transport, kicks, shear, moving sides, the demon |
 | W1 | straight walls: a right-angled wedge under gravity, against two bouncing balls |
 
 """
@@ -56,6 +57,12 @@ NOTES = """
   pairs of one species, which have N_i - 1 partners; measured are +.11(5), +.14(7), -.45(6) %.
 - **P8-05**: the formula of the crystal is good to .2 %: the program finds -.15, -.21, -.15, -.07,
   -.01 % at packing .74, .77, .80, .83, .86 (errors .03 to .01), and 0 near .9069.
+- **P15-09**: the theory of sheared grains is linear in the stress. For xi = .95 it has .2276,
+  .2142, .9518, and .2275(6), .2168(6), .9494(6) are found; for xi = .8 .475, .379, .826, and
+  .490(1), .386(1), .818(1).
+- **P15-13**: the threshold of Maxwell's demon is that of many dilute grains, .73 here. The chambers
+  of the case, with 120 grains, turn even near .65; five times as many of a fifth of the diameter
+  still part at .65.
 - **P8-03** is a remark, not a case. Up to packing .70 the program agrees with Li et al. (2022)
   within its errors of .03 to .2 %.
 """

@@ -5,9 +5,13 @@ from . import (
     crater,
     diffusion,
     dissipation,
+    driven,
     equilibrium,
     few_disks,
     gravity,
+    kicked,
+    moved,
+    sheared,
     speeds,
     symmetry,
 )
@@ -22,5 +26,9 @@ TABLES = (
     billiards,
     symmetry,
     diffusion,
+    driven,
+    kicked,
+    sheared,
+    moved,
 )
 CASES = [case for table in TABLES for case in table.CASES]

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What `make install`, `make uninstall` and `make dist` do.
-# usage: .ci/install install|uninstall|dist    environment: PREFIX, DESTDIR, BUILD
+# usage: src/install.sh install|uninstall|dist    environment: PREFIX, DESTDIR, BUILD
 set -euo pipefail
+((BASH_VERSINFO[0]*100 + BASH_VERSINFO[1] >= 404)) || { echo "bash 4.4 or newer is needed, this is $BASH_VERSION" >&2; exit 2; }
 cd "$(dirname "$0")/.."
 action=$1 build=${BUILD:-build} root=${DESTDIR:-}$PREFIX
 
@@ -9,19 +10,39 @@ action=$1 build=${BUILD:-build} root=${DESTDIR:-}$PREFIX
 # is ever removed or replaced.
 shared=share/ricochet
 list=$shared/installed
-completion=share/bash-completion/completions/ricochet
-manual=share/man/man1/ricochet.1
-files=(bin/ricochet bin/ricochet-ensemble "$completion" "$manual")
-texts=(input/* post/*.* post/ricochet/*.* post/page/*.*)
-for text in "${texts[@]}" post/requirements.txt; do files+=("$shared/$text"); done
+documents=share/doc/ricochet
+manuals=share/man/man1
+completions=share/bash-completion/completions
+
+# What stands behind each name: a file, or "-> PLACE" for a link; nothing where the manual page is made.
+declare -A behind
+plan() {
+  local text command
+  behind=([bin/ricochet]=$build/ricochet [bin/ricochet-ensemble]=runs/ensemble.sh
+    [$completions/ricochet]=docs/ricochet-completion.bash [$completions/ricochet-ensemble]='-> ricochet'
+    [$manuals/ricochet.1]='' [$manuals/ricochet-ensemble.1]='' [$shared/post/requirements.txt]=requirements.txt)
+  for text in LICENSE README.md CHANGELOG.md CITATION.cff docs/*.{md,png,ipynb}; do behind[$documents/$text]=$text; done
+  behind[$documents/input]="-> ../../ricochet/input" # pages lead there
+  for text in input/* post/*.* post/ricochet/*.* post/page/*.*; do behind[$shared/$text]=$text; done
+  for text in post/*.py; do
+    command=ricochet-$(basename "$text" .py)
+    [[ $text == post/hatch_build.py ]] || behind[bin/${command//_/-}]="-> ../$shared/post/ricochet/commands.py"
+  done
+}
 
 give_up() { echo "$action: $*" >&2; exit 2; }
 [[ $PREFIX == /?* && ${DESTDIR:-/} == /* ]] ||
   give_up "PREFIX=$PREFIX, DESTDIR=${DESTDIR:-}: write folders that begin with /"
 
-put() { install -DT -m "$1" "$2" "$root/$3"; }
+# SOURCE NAME
+put() {
+  local mode=644
+  [[ ! -x $1 ]] || mode=755
+  mkdir -p "$root/${2%/*}"
+  if [[ $1 == '-> '* ]]; then ln -sfn "${1#-> }" "$root/$2"; else install -T -m $mode "$1" "$root/$2"; fi
+}
 
-# Removes files, what Python has made of them, and the folders in $shared that are then empty.
+# Removes files, what Python has made of them, and folders of ours that are then empty.
 remove() {
   local name folder
   while read -r name; do
@@ -30,8 +51,8 @@ remove() {
       rm -f "$folder/__pycache__/$(basename "$name" .py)".*.pyc
       rmdir "$folder/__pycache__" 2>/dev/null || true
     fi
-    [[ -d $root/$name ]] || rm -f "$root/$name"
-    while [[ $folder/ == "$root/$shared"/* ]] && rmdir "$folder" 2>/dev/null; do folder=${folder%/*}; done
+    [[ -d $root/$name && ! -L $root/$name ]] || rm -f "$root/$name"
+    while [[ ${folder#"$root/"}/ == @($shared|$documents)/* ]] && rmdir "$folder" 2>/dev/null; do folder=${folder%/*}; done
   done
 }
 
@@ -42,7 +63,8 @@ install)
   umask 022 # all users read it, whoever installs
   mkdir -p "$root" 2>/dev/null || true
   [[ -w $root ]] || give_up "cannot write to $root; PREFIX=folder takes another, such as PREFIX=$HOME/.local"
-  now=$(printf '%s\n' "${files[@]}" | sort)
+  plan
+  now=$(printf '%s\n' "${!behind[@]}" | sort)
   if [[ -e $root/$list ]]; then
     before=$(sort "$root/$list")
   elif [[ -d $root/$shared/post/ricochet ]]; then
@@ -57,16 +79,15 @@ install)
   mkdir -p "$root/$shared"
   sort -u <<<"$before${before:+$'\n'}$now" >"$root/$list" # if this install is cut short the next one knows of both
 
-  put 755 "$build/ricochet" bin/ricochet
-  put 755 runs/ensemble.sh bin/ricochet-ensemble
-  put 644 docs/ricochet-completion.bash "$completion"
-  mkdir -p "$root/${manual%/*}"
-  python3 -B docs/manual_page.py "$build/ricochet" "$PREFIX" >"$root/$manual" || give_up 'python3 is needed for the manual page'
-  for text in "${texts[@]}"; do put 644 "$text" "$shared/$text"; done
-  put 644 requirements.txt "$shared/post/requirements.txt"
+  for name in "${!behind[@]}"; do [[ -z ${behind[$name]} ]] || put "${behind[$name]}" "$name"; done
+  mkdir -p "$root/$manuals"
+  for command in ricochet ricochet-ensemble; do
+    python3 -B docs/manual_page.py "$root/bin/$command" "$PREFIX" >"$root/$manuals/$command.1" ||
+      give_up 'python3 is needed for the manual pages'
+  done
   comm -23 <(echo "$before") <(echo "$now") | remove # files of an earlier version
   echo "$now" >"$root/$list"
-  echo "installed: $root/bin/ricochet; scripts and inputs in $root/$shared; man ricochet"
+  echo "installed: $root/bin/ricochet; ricochet-player and the other scripts; inputs in $root/$shared; pages in $root/$documents; man ricochet"
   ;;
 uninstall)
   [[ -e $root/$list ]] || give_up "$root/$list, the list of what was installed, is not there: nothing is removed"

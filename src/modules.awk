@@ -1,6 +1,6 @@
 # Who uses whom, for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, and the list of objects that need no HDF5.
 # Objects of src/ go to one folder, all others to another.
-# usage: awk -v build=FOLDER -v tests=FOLDER -f .ci/modules.awk FILE...
+# usage: awk -v build=FOLDER -v tests=FOLDER -f src/modules.awk FILE...
 FNR == 1 {
   me = FILENAME
   gsub(/.*\/|\.[a-z0-9]*$/, "", me)

@@ -1,10 +1,11 @@
 !> The seam behind which the kinds of fixed obstacles stand. Search, start, time steps and observables ask an
 !> obstacle's shape all they need to know, and know no centre, radius or end themselves.
 module shapes
+  use images, only: images_t
   use kinds, only: real64
   implicit none
   private
-  public :: shape_t, magnitude, nearest_image, spare
+  public :: shape_t, magnitude, spare
 
   !> Relative margin above all rounding, for questions whose answer may err on one side only.
   real(real64), parameter :: spare = 1.0e-6_real64
@@ -15,6 +16,7 @@ module shapes
     logical :: encloses = .false.               !! keeps the disks inside, not outside
   contains
     procedure :: from_nearest
+    procedure :: direction
     procedure(contact_time), deferred :: contact_time
     procedure(gap), deferred :: gap
     procedure(normal), deferred :: normal
@@ -107,25 +109,24 @@ contains
   end function magnitude
 
   !> From the middle of its nearest image to x. What encloses the disks has no images.
-  pure function from_nearest(self, x, period) result(d)
+  pure function from_nearest(self, x, images) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
-    real(real64), intent(in) :: period(2)       !! `never` between walls [length]
+    type(images_t), intent(in) :: images        !! of the box
     real(real64) :: d(2)
 
     d = x - self%middle
-    if (.not. self%encloses) d = d - nearest_image(d, period)
+    if (.not. self%encloses) d = d + images%shift(images%nearest_image(d))
   end function from_nearest
 
-  !> The whole periods in a separation: dx less these leads to the nearest image.
-  pure function nearest_image(dx, period) result(shift)
-    real(real64), intent(in) :: dx(2)           !! [length]
-    real(real64), intent(in) :: period(2)       !! `never` between walls [length]
-    real(real64) :: shift(2)
+  !> Unit vector along the outline where the normal is this one: counter-clockwise around its middle.
+  pure function direction(self, normal) result(along)
+    class(shape_t), intent(in) :: self
+    real(real64), intent(in) :: normal(2)       !! from the outline to a disk
+    real(real64) :: along(2)
 
-    shift = 0
-    if (abs(dx(1)) < 0.5_real64*period(1) .and. abs(dx(2)) < 0.5_real64*period(2)) return    ! nearly always
-    shift = period*anint(dx/period)
-  end function nearest_image
+    along = [-normal(2), normal(1)]
+    if (self%encloses) along = -along
+  end function direction
 
 end module shapes

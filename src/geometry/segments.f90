@@ -5,8 +5,9 @@
 !> ever entered from outside, and what misses them by rounding hits a half circle at the same moment.
 module segments
   use free_flight, only: flight, time_to_circle, time_to_line
+  use images, only: images_t
   use kinds, only: never, real64
-  use shapes, only: nearest_image, shape_t, spare
+  use shapes, only: magnitude, shape_t, spare
   implicit none
   private
   public :: segment_t, new_segment
@@ -17,6 +18,7 @@ module segments
     real(real64) :: length = 0.0_real64         !! half of it [length]
   contains
     procedure :: from_nearest
+    procedure :: direction
     procedure :: contact_time
     procedure :: gap
     procedure :: normal
@@ -41,22 +43,29 @@ contains
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
 
-  !> From the middle of the image that is nearest to x: of a long wall not always the one with the nearest middle.
-  pure function from_nearest(self, x, period) result(d)
+  !> From one end to the other, as far as the tangent goes there: around an end the surface moves less.
+  pure function direction(self, normal) result(along)
     class(segment_t), intent(in) :: self
-    real(real64), intent(in) :: x(2), period(2)
+    real(real64), intent(in) :: normal(2)
+    real(real64) :: along(2)
+
+    along = self%along - dot_product(self%along, normal)*normal
+  end function direction
+
+  !> From the middle of the image that is nearest to x: of a long wall not always the one with the nearest middle.
+  pure function from_nearest(self, x, images) result(d)
+    class(segment_t), intent(in) :: self
+    real(real64), intent(in) :: x(2)
+    type(images_t), intent(in) :: images
     real(real64) :: d(2), nearest(2), candidate(2)
-    integer :: i, j, reach(2)
+    integer :: k
 
     nearest = x - self%middle
-    nearest = nearest - nearest_image(nearest, period)
-    reach = merge(1, 0, period < never)
+    nearest = nearest + images%shift(images%nearest_image(nearest))
     d = nearest
-    do j = -reach(2), reach(2)
-      do i = -reach(1), reach(1)
-        candidate = nearest + [i, j]*period
-        if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
-      end do
+    do k = 1, images%count()
+      candidate = nearest + images%shift(images%around(k))
+      if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
     end do
   end function from_nearest
 
@@ -116,14 +125,20 @@ contains
     length = sqrt(dot_product(offset, offset)) - radius
   end function gap
 
-  !> Unit vector from the wall to a disk that touches it.
+  !> Unit vector from the wall to a disk that touches it: along the straight part the wall's own, exact however small the
+  !> disk is.
   pure function normal(self, d) result(direction)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: d(2)
     real(real64) :: direction(2)
 
-    direction = self%from_outline(d)
-    direction = direction/sqrt(dot_product(direction, direction))
+    if (abs(dot_product(d, self%along)) <= self%length) then
+      direction = [-self%along(2), self%along(1)]
+      direction = sign(1.0_real64, dot_product(d, direction))*direction
+    else
+      direction = self%from_outline(d)
+      direction = direction/magnitude(direction)
+    end if
   end function normal
 
   !> Whether a disk with its centre in a rectangle can touch the wall: separating axes, corners not rounded.

@@ -9,7 +9,7 @@ case $commit in
   ;;
 esac
 cat <<END
-!> The commit and the flags that this program was built from. Written by .ci/build_info.
+!> The commit and the flags that this program was built from. Written by src/build_info.sh.
 module build_info
   implicit none
   private

@@ -1,0 +1,147 @@
+"""Write the results into docs/tasks.md, from the tables that the studies leave in runs/figures.
+
+    make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
+    python docs/tasks_page.py        reads the tables into docs/tasks.json, and writes the page
+
+docs/tasks.json keeps each number of the page with its error; the text stands between comments with
+its name in the page.
+"""
+
+import csv
+import json
+import re
+import textwrap
+from pathlib import Path
+
+from ricochet.statistics import fit_power_law, to_error
+
+DOCS = Path(__file__).resolve().parent
+TABLES = DOCS.parent / "runs" / "figures"
+BLANK = re.compile(r"{(\S+?)}")  # in a text, for a number
+Numbers = dict[str, tuple[float, float | None]]  # with the error, if there is one
+
+TEXTS = {
+    "exam": """\
+- Light and heavy disks start with ⟨K⟩ = 0.5 and 2, and end with {K_light} and {K_heavy} (theory
+  1.25); ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_theory}). Eight
+  seeds.
+- After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ
+  = 1, {ratio_0.9} for 0.9 and {ratio_0.8} for 0.8 (eight seeds), and stays near these values: no
+  equipartition.
+- Of the 2000 disks of a bed {hit} are hit and {displaced} move by more than their radius, from a
+  region {width} wide and {depth} deep (eight beds). The number hit grows with the mass of the
+  projectile to the power {hit_mass}, and with its speed to the power {hit_speed}, that is not at
+  all. Nothing in the task sets a scale of time but `contact_time`; so the study changes it with
+  1/speed. The crater decreases slowly with the projectile's radius, and grows to the whole bed as
+  ξ goes to 1. Open points are not fitted: there walls take part, or a time limit ends the run
+  before 10 % of the energy is left.
+""",
+    "gravity": """\
+- All methods conserve the total energy to {energy_change}, even with dt = 0.004: flights between
+  steps are exact, and a collision changes no position and loses no kinetic energy. Large steps
+  cost collisions instead: disks pass through each other unnoticed. Of the collisions
+  {missed_0.001} % are missed at dt = 0.001, {missed_0.002} % at 0.002 and {missed_0.004} % at
+  0.004 (expected {expected_0.001}, {expected_0.002} and {expected_0.004} %; 32 pairs of runs,
+  seeds 1 to 32, of 520 time units each).
+- ⟨K⟩ of the two species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: disks
+  fall from a mean height of 4, which gives them 470 times the energy of v₀ = 0.5, and 29 times
+  that of v₀ = 2. Single runs fluctuate too much to show this; it is the mean of 100 seeds.
+- The slopes of the logarithm of both histograms agree with kT = ⟨K⟩. Relative to the exponential
+  laws, seed 1 (500 time units) gives {speed_A} and {speed_B} for v² of the light and the heavy
+  disks, and {height_A} and {height_B} for heights. The law for 60 disks of finite size, dashed in
+  the figure, has {speed_law} for v², and {height_law_A} and {height_law_B} for heights.
+""",
+}
+
+
+def table(name: str) -> list[dict[str, str]]:
+    """The rows of a table."""
+    with (TABLES / f"{name}.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def value(row: dict[str, str], name: str, error: str = "") -> tuple[float, float | None]:
+    """A number of a row, with its error if there is a column for it."""
+    error = error or f"{name}_error"
+    return float(row[name]), float(row[error]) if error in row else None
+
+
+def mixture() -> Numbers:
+    """Energies and speeds in equilibrium."""
+    return {
+        f"{name}_{row['species']}{end}": value(row, name + end)
+        for row in table("mixture")
+        for name in ("K", "v")
+        for end in ("", "_theory")
+    }
+
+
+def cooling() -> Numbers:
+    """Temperature ratios at the end."""
+    end = table("cooling_velocity")[-1]
+    return {
+        f"ratio_{xi}": value(end, f"ratio_xi{xi}", f"ratio_error_xi{xi}")
+        for xi in ("1", "0.9", "0.8")
+    }
+
+
+def crater() -> Numbers:
+    """The crater of the task, and how it grows."""
+    rows = [row for row in table("crater_scan") if row["in_fit"] == "1"]
+    (base,) = (row for row in rows if row["scan"] == "mass" and float(row["mass"]) == 25)
+    found = {name: value(base, name) for name in ("hit", "displaced", "width", "depth")}
+    for axis in ("mass", "speed"):
+        own = [row for row in rows if row["scan"] == axis]
+        points = ([float(row[name]) for row in own] for name in (axis, "hit", "hit_error"))
+        law = fit_power_law(*points)
+        found[f"hit_{axis}"] = law.exponent, law.exponent_error
+    return found
+
+
+def gravity() -> Numbers:
+    """Energy, missed collisions, equipartition, laws."""
+    changes = [float(row["largest_change"]) for row in table("gravity_energy")]
+    times = [float(row["T_therm"]) for row in table("gravity_equipartition")]
+    found = {"energy_change": (max(changes), None)}
+    found |= {"T_first": (min(times), None), "T_last": (max(times), None)}
+    for row in table("gravity_missed")[1:]:
+        found[f"missed_{row['dt']}"] = value(row, "missed_percent")
+        found[f"expected_{row['dt']}"] = value(row, "expected_percent")
+    for row in table("gravity_laws"):
+        for kind in ("speed", "height"):
+            found[f"{kind}_{row['species']}"] = value(row, f"{kind}_slope")
+        found["speed_law"] = value(row, "speed_shared")
+        found[f"height_law_{row['species']}"] = value(row, "height_crowded")
+    return found
+
+
+def words(number: tuple[float, float | None]) -> str:
+    """A number of the page."""
+    mean, error = number
+    if error is None:
+        return f"{mean:.1g}" if mean < 1e-6 else f"{mean:.4g}"
+    return " ± ".join(to_error(mean, error))
+
+
+def filled(page: str, numbers: Numbers) -> str:
+    """The page with the texts in their places."""
+    for name, template in TEXTS.items():
+        text = BLANK.sub(lambda blank: words(numbers[blank[1]]), template)
+        items = [" ".join(item.split()) for item in re.split(r"\n(?=- )", text)]
+        wrapped = [textwrap.fill(item, 112, subsequent_indent="  ") + "\n" for item in items]
+        start, end = f"<!-- {name} -->\n", "<!-- end -->"
+        before, _, rest = page.partition(start)
+        page = before + start + "".join(wrapped) + end + rest.partition(end)[2]
+    return page
+
+
+def main() -> None:
+    found = mixture() | cooling() | crater() | gravity()
+    numbers = {name: found[name] for name in BLANK.findall("".join(TEXTS.values()))}
+    (DOCS / "tasks.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
+    page = DOCS / "tasks.md"
+    page.write_text(filled(page.read_text(encoding="utf-8"), numbers), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

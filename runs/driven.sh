@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Gases that walls heat and shear, rough disks, transport in equilibrium, and what shaking, kicks and
+# swimming do to disks: Leidenfrost, Maxwell's demon, the Brazil nut, noise, active disks; four seeds
+# each.
+. "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
+
+for system in fourier couette rough; do
+  runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 "$@"
+done
+"$python" post/fields.py "$data"/fourier/*.h5 --across x \
+  -o "$figures/fourier.png" --csv "$figures/fourier.csv"
+"$python" post/fields.py "$data"/couette/*.h5 --across y \
+  -o "$figures/couette.png" --csv "$figures/couette.csv"
+"$python" post/rough.py "$data"/rough/*.h5 -o "$figures/rough.png" --csv "$figures/rough.csv"
+
+# Viscosity, conductivity, diffusion: some mean free times from frame to frame, packing by packing.
+transport=()
+while read -r packing interval placement; do
+  runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
+    --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" \
+    --set species.disks.count=256 --set stop.collisions_per_disk=8000 \
+    --set "output.frames_every_time=$interval" --set output.precision=single \
+    --set output.event_log=true --set output.virial_tensor=true "$@"
+  transport+=("$data/transport_$packing"/*.h5)
+done <<'TABLE'
+0.05 0.13 random
+0.2 0.05 random
+0.35 0.026 random
+0.5 0.014 random
+0.6 0.009 dense
+TABLE
+"$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
+  --csv "$figures/transport.csv"
+
+# SYSTEM, what to show of it, its member for the film, and what sets its runs apart.
+while read -r system show film scan; do
+  runs/ensemble.sh "input/$system.nml" -d "$data/$system" --seeds 1-4 ${scan:+--scan "$scan"} "$@"
+  "$python" post/driven.py "$data/$system"/*.h5 --show "$show" -o "$figures/$system.png" \
+    --csv "$figures/$system.csv"
+  "$python" post/player.py "$data/$system/$film.h5" -o "$figures/$system.html"
+done <<'TABLE'
+leidenfrost height side.bottom.period_0.3_seed_1 side.bottom.period=0.3,2
+demon share side.bottom.velocity_0.5_seed_1 side.bottom.velocity=0.5,0.9
+nut height seed_1
+heated temperature restitution_0.8_seed_1 contact.restitution=0.8,0.9
+active cluster speed_1_seed_1 drive.speed=1,0
+TABLE
+"$python" post/fields.py "$data"/leidenfrost/side.bottom.period_0.3_*.h5 --across y \
+  -o "$figures/leidenfrost_fields.png" --csv "$figures/leidenfrost_fields.csv"

@@ -1,0 +1,155 @@
+!> What a kick does to the disks. The random numbers are a function of the seed, the disk and the number of the kick
+!> alone, so that it matters neither in which order disks are kicked nor how the run has come there.
+module kicks
+  use kinds, only: int32, pi, real64
+  use disks, only: angle_column, spin_column
+  use drive, only: active, andersen, noise
+  use encounters, only: land, turn
+  use exact_sums, only: exact_sum_t
+  use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
+  use simulation_state, only: simulation_t
+  use tally, only: drive_energy
+  implicit none
+  private
+  public :: kick, orient
+
+contains
+
+  !> Gives the disks their next kick, now, and lists whom it has reached.
+  subroutine kick(sim, kicked)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), allocatable, intent(out) :: kicked(:)
+    integer(int32) :: i, n
+    logical :: is_hit
+
+    sim%kicks = sim%kicks + 1
+    allocate (kicked(sim%n_disks()))
+    n = 0
+    do i = 1, sim%n_disks()
+      if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
+      call kick_disk(sim, i, is_hit)
+      if (.not. is_hit) cycle
+      n = n + 1
+      kicked(n) = i
+    end do
+    kicked = kicked(:n)
+    if (sim%drive%keep_momentum) call restore_momentum(sim, kicked)
+  end subroutine kick
+
+  !> Gives disk i a new velocity, in a sheared box relative to the profile: what it met last, it may meet again at once.
+  !> This is no contact.
+  subroutine kick_disk(sim, i, is_hit)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    logical, intent(out) :: is_hit               !! 'andersen' may leave it alone
+    type(random_stream_t) :: stream
+    real(real64) :: u, z(2), spin(2), v(2)
+
+    associate (drive => sim%drive, id => sim%tag(i)%id)
+      call stream%seed_draw(sim%seed, draws_of_kicks, id, sim%kicks)
+      is_hit = .true.
+      if (drive%kind == andersen) then
+        call stream%draw_uniform(u)
+        is_hit = u < drive%fraction
+      end if
+      if (.not. is_hit) return
+      if (sim%law%rotation) call turn(sim, i, sim%now)
+      call land(sim%disk(i), sim%box%gravity, sim%now)
+      sim%tag(i)%met = 0
+      call stream%draw_normals(z)
+      if (drive%kind == noise) then
+        call change_velocity(sim, i, sim%disk(i)%v + sqrt(drive%strength*drive%interval)*z)
+        return
+      end if
+      v = sim%box%stream(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
+      if (drive%kind == active) call swim(sim, i, v)
+      call change_velocity(sim, i, v)
+      if (.not. sim%law%rotation) return
+      call stream%draw_normals(spin)
+      call change_spin(sim, i, sqrt(drive%temperature/sim%inertia_of(i))*spin(1))
+    end associate
+  end subroutine kick_disk
+
+  !> Lets the orientation of disk i diffuse, and adds a velocity along it.
+  subroutine swim(sim, i, v)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(inout) :: v(2)          !! [length/time]
+    type(random_stream_t) :: stream
+    real(real64) :: z(2)
+
+    associate (drive => sim%drive, angle => sim%extra(sim%extra_row(angle_column), i))
+      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
+      call stream%draw_normals(z)
+      angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
+      v = v + drive%speed*[cos(angle), sin(angle)]
+    end associate
+  end subroutine swim
+
+  !> Gives the active disks orientations at the start, uniform in all directions.
+  subroutine orient(sim)
+    type(simulation_t), intent(inout) :: sim
+    type(random_stream_t) :: stream
+    real(real64) :: u
+    integer(int32) :: i
+
+    do i = 1, sim%n_disks()
+      if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
+      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
+      call stream%draw_uniform(u)
+      sim%extra(sim%extra_row(angle_column), i) = 2*pi*u
+    end do
+  end subroutine orient
+
+  !> Gives disk i a velocity, and counts the energy that this takes.
+  subroutine change_velocity(sim, i, v)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: v(2)             !! [length/time]
+
+    associate (before => sim%disk(i)%v)
+      call sim%tally%sum(drive_energy)%add(0.5_real64*sim%mass_of(i)*dot_product(v - before, v + before))
+      before = v
+    end associate
+  end subroutine change_velocity
+
+  !> Gives disk i an angular velocity, and counts the energy that this takes.
+  subroutine change_spin(sim, i, omega)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: omega            !! [1/time]
+
+    associate (before => sim%extra(sim%extra_row(spin_column), i))
+      call sim%tally%sum(drive_energy)%add(0.5_real64*sim%inertia_of(i)*(omega - before)*(omega + before))
+      before = omega
+    end associate
+  end subroutine change_spin
+
+  !> Takes from the disks that were kicked by noise the common velocity that it gave them. The kicks are drawn once more,
+  !> which needs no memory, and summed exactly, so that the order of the disks leaves no trace.
+  subroutine restore_momentum(sim, kicked)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: kicked(:)
+    type(exact_sum_t) :: momentum(2), mass
+    type(random_stream_t) :: stream
+    real(real64) :: z(2), scale, heaviest
+    integer(int32) :: k
+
+    heaviest = maxval(sim%species%mass)
+    scale = sqrt(sim%drive%strength*sim%drive%interval)
+    call momentum%choose_unit(16*heaviest*scale)
+    call mass%choose_unit(heaviest)
+    do k = 1, size(kicked, kind=int32)
+      associate (i => kicked(k))
+        call stream%seed_draw(sim%seed, draws_of_kicks, sim%tag(i)%id, sim%kicks)
+        call stream%draw_normals(z)
+        call momentum%add(sim%mass_of(i)*scale*z)
+        call mass%add(sim%mass_of(i))
+      end associate
+    end do
+    do k = 1, size(kicked, kind=int32)
+      call change_velocity(sim, kicked(k), sim%disk(kicked(k))%v - momentum%value()/mass%value())
+    end do
+  end subroutine restore_momentum
+
+end module kicks

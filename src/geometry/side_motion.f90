@@ -1,0 +1,314 @@
+!> How a side of the box moves, and when it strikes a disk that flies freely. All along the inner normal of the side.
+!>
+!> Where the acceleration of a disk relative to the side keeps its sign, their gap is convex or concave, and has one
+!> first zero that a bracket holds. A period falls into a few such pieces: no contact can be missed, however close the
+!> side and the disk stay together.
+module side_motion
+  use free_flight, only: flight, flight_velocity, time_to_line
+  use kinds, only: never, pi, real64
+  implicit none
+  private
+  public :: motions, side_motion_t
+
+  !> The motions by their names in the input; a motion is its number in this list.
+  character(len=*), parameter :: motions = "still sine parabolic sawtooth"
+  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4
+  real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
+  !> A part of a period: what bends the gap for so short a time does not change it by a bit.
+  real(real64), parameter :: negligible = 1.0e-10_real64
+  integer, parameter :: pieces_in_reach = 6                 !! that take more than a period, even with some negligible ones
+
+  type :: side_motion_t
+    integer :: kind = still                          !! in `motions`
+    real(real64) :: amplitude = 0.0_real64           !! [length]
+    real(real64) :: period = 1.0_real64              !! [time]
+    real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
+    real(real64) :: strike = 0.0_real64              !! velocity with which a sawtooth hits [length/time]
+  contains
+    procedure :: is_on
+    procedure :: travels
+    procedure :: top_speed
+    procedure :: moment
+    procedure :: place
+    procedure :: velocity
+    procedure :: contact_time
+    procedure, private :: acceleration
+    procedure, private :: displacement
+    procedure, private :: is_soon
+    procedure, private :: lead
+    procedure, private :: velocity_change
+    procedure, private :: piece
+  end type side_motion_t
+
+contains
+
+  !> Whether disks meet the side as one that moves.
+  elemental function is_on(self) result(yes)
+    class(side_motion_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind /= still
+  end function is_on
+
+  !> Whether its place changes.
+  elemental function travels(self) result(yes)
+    class(side_motion_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind == sine .or. self%kind == parabolic
+  end function travels
+
+  !> The highest speed of the side.
+  elemental function top_speed(self) result(speed)
+    class(side_motion_t), intent(in) :: self
+    real(real64) :: speed                            !! [length/time]
+
+    speed = self%strike
+    if (self%kind == sine) speed = 2*pi*self%amplitude/self%period
+    if (self%kind == parabolic) speed = 8*self%amplitude/self%period
+  end function top_speed
+
+  !> Time since a period began, at the time epoch + t of the run. The remainders are exact, so that a late time is as
+  !> sharp as an early one.
+  elemental function moment(self, epoch, t) result(tau)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: epoch, t             !! [time]
+    real(real64) :: tau                              !! [time]
+
+    tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
+  end function moment
+
+  !> How far the side is inwards of its own place.
+  elemental function place(self, tau) result(x)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64) :: x                                !! [length]
+    real(real64) :: s
+
+    x = 0
+    s = modulo(tau, self%period)/self%period
+    if (self%kind == sine) then
+      x = self%amplitude*sin(2*pi*s)
+    else if (self%kind == parabolic) then
+      x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
+    end if
+  end function place
+
+  !> Its velocity inwards.
+  elemental function velocity(self, tau) result(v)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64) :: v                                !! [length/time]
+    real(real64) :: s
+
+    v = self%strike
+    s = modulo(tau, self%period)/self%period
+    if (self%kind == sine) then
+      v = self%top_speed()*cos(2*pi*s)
+    else if (self%kind == parabolic) then
+      v = self%top_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
+    end if
+  end function velocity
+
+  !> Its acceleration inwards, just after a moment.
+  elemental function acceleration(self, tau) result(a)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64) :: a                                !! [length/time**2]
+
+    a = 0
+    if (self%kind == sine) then
+      a = -(2*pi/self%period)**2*self%place(tau)
+    else if (self%kind == parabolic) then
+      a = sign(32*self%amplitude/self%period**2, modulo(tau, self%period) - 0.5_real64*self%period)
+    end if
+  end function acceleration
+
+  !> How far the side moves from a moment on during the time s.
+  elemental function displacement(self, tau, s) result(way)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau, s               !! [time]
+    real(real64) :: way                              !! [length]
+    real(real64) :: half
+
+    half = pi*modulo(s, self%period)/self%period
+    if (self%kind == sine) then
+      way = 2*self%amplitude*cos(2*pi*tau/self%period + half)*sin(half)
+    else
+      way = self%place(tau + modulo(s, self%period)) - self%place(tau)
+    end if
+  end function displacement
+
+  !> Whether `lead` holds: soon after a moment.
+  elemental function is_soon(self, tau, s) result(yes)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau, s               !! [time]
+    logical :: yes
+
+    if (self%kind == sine) then
+      yes = s < small_angle*self%period/(2*pi)
+    else                                             ! on the same parabola
+      yes = s <= 0.5_real64*self%period - modulo(tau, 0.5_real64*self%period)
+    end if
+  end function is_soon
+
+  !> By how much the side is then ahead of one that kept its velocity, to its last digits.
+  elemental function lead(self, tau, s) result(way)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau, s               !! [time]
+    real(real64) :: way                              !! [length]
+    real(real64) :: angle, angle2
+
+    if (self%kind == sine) then
+      angle = 2*pi*s/self%period
+      angle2 = angle*angle
+      way = angle*angle2/6*(1 - angle2/20*(1 - angle2/42*(1 - angle2/72*(1 - angle2/110*(1 - angle2/156)))))  ! x - sin x
+      way = -self%amplitude*(cos(2*pi*tau/self%period)*way + 2*sin(2*pi*tau/self%period)*sin(0.5_real64*angle)**2)
+    else
+      way = 0.5_real64*self%acceleration(tau)*s*s
+    end if
+  end function lead
+
+  !> By how much its velocity has grown during the time s.
+  elemental function velocity_change(self, tau, s) result(v)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau, s               !! [time]
+    real(real64) :: v                                !! [length/time]
+    real(real64) :: half
+
+    half = pi*modulo(s, self%period)/self%period
+    if (self%kind == sine) then
+      v = -2*self%top_speed()*sin(2*pi*tau/self%period + half)*sin(half)
+    else if (self%is_soon(tau, s)) then
+      v = self%acceleration(tau)*s
+    else
+      v = self%velocity(tau + modulo(s, self%period)) - self%velocity(tau)
+    end if
+  end function velocity_change
+
+  !> How long, after a moment, the gap to a disk of acceleration g stays convex or concave: until the side's own
+  !> acceleration passes through g. At most half a period.
+  elemental function piece(self, tau, g) result(s)
+    class(side_motion_t), intent(in) :: self
+    real(real64), intent(in) :: tau                  !! a moment [time]
+    real(real64), intent(in) :: g                    !! [length/time**2]
+    real(real64) :: s                                !! [time]
+    real(real64) :: bend(2), ratio
+
+    bend = [0.0_real64, 0.5_real64]                  ! in periods
+    if (self%kind == sine) then
+      ratio = g/(self%amplitude*(2*pi/self%period)**2)
+      if (abs(ratio) < 1) bend = bend + [-1, 1]*asin(ratio)/(2*pi)
+    end if
+    bend = modulo(bend*self%period - tau, self%period)
+    where (bend < negligible*self%period) bend = self%period
+    s = minval(bend)
+  end function piece
+
+  !> Time until the side strikes the rim of a disk on a parabola; `never` if it does not. A disk that is in its reach for a
+  !> whole period is struck, unless it is at the very end of the reach and hardly moves: then ever more periods are skipped.
+  pure function contact_time(self, tau, gap, v, g) result(s)
+    class(side_motion_t), intent(in) :: self         !! one that travels
+    real(real64), intent(in) :: tau                  !! the moment from which the time counts [time]
+    real(real64), intent(in) :: gap                  !! from the side to the rim, not negative [length]
+    real(real64), intent(in) :: v                    !! of the disk [length/time]
+    real(real64), intent(in) :: g                    !! its acceleration [length/time**2]
+    real(real64) :: s, from, to, above, entry
+    integer :: pieces
+
+    above = gap + self%place(tau) - self%amplitude   ! beyond the reach of the side
+    entry = time_to_line(above, -v, -g)              ! comes into it, the last time
+    s = never
+    from = 0
+    pieces = 0
+    do
+      if (flight(above, v, g, from) > 0) then
+        if (from < entry) then
+          from = entry
+          pieces = 0
+        else if (.not. flight_velocity(v, g, from) < 0) then
+          return
+        end if
+      end if
+      if (.not. from < never) return
+      to = from + self%piece(modulo(tau + modulo(from, self%period), self%period), g)
+      s = strike_between(self, tau, gap, v, g, from, to)
+      if (s < never) return
+      pieces = pieces + 1
+      from = to
+      if (modulo(pieces, pieces_in_reach) == 0) from = scale(to, 1) + self%period
+    end do
+  end function contact_time
+
+  !> The contact within a piece of the flight in which the gap is convex or concave; `never` if there is none.
+  pure function strike_between(motion, tau, gap, v, g, from, to) result(s)
+    class(side_motion_t), intent(in) :: motion
+    real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
+    real(real64), intent(in) :: from, to             !! the piece [time]
+    real(real64) :: s, curvature, low, high, relative
+
+    relative = v - motion%velocity(tau)
+    curvature = g - motion%acceleration(tau + modulo(from, motion%period) + 0.5_real64*(to - from))
+    if (motion%kind == parabolic) then
+      s = from + time_to_line(max(apart(from), 0.0_real64), -opening(from), -curvature)
+      if (s > to) s = never
+      return
+    end if
+    s = from
+    if (.not. apart(from) > 0 .and. opening(from) < 0) return
+    s = never
+    high = to
+    if (curvature > 0) then                          ! the gap is smallest where it no longer shrinks
+      if (.not. opening(from) < 0) return
+      low = from
+      if (opening(to) > 0) call bisect(.true., low, high)
+    end if
+    if (.not. apart(high) < 0) return
+    low = from
+    call bisect(.false., low, high)
+    s = low
+
+  contains
+
+    !> The gap after the time t.
+    pure function apart(t) result(distance)
+      real(real64), intent(in) :: t
+      real(real64) :: distance
+
+      if (motion%is_soon(tau, t)) then
+        distance = gap + (relative*t + (0.5_real64*g*t*t - motion%lead(tau, t)))
+      else
+        distance = gap + (flight(0.0_real64, v, g, t) - motion%displacement(tau, t))
+      end if
+    end function apart
+
+    !> How fast it grows then.
+    pure function opening(t) result(speed)
+      real(real64), intent(in) :: t
+      real(real64) :: speed
+
+      speed = relative + (g*t - motion%velocity_change(tau, t))
+    end function opening
+
+    !> Halves an interval to the last bit: beyond its end the gap grows, or is negative.
+    pure subroutine bisect(to_smallest, left, right)
+      logical, intent(in) :: to_smallest
+      real(real64), intent(inout) :: left, right
+      real(real64) :: middle
+      logical :: beyond
+
+      do
+        middle = 0.5_real64*(left + right)
+        if (middle <= left .or. middle >= right) exit
+        if (to_smallest) then
+          beyond = opening(middle) > 0
+        else
+          beyond = apart(middle) < 0
+        end if
+        if (beyond) right = middle
+        if (.not. beyond) left = middle
+      end do
+    end subroutine bisect
+  end function strike_between
+
+end module side_motion

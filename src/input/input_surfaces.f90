@@ -1,0 +1,195 @@
+!> From the groups that describe sides and obstacles to their shapes and laws.
+module input_surfaces
+  use box_geometry, only: box_t, surface_t
+  use circles, only: new_circle
+  use collisions, only: grip_t, normal_rule, wall_law_t, wall_rules
+  use input_problems, only: problem_list_t
+  use input_species, only: check_name
+  use kinds, only: real64
+  use name_index, only: name_index_t
+  use parameter_values, only: parameter_group_t
+  use parameters, only: largest, table, words_of
+  use partners, only: n_sides, side_name
+  use segments, only: new_segment
+  use side_motion, only: motions, side_motion_t
+  use texts, only: place_of, written
+  implicit none
+  private
+  public :: take_obstacles, take_wall_laws
+
+contains
+
+  !> Fills the list of obstacles; it is empty if one of them is incomplete.
+  subroutine take_obstacles(groups, obstacles, problems)
+    type(parameter_group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
+    type(surface_t), allocatable, intent(out) :: obstacles(:)
+    type(problem_list_t), intent(inout) :: problems
+    type(name_index_t) :: names
+    logical :: complete
+    integer :: k, v
+
+    names = name_index_t(groups%instance)
+    complete = .true.
+    do k = 1, size(groups)
+      call check_name(groups, k, names, problems)
+      do v = 1, size(groups(k)%values)
+        associate (value => groups(k)%values(v))
+          if (table(value%row)%status /= "example") cycle       ! has a default, or may be left out
+          call groups(k)%demand(trim(value%name), problems)
+          complete = complete .and. value%is_set()
+        end associate
+      end do
+    end do
+    allocate (obstacles(merge(size(groups), 0, complete)))
+    do k = 1, size(obstacles)
+      obstacles(k)%name = trim(groups(k)%instance)
+      call take_shape(groups(k), obstacles(k))
+    end do
+  end subroutine take_obstacles
+
+  !> The shape that a group describes.
+  subroutine take_shape(group, obstacle)
+    type(parameter_group_t), intent(in) :: group
+    type(surface_t), intent(inout) :: obstacle
+
+    select case (group%name)
+    case ("wall")
+      allocate (obstacle%shape, source=new_segment(group%reals_of("from"), group%reals_of("to")))
+    case default                                          ! "obstacle"
+      allocate (obstacle%shape, source=new_circle(group%reals_of("centre"), group%real_of("radius", 0.0_real64), &
+        encloses=group%text_of("side") == "inside"))
+    end select
+  end subroutine take_shape
+
+  !> The laws of all walls: their own where their groups give one, else that of `&contact`.
+  subroutine take_wall_laws(sides, obstacles, law, box, problems)
+    type(parameter_group_t), intent(inout) :: sides(:)
+    type(parameter_group_t), intent(inout) :: obstacles(:)
+    type(wall_law_t), intent(in) :: law                   !! of walls without one of their own
+    type(box_t), intent(inout) :: box
+    type(problem_list_t), intent(inout) :: problems
+    integer :: k, side, line_of(n_sides)
+
+    box%side%law = law
+    if (law%rule /= normal_rule) box%side%law%grip = grip_t()
+    line_of = 0
+    do k = 1, size(sides)
+      side = place_of(trim(sides(k)%instance), side_name)
+      if (side == 0) then
+        if (.not. sides(k)%faulty("name")) call sides(k)%complain("name", "is missing; say which side it is", problems)
+      else if (line_of(side) > 0) then
+        call sides(k)%complain("name", "the side """//trim(side_name(side))//""" is already that of line "// &
+          written(line_of(side)), problems)
+      else if (.not. box%is_wall(side)) then
+        call sides(k)%complain("name", "the side """//trim(side_name(side))//""" is periodic (box.boundary), not a wall", &
+          problems)
+      else
+        line_of(side) = sides(k)%line
+        call take_law(sides(k), law, box%side(side)%law, problems)
+        call take_motion(sides(k), box%side(side)%motion, problems)
+        if (box%side(side)%motion%travels()) call check_room(sides(k), box, (side + 1)/2, problems)
+      end if
+    end do
+    do k = 1, size(box%obstacle)
+      call take_law(obstacles(k), law, box%obstacle(k)%law, problems)
+    end do
+  end subroutine take_wall_laws
+
+  !> The law of one wall. Values that follow from `&contact` are put into its group.
+  subroutine take_law(group, otherwise, law, problems)
+    type(parameter_group_t), intent(inout) :: group
+    type(wall_law_t), intent(in) :: otherwise
+    type(wall_law_t), intent(out) :: law
+    type(problem_list_t), intent(inout) :: problems
+
+    law%speed = group%real_of("speed", 0.0_real64)
+    if (group%given("temperature")) then
+      call take_temperature(group, law, problems)
+      return
+    end if
+    law%restitution = group%real_of("restitution", otherwise%restitution)
+    call group%put_reals("restitution", [law%restitution])
+    associate (rules => words_of(wall_rules))
+      law%rule = otherwise%rule
+      if (group%given("rule")) law%rule = max(1, place_of(group%text_of("rule"), rules))
+      call group%put_text("rule", trim(rules(law%rule)))
+    end associate
+    call take_grip(group, otherwise, law, problems)
+    if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("speed", &
+      "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
+  end subroutine take_law
+
+  !> How a side moves.
+  subroutine take_motion(group, motion, problems)
+    type(parameter_group_t), intent(inout) :: group
+    type(side_motion_t), intent(out) :: motion
+    type(problem_list_t), intent(inout) :: problems
+
+    call group%check_choices(problems)
+    if (group%faulty("motion")) return
+    motion%kind = place_of(group%text_of("motion"), words_of(motions))
+    motion%amplitude = group%real_of("amplitude", 0.0_real64)
+    motion%period = group%real_of("period", 1.0_real64)
+    motion%phase = group%real_of("phase", 0.0_real64)
+    motion%strike = group%real_of("velocity", 0.0_real64)
+    if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
+      written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
+    if (motion%is_on() .and. group%given("temperature")) call group%complain("motion", &
+      "excludes temperature: a thermal wall does not move; leave one of them out", problems)
+  end subroutine take_motion
+
+  !> Sides must not meet, whenever each is how far inwards.
+  subroutine check_room(group, box, axis, problems)
+    type(parameter_group_t), intent(in) :: group
+    type(box_t), intent(in) :: box
+    integer, intent(in) :: axis
+    type(problem_list_t), intent(inout) :: problems
+    real(real64) :: width
+
+    width = box%upper(axis) - box%lower(axis)
+    if (width > 0 .and. sum(box%side(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
+      "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
+  end subroutine check_room
+
+  !> A thermal wall has no other law.
+  subroutine take_temperature(group, law, problems)
+    type(parameter_group_t), intent(in) :: group
+    type(wall_law_t), intent(inout) :: law
+    type(problem_list_t), intent(inout) :: problems
+    character(len=*), parameter :: others(*) = [character(len=22) :: "restitution", "rule", "tangential_restitution", &
+      "friction"]
+    integer :: k
+
+    law%temperature = group%real_of("temperature", 0.0_real64)
+    do k = 1, size(others)
+      if (group%given(trim(others(k)))) call group%complain(trim(others(k)), &
+        "has no effect at a thermal wall; leave it out, or temperature", problems)
+    end do
+  end subroutine take_temperature
+
+  !> How rough a wall is. With the rule 'velocity' it leaves rotation alone.
+  subroutine take_grip(group, otherwise, law, problems)
+    type(parameter_group_t), intent(inout) :: group
+    type(wall_law_t), intent(in) :: otherwise
+    type(wall_law_t), intent(inout) :: law
+    type(problem_list_t), intent(inout) :: problems
+    character(len=*), parameter :: names(2) = [character(len=22) :: "tangential_restitution", "friction"]
+    integer :: k
+
+    if (law%rule /= normal_rule) then
+      do k = 1, 2
+        if (group%given(trim(names(k)))) call group%complain(trim(names(k)), &
+          "has no effect with rule = 'velocity'; take rule = 'normal'", problems)
+      end do
+      return
+    end if
+    law%grip%restitution = group%real_of("tangential_restitution", otherwise%grip%restitution)
+    law%grip%friction = group%real_of("friction", otherwise%grip%friction)
+    if (group%given("friction") .and. .not. law%grip%is_rough()) call group%complain("friction", &
+      "has no effect without tangential_restitution, which is -1 (smooth); give it, too", problems)
+    if (.not. law%grip%is_rough()) return
+    call group%put_reals("tangential_restitution", [law%grip%restitution])
+    if (law%grip%friction < huge(law%grip%friction)) call group%put_reals("friction", [law%grip%friction])
+  end subroutine take_grip
+
+end module input_surfaces

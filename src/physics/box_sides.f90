@@ -1,0 +1,85 @@
+!> The sides of the box: where they are, and when a disk meets them, as a pure function of the disk's own state, counted
+!> from the epoch like its clock.
+module box_sides
+  use box_geometry, only: box_t
+  use disks, only: disk_t
+  use free_flight, only: time_to_line
+  use kinds, only: int32, never, real64
+  use partners, only: axis_of, n_sides, sense_of, wall_index
+  implicit none
+  private
+  public :: bounds, next_side, side_time
+
+  real(real64), parameter :: rounding = 16*epsilon(1.0_real64)     !! relative, of a gap to a side that moves
+
+contains
+
+  !> Where the sides are at a time.
+  pure subroutine bounds(box, t, lower, upper)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: t               !! since the epoch [time]
+    real(real64), intent(out) :: lower(2), upper(2)     !! left and bottom, right and top [length]
+    real(real64) :: inwards(n_sides)
+    integer :: k
+
+    inwards = 0
+    do k = 1, n_sides
+      associate (motion => box%side(k)%motion)
+        if (motion%travels()) inwards(k) = motion%place(motion%moment(box%epoch, t))
+      end associate
+    end do
+    lower = box%lower + inwards([1, 3])
+    upper = box%upper - inwards([2, 4])
+  end subroutine bounds
+
+  !> When the disk's rim meets a wall, or its centre a periodic side. A gap that rounding made negative
+  !> counts as zero: a disk that has arrived and moves on outwards turns now and never leaks. At a side that moves, so
+  !> does one that is as small: bounces that become ever faster would never come to an end.
+  pure function side_time(box, disk, side) result(t)
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    integer(int32), intent(in) :: side          !! 0, -1, -2, -3: left, right, bottom, top
+    real(real64) :: t, gap, inset, tau
+    integer :: axis, sense
+
+    axis = axis_of(side)
+    sense = sense_of(side)
+    inset = merge(0.0_real64, disk%radius, box%periodic(axis))
+    if (sense < 0) then
+      gap = disk%x(axis) - (box%lower(axis) + inset)
+    else
+      gap = (box%upper(axis) - inset) - disk%x(axis)
+    end if
+    associate (motion => box%side(wall_index(side))%motion)
+      if (motion%travels()) then
+        tau = motion%moment(box%epoch, disk%clock)
+        gap = gap - motion%place(tau)
+        if (gap < rounding*(abs(disk%x(axis)) + disk%radius + motion%amplitude)) gap = 0
+        t = disk%clock + motion%contact_time(tau, gap, -sense*disk%v(axis), -sense*box%gravity(axis))
+      else
+        t = disk%clock + time_to_line(max(gap, 0.0_real64), sense*disk%v(axis), sense*box%gravity(axis))
+      end if
+    end associate
+  end function side_time
+
+  !> The side met first; of two at the same moment the one named first.
+  pure subroutine next_side(box, disk, t, side)
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    real(real64), intent(out) :: t
+    integer(int32), intent(out) :: side
+    integer(int32) :: k
+    real(real64) :: t_k
+
+    t = never
+    side = 0
+    do k = 0, 1 - n_sides, -1
+      t_k = side_time(box, disk, k)
+      if (t_k < t) then
+        t = t_k
+        side = k
+      end if
+    end do
+  end subroutine next_side
+
+end module box_sides

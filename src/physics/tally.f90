@@ -1,0 +1,119 @@
+!> What collisions have gathered since the start of the run. Sums are exact: they come out the same in whatever order, and
+!> in whatever parts of a simulation, they are gathered.
+module tally
+  use exact_sums, only: exact_sum_t
+  use kinds, only: int64, real64
+  implicit none
+  private
+  public :: sums, surface_tally_t, tally_t
+
+  !> What one term of a sum may amount to, and so how fine it must be: see `simulation_state: choose_units`.
+  integer, parameter, public :: energies = 1, impulses = 2, moments = 3
+
+  type :: sum_t
+    character(len=16) :: name
+    integer :: kind                                !! energies, ...
+  end type sum_t
+
+  !> The sums over collisions, each by its number. Units, checkpoints, domains and their merging go by this list.
+  integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
+  type(sum_t), parameter :: sums(*) = [ &
+    sum_t("virial", moments), &                    ! impulse times distance over pair collisions [energy]
+    sum_t("dissipated", energies), &               ! kinetic energy lost [energy]
+    sum_t("heat", energies), &                     ! given to disks by thermal walls [energy]
+    sum_t("work", energies), &                     ! done on disks by what moves them [energy]
+    sum_t("drive_energy", energies), &             ! given to disks by kicks [energy]
+    sum_t("stress_xx", moments), sum_t("stress_xy", moments), &   ! change of momentum times distance over pairs [energy]
+    sum_t("stress_yx", moments), sum_t("stress_yy", moments)]
+
+  !> What has happened at one side of the box, or at one obstacle.
+  type :: surface_tally_t
+    integer(int64) :: collisions = 0
+    type(exact_sum_t) :: impulse(2)                !! given to it [mass length/time]
+    type(exact_sum_t) :: energy                    !! that disks have gained [energy]
+  end type surface_tally_t
+
+  type :: tally_t
+    integer(int64) :: events = 0                   !! collisions of any kind
+    integer(int64) :: collisions = 0               !! of pairs
+    type(exact_sum_t) :: sum(size(sums))
+    type(surface_tally_t), allocatable :: surface(:)   !! sides, then obstacles: as in `partners: wall_index`
+  contains
+    procedure :: make_room
+    procedure :: choose_units
+    procedure :: has_units
+    procedure :: total
+    procedure :: include
+    procedure :: clear
+  end type tally_t
+
+contains
+
+  !> Makes room for what happens at n surfaces, unless there is.
+  pure subroutine make_room(self, n)
+    class(tally_t), intent(inout) :: self
+    integer, intent(in) :: n
+
+    if (.not. allocated(self%surface)) allocate (self%surface(n))
+  end subroutine make_room
+
+  !> Makes the sums fine enough for terms up to these bounds.
+  pure subroutine choose_units(self, bound)
+    class(tally_t), intent(inout) :: self
+    real(real64), intent(in) :: bound(:)           !! by kind
+
+    call self%sum%choose_unit(bound(sums%kind))
+    call self%surface%impulse(1)%choose_unit(bound(impulses))
+    call self%surface%impulse(2)%choose_unit(bound(impulses))
+    call self%surface%energy%choose_unit(bound(energies))
+  end subroutine choose_units
+
+  !> Whether the units have been chosen.
+  pure function has_units(self) result(yes)
+    class(tally_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%sum(1)%per_one > 0
+  end function has_units
+
+  !> A sum so far.
+  elemental function total(self, k)
+    class(tally_t), intent(in) :: self
+    integer, intent(in) :: k                       !! number in `sums`
+    real(real64) :: total
+
+    total = self%sum(k)%value()
+  end function total
+
+  !> Adds what has been gathered elsewhere, in the same units.
+  pure subroutine include(self, other)
+    class(tally_t), intent(inout) :: self
+    type(tally_t), intent(in) :: other
+    integer :: k
+
+    self%events = self%events + other%events
+    self%collisions = self%collisions + other%collisions
+    self%sum%units = self%sum%units + other%sum%units
+    self%surface%collisions = self%surface%collisions + other%surface%collisions
+    do k = 1, 2
+      self%surface%impulse(k)%units = self%surface%impulse(k)%units + other%surface%impulse(k)%units
+    end do
+    self%surface%energy%units = self%surface%energy%units + other%surface%energy%units
+  end subroutine include
+
+  !> Begins anew in the same units.
+  pure subroutine clear(self)
+    class(tally_t), intent(inout) :: self
+    integer :: k
+
+    self%events = 0
+    self%collisions = 0
+    self%sum%units = 0
+    self%surface%collisions = 0
+    do k = 1, 2
+      self%surface%impulse(k)%units = 0
+    end do
+    self%surface%energy%units = 0
+  end subroutine clear
+
+end module tally

@@ -1,0 +1,153 @@
+!> What changes in the state when a disk hits a side of the box or an obstacle; and what every contact does to a disk.
+module wall_hits
+  use kinds, only: int32, real64
+  use box_geometry, only: strike_velocity, surface_velocity, wall_law, wall_normal
+  use collisions, only: grip_t, still_in_contact, tangential_impulse, wall_law_t, wall_rebound
+  use disks, only: contact_column, disk_t, spin_column
+  use free_flight, only: flight, flight_velocity
+  use partners, only: is_side, wall_index
+  use random_stream, only: random_stream_t, thermal_walls
+  use simulation_state, only: simulation_t
+  use tally, only: dissipated, heat, work
+  implicit none
+  private
+  public :: collide_wall, land, make_contact, spin_up
+
+contains
+
+  !> Advances a disk's own state to the time t.
+  pure subroutine land(disk, gravity, t)
+    type(disk_t), intent(inout) :: disk
+    real(real64), intent(in) :: gravity(2), t
+    real(real64) :: s
+
+    s = t - disk%clock
+    disk%x = flight(disk%x, disk%v, gravity, s)
+    disk%v = flight_velocity(disk%v, gravity, s)
+    disk%clock = t
+    disk%stamp = disk%stamp + 1
+  end subroutine land
+
+  !> Disk i makes contact at the time t. `elastic`: its last contact is not over, by the contact law.
+  pure subroutine make_contact(sim, i, t, elastic)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: t
+    logical, intent(inout) :: elastic
+
+    associate (last => sim%extra(sim%extra_row(contact_column), i))
+      elastic = elastic .or. still_in_contact(sim%law, sim%tag(i)%collisions, t - last)
+      last = t
+    end associate
+  end subroutine make_contact
+
+  !> Changes the angular momentum of disk i.
+  pure subroutine spin_up(sim, i, change)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: change           !! [mass length**2/time]
+
+    associate (omega => sim%extra(sim%extra_row(spin_column), i))
+      omega = omega + change/sim%inertia_of(i)
+    end associate
+  end subroutine spin_up
+
+  !> Collides disk i with a side or an obstacle at the time t.
+  subroutine collide_wall(sim, i, code, t, counts)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
+    real(real64), intent(in) :: t
+    logical, value :: counts                     !! in the tally
+    real(real64) :: normal(2), strike(2), u(2), v(2), omega
+    type(wall_law_t) :: law
+    logical :: elastic
+
+    elastic = .false.
+    if (sim%law%contact_time > 0) call make_contact(sim, i, t, elastic)
+    call land(sim%disk(i), sim%box%gravity, t)
+    law = wall_law(sim%box, code)
+    normal = wall_normal(sim%box, code, sim%disk(i)%x)
+    strike = strike_velocity(sim%box, code, normal, t)
+    u = surface_velocity(sim%box, code, normal) + strike
+    v = sim%disk(i)%v
+    omega = sim%spin(i)
+    if (law%temperature > 0) then
+      call leave_thermally(sim, i, law%temperature, normal, u)
+    else
+      sim%disk(i)%v = wall_rebound(law, v - strike, normal, elastic)
+      if (any(abs(strike) > 0)) sim%disk(i)%v = sim%disk(i)%v + strike   ! never behind the side: rounded sums keep order
+      if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
+    end if
+    sim%tag(i)%collisions = sim%tag(i)%collisions + 1
+    sim%tag(i)%met = merge(0, code, is_side(code))
+    if (counts) call count_hit(sim, i, wall_index(code), law%temperature > 0, u, v, omega)
+  end subroutine collide_wall
+
+  !> Gives disk i, at a thermal wall, a velocity as if it came out of a gas of that temperature: along the normal with the
+  !> density (m v/kT) exp(-m v**2/2kT), along the wall, and in rotation, with Maxwell's.
+  pure subroutine leave_thermally(sim, i, temperature, normal, u)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: temperature      !! kT [energy]
+    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
+    type(random_stream_t) :: stream
+    real(real64) :: uniform, normals(2), thermal
+
+    call stream%seed_draw(sim%seed, thermal_walls, sim%tag(i)%id, sim%tag(i)%collisions)
+    call stream%draw_uniform(uniform)
+    call stream%draw_normals(normals)
+    thermal = sqrt(temperature/sim%mass_of(i))
+    sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
+    if (sim%law%rotation) sim%extra(sim%extra_row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
+  end subroutine leave_thermally
+
+  !> The tangential part of a hit of disk i on a rough wall; the velocity along the normal has changed already.
+  pure subroutine rub_wall(sim, i, grip, normal, u, before)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    type(grip_t), intent(in) :: grip
+    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
+    real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
+    real(real64) :: along(2), impulse
+
+    along = [-normal(2), normal(1)]
+    associate (disk => sim%disk(i), mass => sim%mass_of(i))
+      impulse = tangential_impulse(grip, sim%law%inertia, mass, &
+        dot_product(disk%v - u, along) - disk%radius*sim%spin(i), mass*abs(dot_product(disk%v - before, normal)))
+      disk%v = disk%v + (impulse/mass)*along
+      call spin_up(sim, i, -disk%radius*impulse)
+    end associate
+  end subroutine rub_wall
+
+  !> Counts what a hit on a side or obstacle has changed: what the moving surface did is work, the rest heat of a thermal
+  !> wall or else lost.
+  pure subroutine count_hit(sim, i, k, heats, u, v, omega)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i
+    integer, intent(in) :: k                     !! the surface, in the tally
+    logical, intent(in) :: heats                 !! it is a thermal wall
+    real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
+    real(real64), intent(in) :: v(2), omega      !! of the disk before [length/time, 1/time]
+    real(real64) :: mass, gain, done
+
+    mass = sim%mass_of(i)
+    gain = 0.5_real64*mass*(dot_product(sim%disk(i)%v, sim%disk(i)%v) - dot_product(v, v))
+    if (sim%law%rotation) gain = gain + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
+    done = mass*dot_product(u, sim%disk(i)%v - v)
+    sim%tally%events = sim%tally%events + 1
+    if (heats) then
+      call sim%tally%sum(heat)%add(gain - done)
+    else
+      call sim%tally%sum(dissipated)%add(done - gain)
+    end if
+    if (abs(done) > 0) call sim%tally%sum(work)%add(done)
+    associate (surface => sim%tally%surface(k))
+      surface%collisions = surface%collisions + 1
+      call surface%impulse%add(-mass*(sim%disk(i)%v - v))
+      call surface%energy%add(gain)
+    end associate
+  end subroutine count_hit
+
+end module wall_hits

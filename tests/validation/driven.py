@@ -1,0 +1,189 @@
+"""Section 15: thermal walls, rough disks, transport coefficients."""
+
+from math import pi, sqrt
+
+import numpy as np
+
+from ricochet import Run
+from ricochet.statistics import Estimate, combined, hold_against
+from ricochet.theory import ROUGH_RATIOS, maxwell_cdf
+from ricochet.thermodynamics import start_of_equilibrium
+from transport import MOMENTS, of_moments
+
+from .case import AT_LEAST, Case, Member, sigmas, within
+from .estimators import over
+from .inputs import PERIODIC, gas, namelist
+
+# --- one disk between a hot and a cold wall, which its centre finds 1 apart ---
+
+HOT, COLD = 4.0, 1.0
+FLUX = sqrt(2 / pi) * sqrt(HOT * COLD) * (sqrt(HOT) - sqrt(COLD))
+ROUND_TRIP = sqrt(pi / 2) * (1 / sqrt(HOT) + 1 / sqrt(COLD))
+
+
+def between_walls(turning: bool) -> tuple[Member, ...]:
+    """A disk, smooth or with a spin, in a box that is periodic along the walls."""
+    spin = {"angular_velocity": 1.0} if turning else {}
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (1.2, 1), "boundary": ("wall", "periodic")},
+                side=[
+                    {"name": "left", "temperature": HOT},
+                    {"name": "right", "temperature": COLD},
+                ],
+                species={"name": "gas", "count": 1, "radius": 0.1, "temperature": 2.0, **spin},
+                stop={"time": 40000},
+                output={"frames_every_time": 40000, "observables_every_time": 4000},
+            )
+        )
+        for seed in range(1, 11)
+    )
+
+
+def rate(run: Run, name: str) -> float:
+    """A sum at its end over the time."""
+    time, value = run.observable(name)
+    return float(value[-1] / time[-1])
+
+
+def flux(run: Run) -> float:
+    """Heat per time from left to right."""
+    return (rate(run, "sides/left/energy") - rate(run, "sides/right/energy")) / 2
+
+
+# --- a gas between walls of one temperature ---
+
+KT, COUNT = 2.0, 50
+HEATED = tuple(
+    Member(
+        namelist(
+            run={"seed": seed},
+            box={"upper": (20, 20), "boundary": ("wall", "periodic")},
+            side=[{"name": side, "temperature": KT} for side in ("left", "right")],
+            species={"name": "gas", "count": COUNT, "radius": 0.5, "temperature": KT},
+            stop={"time": 4000},
+            output={"frames_every_time": 100, "observables_every_time": 2},
+        )
+    )
+    for seed in range(1, 11)
+)
+
+
+def energies(run: Run) -> np.ndarray:
+    """Total energies after the start."""
+    time, energy = run.observable("total_energy")
+    return energy[time >= 100]
+
+
+def maxwell_p(*runs: Run) -> float:
+    """Probability of the distance of all speeds from Maxwell's law at T."""
+    speeds = [run.speed(slice(1, None)).ravel() * np.sqrt(1 / (2 * KT)) for run in runs]
+    return hold_against(np.concatenate(speeds), maxwell_cdf).ks_p
+
+
+# --- rough disks that cool ---
+
+ETA, ROUGH_COUNT = 0.0025, 20000  # the references are those of the dilute limit
+
+
+def cooling(xi: float, beta: float) -> tuple[Member, ...]:
+    """Dilute gases that start with the proportion of temperatures that they are to keep."""
+    edge = sqrt(ROUGH_COUNT * pi / 4 / ETA)
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (edge, edge), **PERIODIC},
+                species={
+                    "name": "gas", "count": ROUGH_COUNT, "radius": 0.5, "temperature": 1.0,
+                    "rotational_temperature": ROUGH_RATIOS[xi, beta],
+                },
+                contact={"restitution": xi, "tangential_restitution": beta},
+                stop={"collisions_per_disk": 10},
+                output={"observables_every_collisions": 2000},
+            )
+        )
+        for seed in range(1, 7)
+    )  # fmt: skip
+
+
+def ratio(run: Run) -> float:
+    """T_rot / T from 4 to 10 collisions per disk."""
+    tau = run.collisions_per_disk.value
+    turning, moving = (
+        run.observable(f"all/{name}").value for name in ("rotational_temperature", "temperature")
+    )
+    return float(np.mean((turning / moving)[tau >= 4]))
+
+
+# --- viscosities and conductivity of a gas in equilibrium ---
+
+
+def flowing(eta: float) -> tuple[Member, ...]:
+    """Runs with all that the Helfand moments take."""
+    return tuple(
+        Member(
+            gas(
+                512, seed=seed, packing_fraction=eta, periodic=True, temperature=1.0,
+                stop={"collisions_per_disk": 2500},
+                output={
+                    "frames_every_collisions": 640000, "observables_every_collisions": 512,
+                    "event_log": True, "virial_tensor": True,
+                },
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def enskog_ratios(*runs: Run) -> Estimate:
+    """Shear and bulk viscosity and conductivity over those of Enskog's theory."""
+    found = of_moments(list(runs), [start_of_equilibrium(run) for run in runs])
+    means = [combined(found[name].members) for name in MOMENTS]
+    return Estimate(*(np.array([getattr(one, k) for one in means]) for k in ("mean", "error")))
+
+
+CASES = [
+    Case(
+        "P15-01", "one smooth disk between T = 4 and 1: heat per time",
+        between_walls(False), over(flux), 1.5 * FLUX, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-01", "one disk that turns: heat per time",
+        between_walls(True), over(flux), 2 * FLUX, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-01", "one smooth disk: hits per time on each wall",
+        between_walls(False),
+        over(lambda run: [rate(run, f"sides/{side}/collisions") for side in ("left", "right")]),
+        1 / ROUND_TRIP, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-02", "50 disks between walls at T: energy over N T",
+        HEATED, over(lambda run: energies(run).mean() / (COUNT * KT)), 1, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-02", "variance of the energy over N T^2",
+        HEATED, over(lambda run: energies(run).var() / (COUNT * KT**2)), 1, sigmas(4, 0.2), "D",
+    ),
+    Case(
+        "P15-02", "speeds against Maxwell's law at T: probability",
+        HEATED, maxwell_p, 0.001, AT_LEAST, "D",
+    ),
+    *[
+        Case(
+            "P15-03", f"rough disks, restitution {xi}, tangential {beta}: T_rot / T",
+            cooling(xi, beta), over(ratio), expected, within(0.01), "D",
+        )
+        for (xi, beta), expected in ROUGH_RATIOS.items()
+    ],
+    *[
+        Case(
+            "P15-04", f"packing {eta}: shear, bulk viscosity, conductivity over Enskog's",
+            flowing(eta), enskog_ratios, 1, sigmas(4, 0.2), "D",
+        )
+        for eta in (0.05, 0.2)
+    ],
+]  # fmt: skip

@@ -1,0 +1,251 @@
+"""Section 15, kicks: noise against collisions, heat baths, Brownian and active disks."""
+
+from collections.abc import Callable
+from math import exp, pi, sqrt
+
+import numpy as np
+
+from ricochet import Run
+from ricochet import hard_disks as hd
+from ricochet.statistics import excess_kurtosis
+
+from .case import Case, Member, sigmas, within
+from .estimators import over
+from .inputs import PERIODIC, gas, namelist
+from .laws import noise_kurtosis
+
+
+# --- a dilute inelastic gas that noise heats: collisions take what it gives at T = 1 ---
+
+HEATED_COUNT, ETA = 5000, 0.0025
+FREE_TIME = 1 / float(hd.collision_rate(hd.henderson(ETA), 1.0, HEATED_COUNT))  # at T = 1
+STRENGTH = 0.002
+
+
+def heated(xi: float) -> tuple[Member, ...]:
+    """Many kicks in a free flight, samples at any moment between two, from the temperature due."""
+    edge = sqrt(HEATED_COUNT * pi / 4 / ETA)
+    kt = hd.noise_temperature(STRENGTH, xi, ETA, 1.0)
+    unit = FREE_TIME / sqrt(kt)
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (edge, edge), **PERIODIC},
+                species={
+                    "name": "gas", "count": HEATED_COUNT, "radius": 0.5, "exact_temperature": kt,
+                    "temperature": kt,
+                },
+                contact={"restitution": xi},
+                drive={
+                    "kind": "noise", "interval": 0.1 * unit, "strength": STRENGTH,
+                    "keep_momentum": True,
+                },
+                stop={"time": 60 * unit},
+                output={
+                    "frames_every_time": 3.03 * unit, "observables_every_time": 0.303 * unit,
+                    "precision": "single",
+                },
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def steady_temperature(run: Run) -> float:
+    """The mean after a fifth of the run."""
+    time, kt = run.observable("all/temperature")
+    return float(kt[time >= time[-1] / 5].mean())
+
+
+def steady_kurtosis(run: Run) -> float:
+    """a2 of all velocities after a fifth of the run."""
+    return float(np.mean([excess_kurtosis(v) for v in run.speed(slice(run.frames // 5, None))]))
+
+
+# --- disks that never meet: what each of them does is known exactly ---
+
+FREE_COUNT, KICK = 100, 1.0
+
+
+def free(frames_every: int, kicks: int, **drive) -> tuple[Member, ...]:
+    """All but points, which hardly ever meet; `drive` as in the input."""
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (100, 100), **PERIODIC},
+                species={
+                    "name": "free", "count": FREE_COUNT, "mass": MASS, "radius": 1e-6,
+                    "temperature": drive["temperature"],
+                },
+                drive={"interval": KICK, **drive},
+                stop={"time": kicks * KICK},
+                output={"frames_every_time": frames_every * KICK},
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+MASS, BATH = 2.0, 3.0
+FRACTION = 0.3
+LAGS = (1, 2, 5)
+BATHED = free(1, 2000, kind="andersen", temperature=BATH, fraction=FRACTION)
+DIFFUSING = free(1, 2000, kind="brownian", temperature=BATH)
+SWIM, TURN = 1.5, 0.02  #: speed and diffusion of the orientation of an active disk
+WARMTH = 0.5
+SWIMMING = free(10, 20000, kind="active", temperature=WARMTH, speed=SWIM, rotational_diffusion=TURN)
+
+
+def memory(run: Run) -> list[float]:
+    """<v(0) v(t)> at the lags, over 2 kT / m."""
+    v = run.velocity[:]
+    return [float(np.mean(v[k:] * v[: len(v) - k])) * MASS / BATH for k in (0, *LAGS)]
+
+
+def spread(lags: tuple[int, ...], law: Callable[[int], float]) -> Callable[[Run], list[float]]:
+    """<|dr|^2> at lags in frames over its law; the first flight is not yet that of a kick."""
+
+    def measure(run: Run) -> list[float]:
+        r = run.unwrapped(slice(1, None))
+        squares = ((k, np.sum((r[k:] - r[:-k]) ** 2, axis=-1)) for k in lags)
+        return [float(np.mean(square)) / law(k) for k, square in squares]
+
+    return measure
+
+
+def headings(run: Run) -> list[float]:
+    """<cos> of the turn of the orientation at the lags, in frames."""
+    angle = run.element("orientation")[:]
+    return [float(np.mean(np.cos(angle[k:] - angle[:-k]))) for k in LAGS]
+
+
+def swum(kicks: int) -> float:
+    """<|dr|^2> of an active disk that has a straight flight for each kick.
+
+    The n directions of the flights are u_1 ... u_n with <u_i u_j> = exp(-D_r |i - j| interval);
+    for short intervals it is 4 D t + 2 (v / D_r)^2 (D_r t - 1 + exp(-D_r t)), Howse et al., Phys.
+    Rev. Lett. 99, 048102 (2007).
+    """
+    i = np.arange(kicks)
+    together = np.exp(-TURN * KICK * np.abs(i[:, None] - i)).sum()
+    return float(KICK**2 * (SWIM**2 * together + 2 * kicks * WARMTH / MASS))
+
+
+# --- disks of two kinds that can turn, in a heat bath: every freedom has its share ---
+
+PAIRS = 100
+
+
+def bathed(kind: str, **drive) -> tuple[Member, ...]:
+    """A dense elastic mixture, as rough as can be, that starts at another temperature."""
+    edge = sqrt(PAIRS * pi * (0.5**2 + 0.8**2) / 0.3)
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (edge, edge), **PERIODIC},
+                species=[
+                    {"name": "light", "count": PAIRS, "radius": 0.5, "temperature": 1.0},
+                    {
+                        "name": "heavy", "count": PAIRS, "radius": 0.8, "mass": 4.0,
+                        "temperature": 1.0,
+                    },
+                ],
+                contact={"tangential_restitution": 1.0},
+                drive={"kind": kind, "interval": 0.5, "temperature": BATH, **drive},
+                stop={"time": 2000},
+                output={"observables_every_time": 0.503},
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def shares(run: Run) -> list[float]:
+    """<m v^2 / 2> and <I omega^2> of both species over the temperature of the bath."""
+    return [
+        factor * float(run.observable(f"{species}/{what}").value[100:].mean()) / BATH
+        for species in ("light", "heavy")
+        for what, factor in (("kinetic_energy", 1), ("rotational_energy", 2))
+    ]
+
+
+def heat_capacity(run: Run) -> float:
+    """Variance of the energy over T^2, per disk."""
+    return float(run.observable("total_energy").value[100:].var() / BATH**2 / (2 * PAIRS))
+
+
+# --- Brownian disks have the pressure of hard disks, whatever their dynamics ---
+
+CROWD, CROWDED = 1000, 0.3
+CROWDS = tuple(
+    Member(
+        gas(
+            CROWD, seed=seed, packing_fraction=CROWDED, periodic=True, temperature=1.0,
+            drive={"kind": "brownian", "interval": 0.002, "temperature": 1.0},
+            stop={"collisions_per_disk": 100}, output={"observables_every_collisions": 5000},
+        )
+    )
+    for seed in range(1, 5)
+)  # fmt: skip
+
+
+def compressibility(run: Run) -> float:
+    """Z by the virial of the pairs."""
+    time, virial = run.observable("virial")
+    return float(1 + (virial[-1] - virial[1]) / (2 * CROWD * (time[-1] - time[1])))
+
+
+CASES = [
+    *[
+        Case(
+            "P15-05", f"inelastic gas and noise, xi = {xi}: T",
+            heated(xi), over(steady_temperature), hd.noise_temperature(STRENGTH, xi, ETA, 1.0),
+            sigmas(4, 0.01), "van Noije and Ernst 1998",
+        )
+        for xi in (0.8, 0.6)
+    ],
+    *[
+        Case(
+            "P15-05", f"the same, xi = {xi}: a2",
+            heated(xi), over(steady_kurtosis), noise_kurtosis(xi), within(0.005),
+            "van Noije and Ernst 1998",
+        )
+        for xi in (0.8, 0.6)
+    ],
+    Case(
+        "P15-06", "Andersen kicks, free disks: <v v(t)> m / 2 kT after 0, 1, 2, 5 of them",
+        BATHED, over(memory), [(1 - FRACTION) ** k for k in (0, *LAGS)], sigmas(4, 0.02), "D",
+    ),
+    *[
+        Case(
+            "P15-06", f"{kind} kicks, rough mixture: moving and turning, both species, over T",
+            bathed(kind, **more), over(shares), 1, sigmas(4, 0.01), "D",
+        )
+        for kind, more in (("andersen", {"fraction": 0.2}), ("brownian", {}))
+    ],
+    Case(
+        "P15-06", "andersen kicks, the same: variance of the energy over N T^2",
+        bathed("andersen", fraction=0.2), over(heat_capacity), 1.5, sigmas(4, 0.1), "D",
+    ),
+    Case(
+        "P15-07", "Brownian free disks: <dr^2> over 4 D t at 1, 5, 20 kicks",
+        DIFFUSING, over(spread((1, 5, 20), lambda kicks: 2 * BATH / MASS * KICK**2 * kicks)),
+        1, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-07", "Brownian disks at packing .3: Z by the virial",
+        CROWDS, over(compressibility), float(hd.simulated(CROWDED)), sigmas(4, 0.01), "KR",
+    ),
+    Case(
+        "P15-08", "active free disks: <dr^2> over its law at D_r t = .2, 2, 20",
+        SWIMMING, over(spread((1, 10, 100), lambda frames: swum(10 * frames))),
+        1, sigmas(4, 0.02), "Howse et al. 2007, D",
+    ),
+    Case(
+        "P15-08", "the same: <cos> of the turn at D_r t = .2, .4, 1",
+        SWIMMING, over(headings), [exp(-TURN * 10 * KICK * k) for k in LAGS], sigmas(4, 0.02), "D",
+    ),
+]  # fmt: skip

@@ -1,0 +1,159 @@
+"""Section 15, sides that move: one disk on a floor, a gas under a piston, Maxwell's demon."""
+
+from math import acos, pi, sin, sqrt
+
+import numpy as np
+
+from ricochet import Run
+from ricochet.theory import demon_share
+
+from .case import AT_LEAST, AT_MOST, Case, Member, relative, sigmas, within
+from .estimators import over
+from .inputs import namelist
+
+# --- one disk that bounces on the floor, g = 1 ---
+
+
+def bouncing(height: float, **law) -> Member:
+    """A disk that starts at rest with its rim so high above the place of the floor."""
+    return Member(
+        namelist(
+            box={"upper": (1, 1000), "gravity": (0, -1)},
+            side={"name": "bottom", "rule": "normal", **law},
+            species={"radius": 0.1, "position": (0.5, 0.1 + height)},
+            stop={"events": 400, "time": 1e6},
+            output={"frames_every_events": 1},
+        )
+    )
+
+
+V = 0.25
+STRUCK = tuple(bouncing(1, motion="sawtooth", velocity=V, restitution=xi) for xi in (0.5, 0.75))
+
+
+def leaving(run: Run) -> np.ndarray:
+    """Upward velocities right after the last 40 bounces."""
+    return run.velocity[run.frames - 41 : run.frames - 1][:, 0, 1]
+
+
+def shaken(xi: float, strength: float) -> Member:
+    """On a sine of period 1, from close to the orbit of a bounce per period.
+
+    A disk that leaves with 1/2 flies for a period; the floor then has (1 - xi) / (1 + xi) / 2.
+    """
+    amplitude = strength / (2 * pi) ** 2
+    phase = acos((1 - xi) / (1 + xi) / 2 / (2 * pi * amplitude))
+    height = amplitude * sin(phase) + 0.125 + 1e-4
+    return bouncing(
+        height, motion="sine", amplitude=amplitude, period=1.0, restitution=xi,
+        phase=(phase / (2 * pi) + 0.5) % 1,
+    )  # fmt: skip
+
+
+def doubling(xi: float) -> float:
+    """Largest acceleration of the floor, over g, up to which the orbit repeats at each bounce."""
+    return float(np.hypot(pi * (1 - xi) / (1 + xi), 2 * (1 + xi**2) / (1 + xi) ** 2))
+
+
+BELOW, ABOVE = (
+    tuple(shaken(xi, factor * doubling(xi)) for xi in (0.5, 0.8)) for factor in (0.98, 1.02)
+)
+
+
+# --- a dilute gas that a side presses together and lets expand, slowly ---
+
+PISTON = tuple(
+    Member(
+        namelist(
+            run={"seed": seed},
+            box={"upper": (2, 1)},
+            side={"name": "right", "motion": "sine", "amplitude": 0.5, "period": 1000.0},
+            species={"name": "gas", "count": 200, "radius": 1e-3, "temperature": 1.0,
+                     "exact_temperature": 1.0},
+            stop={"time": 750},
+            output={"observables_every_time": 250},
+        )
+    )
+    for seed in range(1, 5)
+)  # fmt: skip
+
+
+def adiabats(run: Run) -> list[float]:
+    """T x area over its start when the side is farthest in, at its place, farthest out."""
+    kt = run.observable("all/temperature").value
+    area = np.array([2.0, 1.5, 2.0, 2.5]) - 2e-3
+    return list((kt * area / (kt[0] * area[0]))[1:])
+
+
+# --- Maxwell's demon: two chambers, a sawtooth floor, a hole above it ---
+
+GRAINS, DIAMETER, WIDTH, HOLE, XI = 120, 0.5, 19.5, 8.0, 0.9
+LAYERS = GRAINS * DIAMETER / WIDTH
+THRESHOLD = LAYERS * (1 - XI**2) * sqrt(pi * HOLE) / 4  # of the velocity: see `demon_share`
+
+
+def chambers(velocity: float) -> tuple[Member, ...]:
+    """The input `demon.nml` with another floor, for longer."""
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (40, 50), "gravity": (0, -1)},
+                side={"name": "bottom", "motion": "sawtooth", "velocity": velocity},
+                wall=[
+                    {"name": "lower", "from": (20, 0), "to": (20, HOLE)},
+                    {"name": "upper", "from": (20, HOLE + 6), "to": (20, 50)},
+                ],
+                species={"name": "grain", "count": GRAINS, "radius": DIAMETER / 2,
+                         "region": (0, 40, 1, 30), "temperature": 4.0},
+                contact={"restitution": XI, "wall_restitution": 1, "wall_rule": "normal",
+                         "contact_time": 1e-4},
+                stop={"time": 3000},
+                output={"frames_every_time": 5},
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def fuller(run: Run) -> float:
+    """Mean share of the half that has more of them in the second half of the time."""
+    late = run.position[run.frames // 2 :][..., 0] < 20
+    share = float(late.mean())
+    return max(share, 1 - share)
+
+
+CASES = [
+    Case(
+        "P15-11", "floor that strikes with V, xi = .5, .75: velocity over V (1 + xi) / (1 - xi)",
+        STRUCK, lambda *runs: [leaving(r)[-1] / V / f for r, f in zip(runs, (3, 7), strict=True)],
+        1, relative(1e-12), "D",
+    ),
+    Case(
+        "P15-11", "floor of a sine, .98 of the doubling, xi = .5, .8: velocity at each bounce",
+        BELOW, lambda *runs: [leaving(run)[-1] for run in runs], 0.5, within(1e-4), "D",
+    ),
+    Case(
+        "P15-11", "the same, 1.02 of it: two bounces in turn, difference of their velocities",
+        ABOVE, lambda *runs: [abs(leaving(run)[-1] - leaving(run)[-2]) for run in runs],
+        0.01, AT_LEAST, "D",
+    ),
+    Case(
+        "P15-11", "the same: difference of each bounce and the next but one",
+        ABOVE, lambda *runs: [abs(leaving(run)[-1] - leaving(run)[-3]) for run in runs],
+        1e-4, AT_MOST, "D",
+    ),
+    Case(
+        "P15-12", "slow piston on a dilute gas: T x area over its start at three places",
+        PISTON, over(adiabats), 1, sigmas(4, 0.02), "D",
+    ),
+    *[
+        Case(
+            "P15-13", f"Maxwell's demon, floor with {velocity:g} of the threshold: fuller share",
+            chambers(velocity * THRESHOLD), over(fuller),
+            demon_share(HOLE / (velocity * THRESHOLD) ** 2, LAYERS, XI), within(0.05),
+            "after Eggers 1999",
+        )
+        for velocity in (0.7, 1.2)
+    ],
+]  # fmt: skip

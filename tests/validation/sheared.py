@@ -1,0 +1,170 @@
+"""Section 15, flow: sheared gases, elastic and inelastic; heat and momentum from wall to wall."""
+
+from collections.abc import Callable
+from math import pi, sqrt
+
+import numpy as np
+
+from fields import estimates, prediction
+from ricochet import Run
+from ricochet import hard_disks as hd
+
+from .case import Case, Member, relative, sigmas
+from .estimators import over
+from .inputs import PERIODIC, namelist
+from .laws import sheared_grains
+
+# --- an elastic gas: viscosity is how fast shear heats it ---
+
+COUNT = 500
+
+
+def heating(eta: float) -> tuple[Member, ...]:
+    """From T = 1 to about 4, at first with a shear rate of a thirtieth of the collision rate."""
+    gamma = float(hd.collision_rate(hd.henderson(eta), 1.0, COUNT)) / 30
+    doubling = 2 / (viscosity(eta) * gamma**2)
+    edge = sqrt(COUNT * pi / 4 / eta)
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
+                species={"name": "gas", "count": COUNT, "radius": 0.5, "exact_temperature": 1.0,
+                         "temperature": 1.0},
+                stop={"time": doubling},
+                output={"observables_every_time": doubling / 20},
+            )
+        )
+        for seed in range(1, 25)
+    )  # fmt: skip
+
+
+def viscosity(eta: float) -> float:
+    """Enskog's, over the mass density, at T = 1."""
+    return float(hd.enskog_viscosity(hd.simulated(eta), eta, 1.0))
+
+
+def heated_by_shear(eta: float) -> Callable[[Run], float]:
+    """Growth of the root of T over that by Enskog's viscosity.
+
+    n dT/dt = (viscosity) gamma^2, and the viscosity is as the root of T: that grows evenly.
+    """
+
+    def measure(run: Run) -> float:
+        time, kt = run.observable("all/temperature")
+        growth = (sqrt(kt[-1]) - sqrt(kt[0])) / time[-1]
+        return growth * 2 / (viscosity(eta) * run.shear_rate**2)
+
+    return measure
+
+
+# --- a dilute inelastic gas: shear heats it as fast as collisions cool it ---
+
+GRAINS, ETA = 1000, 0.0025
+FREQUENCY = 2 * sqrt(pi) * 4 * ETA / pi  # the unit of rates at T = 1
+
+
+def steady(xi: float) -> tuple[Member, ...]:
+    """With the shear rate that the theory has for T = 1."""
+    edge = sqrt(GRAINS * pi / 4 / ETA)
+    gamma = sheared_grains(xi)[0] * FREQUENCY
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
+                species={"name": "grains", "count": GRAINS, "radius": 0.5, "temperature": 1.0},
+                contact={"restitution": xi},
+                stop={"collisions_per_disk": 250},
+                output={"frames_every_collisions_per_disk": 1.0,
+                        "observables_every_collisions_per_disk": 1.0},
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def of_steady_shear(run: Run) -> list[float]:
+    """Shear rate, -P_xy and P_yy in the units of the theory, after 50 collisions per disk.
+
+    Disks alone carry the stress: what collisions hand on is of the order of the packing.
+    """
+    late = slice(50, None)
+    place, v = run.position[late], run.velocity[late]
+    v[..., 0] -= run.shear_rate * (place[..., 1] - run.lower[1] - run.edges[1] / 2)
+    kt = np.mean(v**2)
+    return [
+        run.shear_rate / (FREQUENCY * sqrt(kt)),
+        -np.mean(v[..., 0] * v[..., 1]) / kt,
+        np.mean(v[..., 1] ** 2) / kt,
+    ]
+
+
+# --- a gas between two walls: heat and momentum that pass from one to the other ---
+
+BETWEEN, CELLS = 800, 20
+
+
+def between(eta: float, temperatures: tuple[float, float], speed: float) -> tuple[Member, ...]:
+    """Thermal walls on the left and the right; they slide in opposite directions."""
+    edge = sqrt(BETWEEN * pi / 4 / eta / 2)
+    return tuple(
+        Member(
+            namelist(
+                run={"seed": seed},
+                box={"upper": (2 * edge, edge), "boundary": ("wall", "periodic")},
+                side=[
+                    {"name": name, "temperature": kt, "speed": u}
+                    for name, kt, u in zip(
+                        ("left", "right"), temperatures, (-speed, speed), strict=True
+                    )
+                ],
+                species={"name": "gas", "count": BETWEEN, "radius": 0.5,
+                         "temperature": sum(temperatures) / 2},
+                stop={"time": 4000},
+                output={"frames_every_time": 4, "observables_every_time": 4},
+            )
+        )
+        for seed in range(1, 9)
+    )  # fmt: skip
+
+
+def drop(name: str, column: int) -> Callable[[Run], float]:
+    """How much a field changes over the middle half of the box, over what the fluxes say."""
+
+    def measure(run: Run) -> float:
+        found = estimates([run], None, (CELLS, 1))
+        x = run.lower[0] + (np.arange(CELLS) + 0.5) * run.edges[0] / CELLS
+        law, _ = prediction([run], 0, None, x, found)
+        half = slice(CELLS // 4, -CELLS // 4)
+        slopes = [np.polyfit(x[half], y[half], 1)[0] for y in (found[name].mean, law[:, column])]
+        return float(slopes[0] / slopes[1])
+
+    return measure
+
+
+CASES = [
+    *[
+        Case(
+            "P15-09", f"sheared gas, packing {eta}: heating over that by Enskog's viscosity",
+            heating(eta), over(heated_by_shear(eta)), 1, sigmas(4, 0.05), "D",
+        )
+        for eta in (0.05, 0.2)
+    ],
+    *[
+        Case(
+            "P15-09", f"sheared grains, xi = {xi}: shear rate, -P_xy, P_yy, reduced",
+            steady(xi), over(of_steady_shear), sheared_grains(xi), relative(0.05),
+            "Santos, Garzo and Dufty 2004",
+        )
+        for xi in (0.95, 0.8)
+    ],
+    Case(
+        "P15-10", "gas between walls at T = 4, 1: slope of T over that by Enskog's conductivity",
+        between(0.2, (4.0, 1.0), 0.0), over(drop("temperature", 1)), 1, sigmas(4, 0.05), "D",
+    ),
+    Case(
+        "P15-10", "gas between sliding walls: slope of the flow over that by Enskog's viscosity",
+        between(0.2, (1.0, 1.0), 1.5), over(drop("flow_y", 0)), 1, sigmas(4, 0.05), "D",
+    ),
+]  # fmt: skip
