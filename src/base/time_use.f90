@@ -7,16 +7,16 @@ module time_use
   use system, only: seconds
   implicit none
   private
-  public :: begin_time_use, note_busy, spend_time_on, time_use_report
+  public :: begin_time_use, spend_time_on, time_use_report
 
   integer, parameter, public :: part_start = 1, part_events = 2, part_epochs = 3, part_cuts = 4, part_filling = 5, &
     part_refreshing = 6, part_domains = 7, part_verifying = 8, part_gathering = 9, part_merging = 10, part_samples = 11, &
-    part_end = 12
-  integer, parameter :: n_parts = 12
+    part_end = 12, part_waiting = 13
+  integer, parameter :: n_parts = 13
   character(len=*), parameter :: names(n_parts) = [character(len=38) :: "start: reading, placing, checking", &
     "events, on one core", "epochs: sorting disks, predicting", "cutting the box", "* filling domains", &
     "* taking over copies", "* events in domains", "* comparing copies", "* gathering disks", "merging collisions", &
-    "samples, checkpoints", "end of the output"]
+    "samples, checkpoints", "end of the output", "waiting for other threads"]
   character(len=*), parameter :: entry = "(a,f10.3,"" s"",f7.1,"" %"")"
   integer, parameter :: cores(4) = [4, 8, 16, 64]
 
@@ -24,7 +24,6 @@ module time_use
   integer :: part = part_start
   real(real64) :: since = 0.0_real64               !! when the present part began [s]
   real(real64) :: spent(n_parts) = 0.0_real64      !! on each part [s]
-  real(real64) :: busy = 0.0_real64                !! with events in domains, all threads together [s]
 
 contains
 
@@ -50,35 +49,25 @@ contains
     part = next
   end subroutine spend_time_on
 
-  !> Notes how long threads were busy with events in domains.
-  subroutine note_busy(time)
-    real(real64), intent(in) :: time               !! all threads together [s]
-
-    busy = busy + time
-  end subroutine note_busy
-
-  !> A line for each part that took any time; how long the threads waited for each other, on average; and how many times
-  !> faster than one core more cores can be, if they share the work of the parts with a star and one of them does the rest
-  !> (Amdahl, AFIPS Conf. Proc. 30, 483 (1967)). Empty if nothing was measured.
+  !> A line for each part that took the main thread any time; and how many times faster than one core more cores can be, if
+  !> they share the work of the parts with a star and one of them does the rest, but for waiting (Amdahl, AFIPS Conf. Proc.
+  !> 30, 483 (1967)). Empty if nothing was measured.
   function time_use_report(threads) result(text)
     integer, intent(in) :: threads
     character(len=:), allocatable :: text
     character(len=100) :: line
-    real(real64) :: whole, waiting, alone, shared
+    real(real64) :: alone, shared
     integer :: k
 
     text = ""
     if (.not. measured) return
     call spend_time_on(part)
-    whole = sum(spent)
     do k = 1, n_parts
       if (spent(k) > 0) call add(names(k), spent(k))
     end do
-    if (.not. busy > 0) return
-    waiting = spent(part_domains) - busy/threads
-    call add("waiting, of the events in domains", waiting)
-    alone = sum(spent, mask=names(:) (1:1) /= "*")
-    shared = threads*(whole - alone - waiting)
+    if (.not. spent(part_domains) > 0) return
+    shared = threads*sum(spent, mask=names(:) (1:1) == "*")
+    alone = sum(spent, mask=names(:) (1:1) /= "*") - spent(part_waiting)
     write (line, "(a,*(i0,"": "",f0.2,:,"",  ""))") "cores and the best that they can gain: ", &
       (cores(k), (alone + shared)/(alone + shared/cores(k)), k=1, size(cores))
     text = text//trim(line)
@@ -88,7 +77,7 @@ contains
       character(len=*), intent(in) :: name
       real(real64), intent(in) :: time             !! [s]
 
-      write (line, entry) [character(len=len(names)) :: name], time, 100*time/whole
+      write (line, entry) [character(len=len(names)) :: name], time, 100*time/sum(spent)
       text = text//trim(line)//new_line("a")
     end subroutine add
   end function time_use_report

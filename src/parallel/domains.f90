@@ -46,7 +46,6 @@ module domains
     integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
     type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
     integer(int64) :: turns = 0                    !! of the engine, in this window
-    real(real64) :: busy = 0.0_real64              !! how long its engine has been at work in this stride [s]
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
     integer(int32) :: n_news = 0
@@ -230,7 +229,6 @@ contains
     integer(int64) :: left
 
     self%done = .false.
-    self%busy = 0
     if (.not. self%good) return                    ! there was no room for all copies
     began = seconds()
     limits%time = t_end
@@ -247,7 +245,6 @@ contains
       if (seconds() - began > longest_window) exit
     end do
     self%turns = self%turns + turns - left
-    self%busy = seconds() - began
   end subroutine move_on
 
   !> The next event.

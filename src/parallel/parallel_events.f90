@@ -13,13 +13,11 @@ module parallel_events
   use evolution, only: evolution_t, limits_t
   use partition, only: partition_t
   use simulation_state, only: simulation_t
-  use system, only: seconds
   use time_use, only: part_epochs, part_events, part_merging, spend_time_on
   implicit none
   private
   public :: parallel_events_t
 
-  real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
   integer, parameter :: most_windows = 24                      !! of a visit
   real(real64), parameter :: shortest = 0.1_real64             !! window to be tried, in usual ones
   !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
@@ -190,11 +188,10 @@ contains
     type(limits_t), intent(in) :: goal             !! its time counts since the epoch
     integer, intent(out) :: outcome
     type(event_log_t) :: merged
-    real(real64) :: began, t
+    real(real64) :: t
     integer :: windows
     logical :: good
 
-    began = seconds()
     outcome = left_alone
     if (self%holder /= all_domains) then
       if (allocated(self%engine)) deallocate (self%engine)
@@ -207,12 +204,8 @@ contains
       self%holder = all_domains
     end if
     t = sim%now
-    do windows = 1, self%patience
-      call self%parts%run_window(sim, goal, t, good)
-      if (.not. good .or. .not. t < goal%time .or. .not. self%parts%left(sim, goal) > 0) exit
-      if (seconds() - began > longest_visit) exit
-    end do
-    self%windows_done = self%windows_done + min(windows, self%patience)
+    call self%parts%run_windows(sim, goal, self%patience, t, windows, good)
+    self%windows_done = self%windows_done + windows
     call spend_time_on(part_merging)
     if (good .and. self%log%is_on()) call merge_logs(self%parts%domain, merged, good)
     call self%conclude(sim, good, outcome)

@@ -3,6 +3,7 @@
 !> and have to be filled again.
 module partition
   use kinds, only: int16, int32, int64, real64
+  use barrier, only: barrier_t, close_barrier, is_last_at, join, open_barrier, release
   use cell_faces, only: patch_t
   use cell_grid, only: whole_box
   use domain_borders, only: refresh, verify
@@ -11,13 +12,15 @@ module partition
   use evolution, only: limits_t
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
+  use system, only: seconds
   use tally, only: tally_t
-  use time_use, only: note_busy, part_cuts, part_domains, part_filling, part_gathering, part_refreshing, part_verifying, &
+  use time_use, only: part_cuts, part_domains, part_filling, part_gathering, part_refreshing, part_verifying, part_waiting, &
     spend_time_on
   implicit none
   private
   public :: partition_t
 
+  real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
   real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken one by one
 
   !> How fast things happen, as far as it is known.
@@ -27,6 +30,20 @@ module partition
   contains
     procedure :: learn
   end type pace_t
+
+  !> What all threads do next: one of them decides while the others wait.
+  type :: plan_t
+    logical :: goes_on = .true.
+    integer :: windows = 0, most = 0               !! begun, and allowed
+    real(real64) :: until = 0.0_real64             !! by the clock, for another to begin [s]
+    real(real64) :: t_begin = 0.0_real64, t_end = 0.0_real64   !! of the window, since the epoch [time]
+    integer(int64) :: events = 0                   !! in the domains when it began
+    logical :: begins = .false.                    !! domains take over what came of the window before
+    logical :: moves = .false.                     !! domains go on to a time
+    real(real64) :: t = 0.0_real64                 !! this one, since the epoch [time]
+    integer(int64) :: turns = 0                    !! of an engine, at most, on the way
+    logical :: good = .true.                       !! the window holds
+  end type plan_t
 
   type :: partition_t
     integer(int32) :: threads = 1
@@ -41,15 +58,18 @@ module partition
     integer(int32) :: widening = 0                 !! of the halo, after failures
   contains
     procedure :: fill
-    procedure :: run_window
+    procedure :: run_windows
     procedure :: tally_now
     procedure :: left
     procedure :: is_past
     procedure :: gather_all
     procedure, private :: window_end
     procedure, private :: expected
-    procedure, private :: stride
+    procedure, private :: begin_window
+    procedure, private :: follow_window
+    procedure, private :: aim
     procedure, private :: step
+    procedure, private :: end_window
   end type partition_t
 
 contains
@@ -156,80 +176,154 @@ contains
       real(goal%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
   end function left
 
-  !> Runs one window in all domains, which first take over what came of the one before. It ends early at the limit of a
-  !> count. `good`: it holds.
-  subroutine run_window(self, sim, goal, t, good)
+  !> Runs windows in all domains, one after the other, for as long as they hold, until the goal is reached or the caller has
+  !> waited long enough. A window ends early at the limit of a count. `good`: all of them hold.
+  !>
+  !> A thread waits for the others twice in each window: before it compares what they hold, and before it changes what
+  !> they compare.
+  subroutine run_windows(self, sim, goal, most, t, windows, good)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    integer, intent(in) :: most                    !! windows
     real(real64), intent(inout) :: t               !! since the epoch [time]
+    integer, intent(out) :: windows                !! begun
     logical, intent(out) :: good
-    integer(int64) :: events
+    type(plan_t) :: plan
+    type(barrier_t) :: barrier
     integer(int32) :: k
-    real(real64) :: t_begin, t_end
 
-    events = sum(self%domain%sim%tally%events)
-    t_begin = t
-    t_end = self%window_end(sim, t, goal%time)
-    call spend_time_on(part_refreshing)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads)
-    do k = 1, self%cuts%n
-      call refresh(self%domain(k))
+    plan%most = most
+    plan%until = seconds() + longest_visit
+    call self%begin_window(sim, goal, t, plan)
+    call open_barrier(barrier)
+    !$omp parallel num_threads(self%threads) private(k)
+    call join(barrier)
+    !$omp barrier
+    do while (plan%goes_on)
+      call turn_to(merge(part_refreshing, part_domains, plan%begins))
+      !$omp do schedule(static, 1)
+      do k = 1, self%cuts%n
+        if (plan%begins) call refresh(self%domain(k))
+        if (plan%moves) call move_on(self%domain(k), plan%t, plan%turns)
+      end do
+      !$omp end do nowait
+      call turn_to(part_waiting)
+      if (is_last_at(barrier)) then
+        call self%follow_window(sim, goal, plan)
+        call release(barrier)
+      end if
+      !$omp flush
+      if (plan%moves) cycle
+      call turn_to(part_verifying)
+      !$omp do schedule(static, 1)
+      do k = 1, self%cuts%n
+        call verify(self%domain, k)
+      end do
+      !$omp end do nowait
+      call turn_to(part_waiting)
+      if (is_last_at(barrier)) then
+        call self%end_window(sim, goal, plan)
+        call release(barrier)
+      end if
+      !$omp flush
     end do
-    !$omp end parallel do
-    call spend_time_on(part_domains)
+    !$omp end parallel
+    call close_barrier(barrier)
+    t = plan%t
+    windows = plan%windows
+    good = plan%good
+  contains
+
+    !> The main thread tells what it does now.
+    subroutine turn_to(part)
+      integer, intent(in) :: part
+
+      !$omp master
+      call spend_time_on(part)
+      !$omp end master
+    end subroutine turn_to
+  end subroutine run_windows
+
+  !> Plans the window that begins now.
+  subroutine begin_window(self, sim, goal, t, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    real(real64), intent(in) :: t                  !! since the epoch [time]
+    type(plan_t), intent(inout) :: plan
+
+    plan%windows = plan%windows + 1
+    plan%t_begin = t
+    plan%t = t
+    plan%t_end = self%window_end(sim, t, goal%time)
+    plan%events = sum(self%domain%sim%tally%events)
+    plan%begins = .true.
     self%domain%turns = 0
+    call self%aim(sim, goal, plan)
+  end subroutine begin_window
+
+  !> Plans how the window goes on, and takes single events where a count is near its limit.
+  subroutine follow_window(self, sim, goal, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    type(plan_t), intent(inout) :: plan
+    logical :: stepped
+
+    stepped = .not. plan%moves
+    plan%begins = .false.
     do
-      call self%stride(sim, goal, t, t_end)
-      good = all(self%domain%done)
-      if (.not. (good .and. t < t_end .and. self%left(sim, goal) > 0)) exit
+      if (stepped) call self%step(plan%t, plan%t_end)
+      plan%moves = .false.
+      if (.not. (all(self%domain%done) .and. plan%t < plan%t_end .and. self%left(sim, goal) > 0)) exit
       if (stop_requested()) exit
+      call self%aim(sim, goal, plan)
+      if (plan%moves) exit
+      stepped = .true.
     end do
-    call spend_time_on(part_verifying)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads)
-    do k = 1, self%cuts%n
-      call verify(self%domain, k)
-    end do
-    !$omp end parallel do
-    good = good .and. all(self%domain%good) .and. self%left(sim, goal) >= 0     ! else several at the last moment
-    if (good) then
-      call self%pace%learn(sum(self%domain%sim%tally%events) - events, sum(self%domain%turns), t - t_begin)
+  end subroutine follow_window
+
+  !> Where all domains go next: to the end of the window unless a count would pass its limit, then most of the way there.
+  !> If it is too near for that they do not move together any more, but from event to event. However wrong the guess of
+  !> the pace, no engine takes more than some turns.
+  subroutine aim(self, sim, goal, plan)
+    class(partition_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: goal
+    type(plan_t), intent(inout) :: plan
+    real(real64) :: expected, sure
+
+    expected = self%expected(plan%t_end - plan%t)
+    plan%turns = int(min(self%overload*self%pace%turns*expected, 1.0e15_real64), int64)
+    sure = self%left(sim, goal)
+    plan%moves = .true.
+    if (sure > expected) then
+      plan%t = plan%t_end
+    else
+      sure = 0.9_real64*sure - 5*sqrt(sure)
+      plan%moves = .not. sure < few_events
+      if (plan%moves) plan%t = min(plan%t_end, plan%t + sure/self%pace%events)
+    end if
+  end subroutine aim
+
+  !> Whether the window that has been compared holds, and whether another one begins.
+  subroutine end_window(self, sim, goal, plan)
+    class(partition_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    type(plan_t), intent(inout) :: plan
+
+    plan%good = all(self%domain%done) .and. all(self%domain%good) .and. self%left(sim, goal) >= 0  ! else several at the last
+    if (plan%good) then                                                                            ! moment
+      call self%pace%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
     else
       self%widening = min(self%widening + 2, self%halo)
     end if
-  end subroutine run_window
-
-  !> Lets all domains go on, to the end of the window unless a count would pass its limit: then most of the way there and,
-  !> in the end, from event to event. However wrong the guess of the pace, no engine takes more than some turns.
-  subroutine stride(self, sim, goal, t, t_end)
-    class(partition_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: goal
-    real(real64), intent(inout) :: t               !! since the epoch [time]
-    real(real64), intent(in) :: t_end              !! likewise
-    integer(int64) :: turns
-    integer(int32) :: k
-    real(real64) :: sure
-
-    turns = int(min(self%overload*self%pace%turns*self%expected(t_end - t), 1.0e15_real64), int64)
-    sure = self%left(sim, goal)
-    if (sure > self%expected(t_end - t)) then
-      t = t_end
-    else
-      sure = 0.9_real64*sure - 5*sqrt(sure)
-      if (sure < few_events) then
-        call self%step(t, t_end)
-        return
-      end if
-      t = min(t_end, t + sure/self%pace%events)
-    end if
-    !$omp parallel do schedule(static, 1) num_threads(self%threads)
-    do k = 1, self%cuts%n
-      call move_on(self%domain(k), t, turns)
-    end do
-    !$omp end parallel do
-    call note_busy(sum(self%domain%busy))
-  end subroutine stride
+    plan%goes_on = plan%good .and. plan%windows < plan%most .and. plan%t < goal%time .and. self%left(sim, goal) > 0 &
+      .and. seconds() < plan%until
+    if (plan%goes_on) call self%begin_window(sim, goal, plan%t, plan)
+  end subroutine end_window
 
   !> Takes the next event, in the domains that expect it, or else goes to the end of the window: of simultaneous events
   !> only the one that the plain engine takes first.

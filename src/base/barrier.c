@@ -1,0 +1,83 @@
+/* A barrier for threads that wait for each other many times in a thousandth of a second, on cores that other programs may
+   want as well. Whoever waits spins if it had to wait only briefly of late, and else sleeps: idle cores lose no time, and
+   on busy ones no thread uses up its share of the processor by waiting for another that has none. OpenMP's own barriers
+   spin for thousandths of a second each time, or never, as the environment says before the program begins.
+   The interfaces are in barrier.f90. */
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <string.h>
+
+double system_seconds(void);
+
+struct barrier {
+    atomic_int threads; /* that take part */
+    atomic_int arrived; /* of these, in this round */
+    atomic_int round;
+    pthread_mutex_t lock;
+    pthread_cond_t released;
+};
+_Static_assert(sizeof(struct barrier) <= 256, "barrier_t in barrier.f90 keeps 256 bytes for it");
+
+static const double longest_spin = 100e-6; /* [s] */
+
+static _Thread_local double usual_wait; /* of this thread [s] */
+
+void barrier_open(struct barrier *self)
+{
+    memset(self, 0, sizeof *self);
+    pthread_mutex_init(&self->lock, NULL);
+    pthread_cond_init(&self->released, NULL);
+}
+
+void barrier_close(struct barrier *self)
+{
+    pthread_cond_destroy(&self->released);
+    pthread_mutex_destroy(&self->lock);
+}
+
+void barrier_join(struct barrier *self) { self->threads++; }
+
+static inline void relax(void)
+{
+#if defined __x86_64__ || defined __i386__
+    __builtin_ia32_pause();
+#elif defined __aarch64__
+    __asm__ volatile("yield");
+#endif
+}
+
+static void wait_for_release(struct barrier *self, int round)
+{
+    const double began = system_seconds();
+    double waited = 0;
+    for (int k = 0; usual_wait < longest_spin && waited < longest_spin && self->round == round; k++) {
+        relax();
+        if (k%32 == 31) waited = system_seconds() - began;
+    }
+    if (self->round == round) {
+        pthread_mutex_lock(&self->lock);
+        while (self->round == round) pthread_cond_wait(&self->released, &self->lock);
+        pthread_mutex_unlock(&self->lock);
+    }
+    waited = system_seconds() - began;
+    usual_wait += ((waited < 2*longest_spin ? waited : 2*longest_spin) - usual_wait)/8;
+}
+
+/* The last one to arrive learns that, at once; the others wait until it releases them. */
+bool barrier_arrive(struct barrier *self)
+{
+    const int round = self->round;
+    if (++self->arrived == self->threads) return true;
+    wait_for_release(self, round);
+    return false;
+}
+
+void barrier_release(struct barrier *self)
+{
+    self->arrived = 0;
+    pthread_mutex_lock(&self->lock);
+    self->round++;
+    pthread_mutex_unlock(&self->lock);
+    pthread_cond_broadcast(&self->released); /* now, so that nobody wakes up only to wait for the lock */
+}

@@ -1,0 +1,48 @@
+!> Where threads wait for each other, and one of them does something for all before they go on. How they wait is in
+!> `barrier.c`.
+module barrier
+  use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
+  implicit none
+  private
+  public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
+
+  !> Not to be copied while threads use it.
+  type, bind(C) :: barrier_t
+    integer(c_int64_t) :: storage(32)
+  end type barrier_t
+
+  interface
+    !> Makes a barrier for threads that are still to join.
+    subroutine open_barrier(barrier) bind(C, name="barrier_open")
+      import :: barrier_t
+      type(barrier_t), intent(out) :: barrier
+    end subroutine open_barrier
+
+    !> The thread that calls is one of those that wait for each other: each joins once, before any waits.
+    subroutine join(barrier) bind(C, name="barrier_join")
+      import :: barrier_t
+      type(barrier_t), intent(inout) :: barrier
+    end subroutine join
+
+    !> Waits until all have come and the last of them has released the others. That one does not wait: it is told, and
+    !> does what is to be done for all before it releases them.
+    function is_last_at(barrier) result(yes) bind(C, name="barrier_arrive")
+      import :: barrier_t, c_bool
+      type(barrier_t), intent(inout) :: barrier
+      logical(c_bool) :: yes
+    end function is_last_at
+
+    !> Lets the others go on, who find what this thread has written.
+    subroutine release(barrier) bind(C, name="barrier_release")
+      import :: barrier_t
+      type(barrier_t), intent(inout) :: barrier
+    end subroutine release
+
+    !> Takes the barrier away, when nobody waits any more.
+    subroutine close_barrier(barrier) bind(C, name="barrier_close")
+      import :: barrier_t
+      type(barrier_t), intent(inout) :: barrier
+    end subroutine close_barrier
+  end interface
+
+end module barrier
