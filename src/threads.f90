@@ -6,6 +6,7 @@ module threads
   use parameters, only: most_threads
   use settings, only: settings_t
   use system, only: cores_of_process, startable_threads
+  use team, only: make_team
   use texts, only: counted, written
   implicit none
   private
@@ -19,6 +20,7 @@ contains
     character(len=:), allocatable, intent(out) :: warning  !! of what the user may not have meant; empty if there is nothing
     character(len=:), allocatable :: name
     integer :: wanted, cores
+    logical :: roomy
     type(parallel_events_t) :: usual
 
     call ask(settings%run%threads, name)
@@ -30,16 +32,17 @@ contains
       wanted = min(threads, usual%most_domains(int(settings%n_disks()), settings%box%periodic))
       if (.not. settings%wants_domains()) wanted = 1
       threads = max(wanted, 1)
-      if (wanted < 2) return
-      if (room_for_domains(settings)) then
+      roomy = room_for_domains(settings)
+      if (wanted > 1 .and. .not. roomy) then
+        threads = 1
+        warning = name//": there is not enough memory for "//written(wanted)//" threads; the run goes on with one"
+      else if (wanted > 1) then
         threads = threads_had(startable_threads(wanted, bytes_needed(settings, .true.)))
         if (threads < wanted) warning = name//": a limit on processes, threads or address space lets only " &
           //written(threads)//" of "//written(wanted)//" threads start; the run goes on with "//written(threads)
-      else
-        threads = 1
-        warning = name//": there is not enough memory for "//written(wanted)//" threads; the run goes on with one"
       end if
     end associate
+    call make_team(settings%run%threads)
   end subroutine start_threads
 
   !> How many threads are asked for, and where: in the input, or in the environment. Else it is one.

@@ -10,12 +10,12 @@ module time_use
   public :: begin_time_use, spend_time_on, time_use_report
 
   integer, parameter, public :: part_start = 1, part_events = 2, part_epochs = 3, part_cuts = 4, part_filling = 5, &
-    part_refreshing = 6, part_domains = 7, part_verifying = 8, part_gathering = 9, part_merging = 10, part_samples = 11, &
-    part_end = 12, part_waiting = 13
-  integer, parameter :: n_parts = 13
+    part_domains = 6, part_verifying = 7, part_gathering = 8, part_merging = 9, part_samples = 10, part_end = 11, &
+    part_waiting = 12
+  integer, parameter :: n_parts = 12
   character(len=*), parameter :: names(n_parts) = [character(len=38) :: "start: reading, placing, checking", &
     "events, on one core", "epochs: sorting disks, predicting", "cutting the box", "* filling domains", &
-    "* taking over copies", "* events in domains", "* comparing copies", "* gathering disks", "merging collisions", &
+    "* events in domains", "* comparing copies", "* gathering disks", "merging collisions", &
     "samples, checkpoints", "end of the output", "waiting for other threads"]
   character(len=*), parameter :: entry = "(a,f10.3,"" s"",f7.1,"" %"")"
   integer, parameter :: cores(4) = [4, 8, 16, 64]

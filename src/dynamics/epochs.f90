@@ -1,7 +1,6 @@
 !> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
 !> to go on from it agree.
 module epochs
-  use disks, only: columns, n_columns
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
@@ -79,7 +78,6 @@ contains
   subroutine move_epoch(sim)
     type(simulation_t), intent(inout) :: sim
     real(real64) :: shift, length
-    integer :: k
 
     if (sim%now - sim%last_advance >= sim%blink) then
       sim%last_advance = sim%now
@@ -89,13 +87,7 @@ contains
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
-    do k = 1, n_columns
-      if (columns(k)%is_moment .and. sim%has_column(k)) call sim%take_values(k, sim%values_of(k) - shift)
-    end do
-    sim%disk%stamp = 0
-    sim%now = sim%now - shift
-    sim%epoch = sim%epoch + shift
-    sim%last_advance = sim%last_advance - shift
+    call sim%move_origin(shift)
     call begin_epoch(sim, length)
   end subroutine move_epoch
 

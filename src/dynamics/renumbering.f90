@@ -4,6 +4,7 @@ module renumbering
   use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
+  use team, only: team_size
   implicit none
   private
   public :: renumber
@@ -17,42 +18,117 @@ contains
   !> and queue; `tag%id` keeps the order of the input.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), allocatable :: first(:), place(:), cell(:)
-    integer(int32) :: n(2), c(2), i, k
+    integer(int32), allocatable :: order(:)
 
-    n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
-    n = tile*((n + tile - 1)/tile)
-    allocate (place(sim%n_disks()), cell(sim%n_disks()))
-    do i = 1, sim%n_disks()
-      c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*n, 0.0_real64), n - 1.0_real64), int32)
-      cell(i) = 1 + tile**2*dot_product(c/tile, [1, n(1)/tile]) + dot_product(modulo(c, tile), [1, tile])
-    end do
-    call sort_by_count(cell, product(n), first, place)
-    deallocate (cell, first)
-    do i = 1, sim%n_disks()
-      do while (place(i) /= i)
-        call swap(sim, i, place(i))
-        k = place(i)
-        place(i) = place(k)
-        place(k) = k
-      end do
-    end do
+    call sort_by_cells(sim, order)
+    if (team_size() > 1) then
+      call copy_in_order(sim, order)
+    else
+      call move_in_order(sim, order)
+    end if
   end subroutine renumber
 
-  !> Lets the disks i and k trade places: no second copy of all disks is needed, and most are near already.
-  pure subroutine swap(sim, i, k)
+  !> The order of the disks by cells: by tiles first, then by cells in each tile. Those of one cell keep their order.
+  subroutine sort_by_cells(sim, order)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), allocatable, intent(out) :: order(:)   !! (n) the disk that comes to each place
+    integer(int32), allocatable :: first(:), place(:), cell(:)
+    integer(int32) :: n(2), c(2), i
+
+    n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
+    n = (n + tile - 1)/tile                       ! tiles
+    allocate (order(sim%n_disks()), place(sim%n_disks()), cell(sim%n_disks()))
+    !$omp parallel do private(c)
+    do i = 1, sim%n_disks()
+      c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*tile*n, 0.0_real64), tile*n - 1.0_real64), int32)
+      cell(i) = tile**2*dot_product(c/tile, [1, n(1)]) + dot_product(modulo(c, tile), [1, tile])
+    end do
+    !$omp end parallel do
+    call sort_by_count(cell/tile**2 + 1, product(n), first, place)
+    !$omp parallel do
+    do i = 1, sim%n_disks()
+      order(place(i)) = i
+    end do
+    !$omp end parallel do
+    !$omp parallel do schedule(static)
+    do i = 1, product(n)
+      call sort_tile(cell, order(first(i):first(i + 1) - 1))
+    end do
+    !$omp end parallel do
+  end subroutine sort_by_cells
+
+  !> Sorts the disks of one tile by their cells.
+  subroutine sort_tile(cell, order)
+    integer(int32), intent(in) :: cell(:)         !! (disks) counted from 0, tile by tile
+    integer(int32), intent(inout) :: order(:)     !! numbers of the disks in the tile
+    integer(int32), allocatable :: first(:)
+    integer(int32) :: place(size(order))
+
+    call sort_by_count(modulo(cell(order), tile**2) + 1, tile**2, first, place)
+    order(place) = order
+  end subroutine sort_tile
+
+  !> Lets the disks take their places: no second copy of them is needed, and most are near already.
+  subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, k
+    integer(int32), intent(inout) :: order(:)     !! as in `sort_by_cells`; afterwards each is at its place
     type(disk_t) :: disk
     type(tag_t) :: tag
+    real(real64) :: extra(size(sim%extra, 1))
+    integer(int32) :: start, to, from
 
-    disk = sim%disk(i)
-    sim%disk(i) = sim%disk(k)
-    sim%disk(k) = disk
-    tag = sim%tag(i)
-    sim%tag(i) = sim%tag(k)
-    sim%tag(k) = tag
-    if (size(sim%extra) > 0) sim%extra(:, [i, k]) = sim%extra(:, [k, i])
-  end subroutine swap
+    do start = 1, sim%n_disks()
+      if (order(start) == start) cycle
+      disk = sim%disk(start)
+      tag = sim%tag(start)
+      extra = sim%extra(:, start)
+      to = start
+      do
+        from = order(to)
+        order(to) = to
+        if (from == start) exit
+        sim%disk(to) = sim%disk(from)
+        sim%tag(to) = sim%tag(from)
+        sim%extra(:, to) = sim%extra(:, from)
+        to = from
+      end do
+      sim%disk(to) = disk
+      sim%tag(to) = tag
+      sim%extra(:, to) = extra
+    end do
+  end subroutine move_in_order
+
+  !> The same by several threads, for which there is memory where there are several.
+  subroutine copy_in_order(sim, order)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: order(:)        !! as in `sort_by_cells`
+    type(disk_t), allocatable :: disk(:)
+    type(tag_t), allocatable :: tag(:)
+    real(real64), allocatable :: extra(:, :)
+    integer(int32) :: k
+
+    allocate (disk(sim%n_disks()))
+    !$omp parallel do
+    do k = 1, sim%n_disks()
+      disk(k) = sim%disk(order(k))
+    end do
+    !$omp end parallel do
+    call move_alloc(disk, sim%disk)
+    allocate (tag(sim%n_disks()))
+    !$omp parallel do
+    do k = 1, sim%n_disks()
+      tag(k) = sim%tag(order(k))
+    end do
+    !$omp end parallel do
+    call move_alloc(tag, sim%tag)
+    if (size(sim%extra) == 0) return
+    allocate (extra, mold=sim%extra)
+    !$omp parallel do
+    do k = 1, sim%n_disks()
+      extra(:, k) = sim%extra(:, order(k))
+    end do
+    !$omp end parallel do
+    call move_alloc(extra, sim%extra)
+  end subroutine copy_in_order
 
 end module renumbering

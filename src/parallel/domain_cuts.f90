@@ -45,18 +45,21 @@ contains
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
     allocate (weight(whole%n(1)), weights(whole%n(2), n(1)), source=0_int32)
+    !$omp parallel do reduction(+:weight) num_threads(threads)
     do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
+    !$omp end parallel do
     call divide(weight, n(1), 2*halo + 1, slabs)
     do s = 1, n(1)
       self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
     end do
+    !$omp parallel do private(s) reduction(+:weights) num_threads(threads)
     do i = 1, size(cell, 2, kind=int32)
-      associate (w => weights(cell(2, i), self%slab_of(cell(1, i))))
-        w = w + 1
-      end associate
+      s = self%slab_of(cell(1, i))
+      weights(cell(2, i), s) = weights(cell(2, i), s) + 1
     end do
+    !$omp end parallel do
     do s = 1, n(1)
       call divide(weights(:, s), n(2), 2*halo + 1, pieces)
       do r = 1, n(2)

@@ -2,7 +2,7 @@
 !> for copies of those around, up to the ends of a patch. There its world ends: who should come in is missing, and wrong
 !> histories creep inwards, until `domain_borders` puts them right.
 module domains
-  use kinds, only: int16, int32, int64, real64
+  use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
   use disks, only: disk_t, n_columns, n_fixed, tag_t
   use domain_grid, only: domain_grid_t, forever
@@ -66,29 +66,20 @@ module domains
 contains
 
   !> Fills a domain with the disks that are in its patch, and predicts their events.
-  subroutine load(self, sim, cell)
+  subroutine load(self, sim, disks)
     type(domain_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    integer(int16), intent(in) :: cell(:, :)       !! (2,disks) of the whole grid
-    logical :: column(self%patch%whole(1)), row(self%patch%whole(2))
+    integer(int32), intent(in) :: disks(:)         !! their numbers
     integer(int32) :: i, n, slots
 
-    column = [(modulo(i - self%patch%first(1), self%patch%whole(1)) < self%patch%n(1), i=1, self%patch%whole(1))]
-    row = [(modulo(i - self%patch%first(2), self%patch%whole(2)) < self%patch%n(2), i=1, self%patch%whole(2))]
-    n = 0
-    do i = 1, sim%n_disks()
-      if (column(cell(1, i)) .and. row(cell(2, i))) n = n + 1
-    end do
+    n = size(disks, kind=int32)
     call make_room(self, sim, n)
-    n = 0
-    do i = 1, sim%n_disks()
-      if (.not. (column(cell(1, i)) .and. row(cell(2, i)))) cycle
-      n = n + 1
-      self%sim%disk(n) = sim%disk(i)
-      self%sim%tag(n) = sim%tag(i)
-      self%home(n) = i
-      self%sim%extra(:, n) = sim%extra(:, i)
+    do i = 1, n
+      self%sim%disk(i) = sim%disk(disks(i))
+      self%sim%tag(i) = sim%tag(disks(i))
+      self%sim%extra(:, i) = sim%extra(:, disks(i))
     end do
+    self%home(:n) = disks
     slots = self%sim%n_disks()
     do i = n + 1, slots
       self%sim%disk(i) = disk_t(event_time=forever, partner=nothing)

@@ -3,9 +3,9 @@
 !> and have to be filled again.
 module partition
   use kinds, only: int16, int32, int64, real64
-  use barrier, only: barrier_t, close_barrier, is_last_at, join, open_barrier, release
   use cell_faces, only: patch_t
   use cell_grid, only: whole_box
+  use disk_tiles, only: disk_tiles_t
   use domain_borders, only: refresh, verify
   use domain_cuts, only: domain_cuts_t
   use domains, only: domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
@@ -14,7 +14,8 @@ module partition
   use simulation_state, only: simulation_t
   use system, only: seconds
   use tally, only: tally_t
-  use time_use, only: part_cuts, part_domains, part_filling, part_gathering, part_refreshing, part_verifying, part_waiting, &
+  use team, only: barrier_t, close_barrier, is_last_at, join, open_barrier, release
+  use time_use, only: part_cuts, part_domains, part_filling, part_gathering, part_verifying, part_waiting, &
     spend_time_on
   implicit none
   private
@@ -51,6 +52,7 @@ module partition
     real(real64) :: window = 0.5_real64            !! collisions per disk in a window
     integer(int32) :: halo = 6                     !! columns and rows of copies around a domain
     real(real64) :: overload = 4.0_real64          !! turns of an engine in a window, over what all should need together
+    type(patch_t) :: whole                         !! the cells of the box; they follow from what does not change in a run
     type(domain_cuts_t) :: cuts
     type(domain_t), allocatable :: domain(:)
     type(pace_t) :: pace
@@ -91,21 +93,22 @@ contains
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: log                     !! collisions are to be listed
     logical, intent(out) :: cut
-    type(patch_t) :: whole
     integer(int16), allocatable :: cell(:, :)
+    integer(int32), allocatable :: disks(:)
+    type(disk_tiles_t) :: tiles
     integer(int32) :: i, k
 
     call spend_time_on(part_cuts)
-    whole = whole_box(sim)
+    if (self%whole%small <= 0) self%whole = whole_box(sim)
     cut = .false.
-    if (whole%small < maxval(sim%disk%radius)) return
+    if (self%whole%small < maxval(sim%disk%radius)) return
     allocate (cell(2, sim%n_disks()))
     !$omp parallel do num_threads(self%threads)
     do i = 1, sim%n_disks()
-      cell(:, i) = int(whole%cell_at(sim%position(i)), int16)
+      cell(:, i) = int(self%whole%cell_at(sim%position(i)), int16)
     end do
     !$omp end parallel do
-    call self%cuts%cut(whole, sim%box%periodic, cell, self%wanted, self%threads, &
+    call self%cuts%cut(self%whole, sim%box%periodic, cell, self%wanted, self%threads, &
       self%halo + self%widening + merge(2, 0, self%wanted > self%threads))
     cut = self%cuts%n > 1
     if (.not. cut) return
@@ -115,7 +118,8 @@ contains
     if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
     if (.not. self%pace%events > 0) self%pace%events = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
     call spend_time_on(part_filling)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads)
+    call tiles%sort(self%whole%n, cell)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads) private(disks)
     do k = 1, self%cuts%n
       associate (domain => self%domain(k))
         domain%patch = self%cuts%patch_of(k, sim%box%periodic)
@@ -124,7 +128,8 @@ contains
         domain%high = self%cuts%high(:, k)
         domain%neighbour = self%cuts%neighbours_of(k, domain%patch)
         call keep_log(domain, log)
-        call load(domain, sim, cell)
+        call tiles%list(domain%patch, cell, disks)
+        call load(domain, sim, disks)
       end associate
     end do
     !$omp end parallel do
@@ -201,7 +206,7 @@ contains
     call join(barrier)
     !$omp barrier
     do while (plan%goes_on)
-      call turn_to(merge(part_refreshing, part_domains, plan%begins))
+      call turn_to(part_domains)
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
         if (plan%begins) call refresh(self%domain(k))
@@ -313,7 +318,9 @@ contains
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: goal             !! its time counts since the epoch
     type(plan_t), intent(inout) :: plan
+    real(real64) :: now                            ! [s]
 
+    now = seconds()
     plan%good = all(self%domain%done) .and. all(self%domain%good) .and. self%left(sim, goal) >= 0  ! else several at the last
     if (plan%good) then                                                                            ! moment
       call self%pace%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
@@ -321,7 +328,7 @@ contains
       self%widening = min(self%widening + 2, self%halo)
     end if
     plan%goes_on = plan%good .and. plan%windows < plan%most .and. plan%t < goal%time .and. self%left(sim, goal) > 0 &
-      .and. seconds() < plan%until
+      .and. now < plan%until
     if (plan%goes_on) call self%begin_window(sim, goal, plan%t, plan)
   end subroutine end_window
 

@@ -59,6 +59,7 @@ module simulation_state
     procedure :: values_of
     procedure :: values_now
     procedure :: take_values
+    procedure :: move_origin
     procedure :: position
     procedure :: velocity
     procedure :: spin
@@ -266,6 +267,26 @@ contains
       self%extra(self%extra_row(k), :) = values
     end select
   end subroutine take_values
+
+  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
+  subroutine move_origin(self, shift)
+    class(simulation_t), intent(inout) :: self
+    real(real64), intent(in) :: shift             !! [time]
+    integer, allocatable :: moments(:)            ! rows of `extra`
+    integer(int32) :: i
+
+    moments = pack(self%extra_row, self%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
+    !$omp parallel do
+    do i = 1, self%n_disks()
+      self%disk(i)%clock = self%disk(i)%clock - shift
+      self%disk(i)%stamp = 0
+      self%extra(moments, i) = self%extra(moments, i) - shift
+    end do
+    !$omp end parallel do
+    self%now = self%now - shift
+    self%epoch = self%epoch + shift
+    self%last_advance = self%last_advance - shift
+  end subroutine move_origin
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)

@@ -1,9 +1,11 @@
-!> Where threads wait for each other, and one of them does something for all before they go on. How they wait is in
-!> `barrier.c`.
-module barrier
+!> The threads of a run: how many share a loop, and where they wait for each other while one of them does something for all.
+!> How they wait is in `team.c`.
+module team
   use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
+!$ use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
+  public :: make_team, team_size
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
   !> Not to be copied while threads use it.
@@ -45,4 +47,21 @@ module barrier
     end subroutine close_barrier
   end interface
 
-end module barrier
+contains
+
+  !> From now on n threads share a loop, unless the loop says otherwise. Without OpenMP it is one.
+  subroutine make_team(n)
+    integer, intent(in) :: n
+
+!$ call omp_set_num_threads(n)
+  end subroutine make_team
+
+  !> How many threads share a loop.
+  function team_size() result(n)
+    integer :: n
+
+    n = 1
+!$ n = omp_get_max_threads()
+  end function team_size
+
+end module team

@@ -2,7 +2,7 @@
    want as well. Whoever waits spins if it had to wait only briefly of late, and else sleeps: idle cores lose no time, and
    on busy ones no thread uses up its share of the processor by waiting for another that has none. OpenMP's own barriers
    spin for thousandths of a second each time, or never, as the environment says before the program begins.
-   The interfaces are in barrier.f90. */
+   The interfaces are in team.f90. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -17,7 +17,7 @@ struct barrier {
     pthread_mutex_t lock;
     pthread_cond_t released;
 };
-_Static_assert(sizeof(struct barrier) <= 256, "barrier_t in barrier.f90 keeps 256 bytes for it");
+_Static_assert(sizeof(struct barrier) <= 256, "barrier_t in team.f90 keeps 256 bytes for it");
 
 static const double longest_spin = 100e-6; /* [s] */
 
