@@ -1,12 +1,12 @@
 !> Sorting by counting, for items with small integer keys such as cell numbers.
 module sorting
   use kinds, only: int32, int64
-  use team, only: team_size
+  use team, only: many, team_size
   implicit none
   private
   public :: sort_by_count
 
-  integer(int32), parameter :: many = 50000, per_key = 8      !! items from which several threads pay: in all, and for a key
+  integer(int32), parameter :: per_key = 8         !! items for each key from which several threads pay
 
 contains
 

@@ -55,11 +55,9 @@ static void wait_for_release(struct barrier *self, int round)
         relax();
         if (k%32 == 31) waited = system_seconds() - began;
     }
-    if (self->round == round) {
-        pthread_mutex_lock(&self->lock);
-        while (self->round == round) pthread_cond_wait(&self->released, &self->lock);
-        pthread_mutex_unlock(&self->lock);
-    }
+    pthread_mutex_lock(&self->lock);
+    while (self->round == round) pthread_cond_wait(&self->released, &self->lock);
+    pthread_mutex_unlock(&self->lock);
     waited = system_seconds() - began;
     usual_wait += ((waited < 2*longest_spin ? waited : 2*longest_spin) - usual_wait)/8;
 }

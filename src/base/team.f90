@@ -5,8 +5,12 @@ module team
 !$ use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
-  public :: make_team, team_size
+  public :: make_team, many, team_size
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
+
+  !> Turns of a loop from which it pays to share it: threads that meet at its end cost each other some microseconds, and on
+  !> busy cores thousandths of a second.
+  integer, parameter :: many = 50000
 
   !> Not to be copied while threads use it.
   type, bind(C) :: barrier_t

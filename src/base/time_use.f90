@@ -14,7 +14,7 @@ module time_use
     part_waiting = 12
   integer, parameter :: n_parts = 12
   character(len=*), parameter :: names(n_parts) = [character(len=38) :: "start: reading, placing, checking", &
-    "events, on one core", "epochs: sorting disks, predicting", "cutting the box", "* filling domains", &
+    "events, on one core", "* epochs: sorting disks", "* cutting the box", "* filling domains", &
     "* events in domains", "* comparing copies", "* gathering disks", "merging collisions", &
     "samples, checkpoints", "end of the output", "waiting for other threads"]
   character(len=*), parameter :: entry = "(a,f10.3,"" s"",f7.1,"" %"")"

@@ -4,7 +4,7 @@ module renumbering
   use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
-  use team, only: team_size
+  use team, only: many, team_size
   implicit none
   private
   public :: renumber
@@ -21,7 +21,7 @@ contains
     integer(int32), allocatable :: order(:)
 
     call sort_by_cells(sim, order)
-    if (team_size() > 1) then
+    if (team_size() > 1 .and. sim%n_disks() >= many) then
       call copy_in_order(sim, order)
     else
       call move_in_order(sim, order)
@@ -38,19 +38,19 @@ contains
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
     n = (n + tile - 1)/tile                       ! tiles
     allocate (order(sim%n_disks()), place(sim%n_disks()), cell(sim%n_disks()))
-    !$omp parallel do private(c)
+    !$omp parallel do private(c) if (sim%n_disks() >= many)
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*tile*n, 0.0_real64), tile*n - 1.0_real64), int32)
       cell(i) = tile**2*dot_product(c/tile, [1, n(1)]) + dot_product(modulo(c, tile), [1, tile])
     end do
     !$omp end parallel do
     call sort_by_count(cell/tile**2 + 1, product(n), first, place)
-    !$omp parallel do
+    !$omp parallel do if (sim%n_disks() >= many)
     do i = 1, sim%n_disks()
       order(place(i)) = i
     end do
     !$omp end parallel do
-    !$omp parallel do schedule(static)
+    !$omp parallel do if (sim%n_disks() >= many)
     do i = 1, product(n)
       call sort_tile(cell, order(first(i):first(i + 1) - 1))
     end do

@@ -3,6 +3,7 @@ module disk_tiles
   use kinds, only: int16, int32
   use cell_faces, only: patch_t
   use sorting, only: sort_by_count
+  use team, only: many
   implicit none
   private
   public :: disk_tiles_t
@@ -28,7 +29,7 @@ contains
     integer(int32) :: tile(size(cell, 2)), place(size(cell, 2)), i
 
     self%n = (whole - 1)/side + 1
-    !$omp parallel do
+    !$omp parallel do if (size(tile) >= many)
     do i = 1, size(tile, kind=int32)
       tile(i) = 1 + (cell(1, i) - 1)/side + self%n(1)*((cell(2, i) - 1)/side)
     end do
@@ -36,7 +37,7 @@ contains
     call sort_by_count(tile, product(self%n), self%first, place)
     if (allocated(self%disk)) deallocate (self%disk)
     allocate (self%disk(size(tile)))
-    !$omp parallel do
+    !$omp parallel do if (size(tile) >= many)
     do i = 1, size(tile, kind=int32)
       self%disk(place(i)) = i
     end do

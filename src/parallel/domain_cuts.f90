@@ -3,6 +3,7 @@
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
+  use team, only: many
   implicit none
   private
   public :: domain_cuts_t
@@ -45,7 +46,7 @@ contains
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
     allocate (weight(whole%n(1)), weights(whole%n(2), n(1)), source=0_int32)
-    !$omp parallel do reduction(+:weight) num_threads(threads)
+    !$omp parallel do reduction(+:weight) num_threads(threads) if (size(cell, 2) >= many)
     do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
@@ -54,7 +55,7 @@ contains
     do s = 1, n(1)
       self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
     end do
-    !$omp parallel do private(s) reduction(+:weights) num_threads(threads)
+    !$omp parallel do private(s) reduction(+:weights) num_threads(threads) if (size(cell, 2) >= many)
     do i = 1, size(cell, 2, kind=int32)
       s = self%slab_of(cell(1, i))
       weights(cell(2, i), s) = weights(cell(2, i), s) + 1

@@ -23,6 +23,7 @@ module parallel_events
   !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
   integer(int64), parameter :: shortest_spell = 5, longest_spell = 5*2**20   !! of the plain engine [events per disk]
+  integer(int64), parameter :: shortest_rest = 50, longest_rest = 1600       !! the same while cores are busy
 
   !> Who has predicted the events.
   integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
@@ -35,12 +36,14 @@ module parallel_events
     type(partition_t) :: parts
     integer(int32) :: least_disks = 1250           !! of a domain; twice as many in a periodic box, which has twice as many cuts
     integer(int32) :: most_disks = 62000           !! likewise, if it is to fit into caches
+    real(real64) :: least_cores = 1.25_real64      !! that several threads must have had of late: else one is faster
     integer(int64) :: windows_done = 0, windows_failed = 0
     ! To save memory this engine is there only while there are no domains.
     type(event_driven_t), allocatable, private :: engine   !! the plain one at work
     integer, private :: holder = nobody            !! of the events predicted
     integer, private :: patience = 1               !! windows of a visit: as many as a failure may throw away
     integer(int64), private :: spell = shortest_spell  !! of the plain engine, the next time [events per disk]
+    integer(int64), private :: rest = shortest_rest    !! likewise
     integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
   contains
     procedure :: start
@@ -51,6 +54,7 @@ module parallel_events
     procedure, private :: end_epoch
     procedure, private :: visit
     procedure, private :: conclude
+    procedure, private :: heed_cores
   end type parallel_events_t
 
 contains
@@ -62,6 +66,7 @@ contains
 
     self%holder = nobody
     self%idle = .false.
+    self%parts%cores = self%parts%threads
     associate (wanted => self%parts%wanted)
       wanted = min(self%parts%threads, self%most_domains(sim%n_disks(), sim%box%periodic))
       if (wanted > 0) wanted = wanted*max(sim%n_disks()/self%most_disks/wanted, 1)
@@ -218,10 +223,24 @@ contains
       call self%parts%gather_all(sim, t)
       if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
       if (all(self%parts%domain%engine%idle)) self%plain_until = sim%tally%events + 1
+      if (self%parts%threads > 1) call self%heed_cores(sim)
     else
       self%holder = nobody
     end if
   end subroutine visit
+
+  !> Leaves the run to the plain engine, longer each time, while other programs want the cores, too, or threads wait for
+  !> each other most of the time: several that share a core are slower than one.
+  subroutine heed_cores(self, sim)
+    class(parallel_events_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+
+    if (sim%tally%events - self%plain_until > self%rest*sim%n_disks()) self%rest = shortest_rest
+    if (self%parts%cores > self%least_cores) return
+    self%plain_until = sim%tally%events + self%rest*sim%n_disks()
+    self%rest = min(2*self%rest, longest_rest)
+    self%parts%cores = self%parts%threads
+  end subroutine heed_cores
 
   !> What follows from windows that were good or not. A failure makes windows shorter and visits brief, so that it throws
   !> away at most as much as was gained before. If shorter windows do not help the plain engine takes over, twice as long

@@ -14,7 +14,7 @@ module partition
   use simulation_state, only: simulation_t
   use system, only: seconds
   use tally, only: tally_t
-  use team, only: barrier_t, close_barrier, is_last_at, join, open_barrier, release
+  use team, only: barrier_t, close_barrier, is_last_at, join, many, open_barrier, release
   use time_use, only: part_cuts, part_domains, part_filling, part_gathering, part_verifying, part_waiting, &
     spend_time_on
   implicit none
@@ -22,6 +22,7 @@ module partition
   public :: partition_t
 
   real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
+  real(real64), parameter :: of_late = 0.1_real64              !! [s]
   real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken one by one
 
   !> How fast things happen, as far as it is known.
@@ -58,6 +59,7 @@ module partition
     type(pace_t) :: pace
     real(real64) :: shortening = 1.0_real64        !! of windows, after failures
     integer(int32) :: widening = 0                 !! of the halo, after failures
+    real(real64) :: cores = 0.0_real64             !! that have been at work of late, on average
   contains
     procedure :: fill
     procedure :: run_windows
@@ -103,7 +105,7 @@ contains
     cut = .false.
     if (self%whole%small < maxval(sim%disk%radius)) return
     allocate (cell(2, sim%n_disks()))
-    !$omp parallel do num_threads(self%threads)
+    !$omp parallel do num_threads(self%threads) if (sim%n_disks() >= many)
     do i = 1, sim%n_disks()
       cell(:, i) = int(self%whole%cell_at(sim%position(i)), int16)
     end do
@@ -196,10 +198,13 @@ contains
     logical, intent(out) :: good
     type(plan_t) :: plan
     type(barrier_t) :: barrier
+    real(real64) :: began, elapsed, cpu(2)         ! [s]
     integer(int32) :: k
 
+    began = seconds()
+    call cpu_time(cpu(1))
     plan%most = most
-    plan%until = seconds() + longest_visit
+    plan%until = began + longest_visit
     call self%begin_window(sim, goal, t, plan)
     call open_barrier(barrier)
     !$omp parallel num_threads(self%threads) private(k)
@@ -235,6 +240,9 @@ contains
     end do
     !$omp end parallel
     call close_barrier(barrier)
+    call cpu_time(cpu(2))
+    elapsed = seconds() - began
+    self%cores = self%cores + (cpu(2) - cpu(1) - elapsed*self%cores)/max(elapsed, of_late)
     t = plan%t
     windows = plan%windows
     good = plan%good
@@ -381,7 +389,7 @@ contains
     integer(int32) :: k
 
     call spend_time_on(part_gathering)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads) if (sim%n_disks() >= many)
     do k = 1, self%cuts%n
       call gather(self%domain(k), sim)
       self%domain(k)%sim%now = now

@@ -10,6 +10,7 @@ module simulation_state
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
   use tally, only: tally_t
+  use team, only: many
   implicit none
   private
   public :: given_t, simulation_t
@@ -276,7 +277,7 @@ contains
     integer(int32) :: i
 
     moments = pack(self%extra_row, self%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
-    !$omp parallel do
+    !$omp parallel do if (self%n_disks() >= many)
     do i = 1, self%n_disks()
       self%disk(i)%clock = self%disk(i)%clock - shift
       self%disk(i)%stamp = 0

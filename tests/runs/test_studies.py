@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-NO_SYSTEM = ("common", "ensemble", "figures", "bench")
+NO_SYSTEM = ("common", "ensemble", "figures", "bench", "scaling")
 SYSTEMS = sorted(p.stem for p in (ROOT / "runs").glob("*.sh") if p.stem not in NO_SYSTEM)
 
 
@@ -89,6 +89,22 @@ def test_help_says_what_a_study_does_and_starts_nothing(study, tmp_path, script)
     assert run.returncode == 0 and "ensemble.sh" in run.stdout
     assert run.stdout.splitlines()[0] in (ROOT / "runs" / f"{script}.sh").read_text()
     assert not (tmp_path / "runs" / script).exists()
+
+
+def test_threads_are_measured_by_turns_and_drawn(study, tmp_path):
+    """Nothing is measured twice, and a run that fails ends it with its reason."""
+    stand_in(tmp_path / "ricochet", f"echo $1 $2 $3 $6 >>'{tmp_path}/runs.txt'\n: >\"$3\"")
+    sizes = {"SIZES": "100", "THREADS": "1 4", "RUNS": "2"}
+    for _ in range(2):
+        run = study("scaling", **sizes)
+        assert run.returncode == 0, run.stderr
+        calls = (tmp_path / "runs.txt").read_text().splitlines()
+        assert [call.split()[3][-1] for call in calls[1:]] == ["1", "4", "1", "4"]
+    assert "post/scaling.py runs/scaling/gas_100_1_1.h5" in (tmp_path / "drawn.txt").read_text()
+    stand_in(tmp_path / "ricochet", "echo no room >&2\nexit 3")
+    run = study("scaling", **sizes | {"SIZES": "200"})
+    assert run.returncode != 0 and run.stderr.splitlines()[-1] == "no room"
+    assert study("scaling", "--help").returncode == 0
 
 
 def test_what_is_missing_shows_before_anything_runs(study):
