@@ -27,9 +27,11 @@ contains
     integer(int32), intent(in) :: whole(2)         !! columns, rows of the whole grid
     integer(int16), intent(in) :: cell(:, :)       !! (2,disks) in it
     integer(int32) :: tile(size(cell, 2)), place(size(cell, 2)), i
+    logical :: shared
 
     self%n = (whole - 1)/side + 1
-    !$omp parallel do if (size(tile) >= many)
+    shared = size(tile) >= many
+    !$omp parallel do if (shared)
     do i = 1, size(tile, kind=int32)
       tile(i) = 1 + (cell(1, i) - 1)/side + self%n(1)*((cell(2, i) - 1)/side)
     end do
@@ -37,7 +39,7 @@ contains
     call sort_by_count(tile, product(self%n), self%first, place)
     if (allocated(self%disk)) deallocate (self%disk)
     allocate (self%disk(size(tile)))
-    !$omp parallel do if (size(tile) >= many)
+    !$omp parallel do if (shared)
     do i = 1, size(tile, kind=int32)
       self%disk(place(i)) = i
     end do

@@ -38,7 +38,9 @@ contains
     type(cuts_t) :: slabs, pieces
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
+    logical :: shared
 
+    shared = size(cell, 2) >= many
     self%whole = whole
     self%halo = halo
     n = numbers(self, periodic, wanted, threads)
@@ -46,7 +48,7 @@ contains
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
     allocate (weight(whole%n(1)), weights(whole%n(2), n(1)), source=0_int32)
-    !$omp parallel do reduction(+:weight) num_threads(threads) if (size(cell, 2) >= many)
+    !$omp parallel do reduction(+:weight) num_threads(threads) if (shared)
     do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
@@ -55,7 +57,7 @@ contains
     do s = 1, n(1)
       self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
     end do
-    !$omp parallel do private(s) reduction(+:weights) num_threads(threads) if (size(cell, 2) >= many)
+    !$omp parallel do private(s) reduction(+:weights) num_threads(threads) if (shared)
     do i = 1, size(cell, 2, kind=int32)
       s = self%slab_of(cell(1, i))
       weights(cell(2, i), s) = weights(cell(2, i), s) + 1

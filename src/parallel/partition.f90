@@ -10,6 +10,7 @@ module partition
   use domain_cuts, only: domain_cuts_t
   use domains, only: domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
   use evolution, only: limits_t
+  use pace, only: pace_t
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use system, only: seconds
@@ -24,14 +25,6 @@ module partition
   real(real64), parameter :: longest_visit = 1.0_real64        !! until the caller can look at signals and clocks [s]
   real(real64), parameter :: of_late = 0.1_real64              !! [s]
   real(real64), parameter :: few_events = 20.0_real64          !! before a limit, to be taken one by one
-
-  !> How fast things happen, as far as it is known.
-  type, public :: pace_t
-    real(real64) :: events = 0.0_real64            !! per time; 0: not known yet [1/time]
-    real(real64) :: turns = 10.0_real64            !! of engines, per event
-  contains
-    procedure :: learn
-  end type pace_t
 
   !> What all threads do next: one of them decides while the others wait.
   type :: plan_t
@@ -77,17 +70,6 @@ module partition
   end type partition_t
 
 contains
-
-  !> Learns from what has happened in a time.
-  pure subroutine learn(self, events, turns, time)
-    class(pace_t), intent(inout) :: self
-    integer(int64), intent(in) :: events, turns
-    real(real64), intent(in) :: time               !! [time]
-
-    if (.not. (events > 0 .and. time > 0)) return
-    self%events = events/time
-    self%turns = max(turns/real(events, real64), 1.0_real64)
-  end subroutine learn
 
   !> Cuts a simulation and fills the domains. `cut`: it could be cut into several.
   subroutine fill(self, sim, log, cut)
