@@ -81,13 +81,15 @@ contains
     integer(int32), allocatable :: disks(:)
     type(disk_tiles_t) :: tiles
     integer(int32) :: i, k
+    logical :: shared
 
     call spend_time_on(part_cuts)
     if (self%whole%small <= 0) self%whole = whole_box(sim)
     cut = .false.
     if (self%whole%small < maxval(sim%disk%radius)) return
     allocate (cell(2, sim%n_disks()))
-    !$omp parallel do num_threads(self%threads) if (sim%n_disks() >= many)
+    shared = sim%n_disks() >= many
+    !$omp parallel do num_threads(self%threads) if (shared)
     do i = 1, sim%n_disks()
       cell(:, i) = int(self%whole%cell_at(sim%position(i)), int16)
     end do
@@ -369,9 +371,11 @@ contains
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: now                !! since the epoch [time]
     integer(int32) :: k
+    logical :: shared
 
     call spend_time_on(part_gathering)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads) if (sim%n_disks() >= many)
+    shared = sim%n_disks() >= many
+    !$omp parallel do schedule(static, 1) num_threads(self%threads) if (shared)
     do k = 1, self%cuts%n
       call gather(self%domain(k), sim)
       self%domain(k)%sim%now = now

@@ -275,9 +275,11 @@ contains
     real(real64), intent(in) :: shift             !! [time]
     integer, allocatable :: moments(:)            ! rows of `extra`
     integer(int32) :: i
+    logical :: shared
 
     moments = pack(self%extra_row, self%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
-    !$omp parallel do if (self%n_disks() >= many)
+    shared = self%n_disks() >= many
+    !$omp parallel do if (shared)
     do i = 1, self%n_disks()
       self%disk(i)%clock = self%disk(i)%clock - shift
       self%disk(i)%stamp = 0
