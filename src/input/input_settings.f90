@@ -2,9 +2,10 @@
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: contact_law_t, wall_law_t, wall_rules
+  use collisions, only: contact_law_t, grip_t, normal_rule, wall_law_t, wall_rules
+  use disks, only: names_of
   use drive, only: active, drive_kinds, drive_t
-  use input_surfaces, only: take_obstacles, take_wall_laws
+  use input_surfaces, only: refuse_grip, take_grip, take_obstacles, take_wall_laws
   use input_problems, only: problem_list_t
   use input_species, only: take_species
   use parameter_values, only: parameter_group_t, range_of
@@ -120,26 +121,15 @@ contains
     type(wall_law_t), intent(out) :: wall_law
     type(problem_list_t), intent(inout) :: problems
     real(real64), allocatable :: pairs(:)
-    character(len=*), parameter :: of_walls(2) = [character(len=27) :: "wall_tangential_restitution", "wall_friction"]
     real(real64) :: restitution
-    integer :: k
 
     restitution = group%real_of("restitution", 1.0_real64)
     wall_law%restitution = group%real_of("wall_restitution", restitution)
     wall_law%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
-    law%grip%restitution = group%real_of("tangential_restitution", -1.0_real64)
-    law%grip%friction = group%real_of("friction", law%grip%friction)
+    call take_grip(group, "", grip_t(), law%grip, problems)
+    call take_grip(group, "wall_", law%grip, wall_law%grip, problems)
+    if (wall_law%rule /= normal_rule) call refuse_grip(group, "wall_", problems)
     law%inertia = group%real_of("inertia", 0.5_real64)
-    wall_law%grip%restitution = group%real_of("wall_tangential_restitution", law%grip%restitution)
-    wall_law%grip%friction = group%real_of("wall_friction", law%grip%friction)
-    if (group%given("friction") .and. .not. law%grip%is_rough()) call group%complain("friction", &
-      "has no effect without tangential_restitution, which is -1 (smooth); give it, too", problems)
-    if (group%given("wall_friction") .and. .not. wall_law%grip%is_rough()) call group%complain("wall_friction", &
-      "has no effect without wall_tangential_restitution, which is -1 (smooth); give it, too", problems)
-    do k = 1, 2
-      if (group%given(trim(of_walls(k))) .and. group%text_of("wall_rule") == "velocity") call group%complain( &
-        trim(of_walls(k)), "has no effect with wall_rule = 'velocity'; take wall_rule = 'normal'", problems)
-    end do
     law%contact_time = group%real_of("contact_time", 0.0_real64)
     call group%put_reals("wall_restitution", [wall_law%restitution])
     allocate (law%restitution(n, n), source=restitution)
@@ -235,7 +225,6 @@ contains
     type(drive_t), intent(out) :: drive
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: wanted
-    integer :: s
 
     call group%check_choices(problems)
     drive%kind = place_of(group%text_of("kind"), words_of(drive_kinds))
@@ -248,23 +237,10 @@ contains
     drive%rotational_diffusion = group%real_of("rotational_diffusion", 0.0_real64)
     wanted = group%text_of("species")
     if (wanted == "") return
-    do s = size(species), 1, -1
-      if (species(s)%name == wanted) drive%species = s
-    end do
+    drive%species = place_of(wanted, names_of(species))
     if (drive%species == 0) call group%complain("species", "there is no species "//shown(wanted)//"; " &
-      //suggestion(wanted, species_names(species)), problems)
+      //suggestion(wanted, names_of(species)), problems)
   end subroutine take_drive
-
-  !> The names of all species.
-  pure function species_names(species) result(names)
-    type(species_settings_t), intent(in) :: species(:)
-    character(len=40) :: names(size(species))
-    integer :: s
-
-    do s = 1, size(species)
-      names(s) = species(s)%name
-    end do
-  end function species_names
 
   !> What cannot go together with kicks. Nothing tells when an energy that they change has fallen for good, and a number of
   !> kicks must be countable.

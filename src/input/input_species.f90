@@ -2,21 +2,18 @@
 module input_species
   use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
+  use disks, only: longest_name
   use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
   use name_index, only: name_index_t
   use observables, only: own_names
   use parameter_values, only: parameter_group_t
-  use parameters, only: largest, row_of, smallest
+  use parameters, only: largest, most_disks, row_of, smallest
   use settings, only: species_settings_t
-  use texts, only: counted, shown, suggestion, written
+  use texts, only: counted, digits, letters, shown, suggestion, written
   implicit none
   private
   public :: take_species, check_name
-
-  character(len=*), parameter :: letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-  integer, parameter :: longest_name = 40
-  integer, parameter :: most_disks = 100000000
 
 contains
 
@@ -70,7 +67,7 @@ contains
     integer :: j
 
     name = trim(groups(k)%instance)
-    if (verify(name, letters//"0123456789_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
+    if (verify(name, letters//digits//"_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
       call groups(k)%complain("name", shown(name)//" is not a valid name; allowed: up to "//written(longest_name)// &
         " letters, digits, _ and -, beginning with a letter", problems)
     else if (any(own_names() == name) .or. any(beside_species == name)) then

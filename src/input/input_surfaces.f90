@@ -15,7 +15,7 @@ module input_surfaces
   use texts, only: place_of, written
   implicit none
   private
-  public :: take_obstacles, take_wall_laws
+  public :: refuse_grip, take_grip, take_obstacles, take_wall_laws
 
 contains
 
@@ -103,8 +103,10 @@ contains
     type(problem_list_t), intent(inout) :: problems
 
     law%speed = group%real_of("speed", 0.0_real64)
+    law%temperature = group%real_of("temperature", 0.0_real64)
     if (group%given("temperature")) then
-      call take_temperature(group, law, problems)
+      call group%refuse([character(len=22) :: "restitution", "rule", "tangential_restitution", "friction"], &
+        "has no effect at a thermal wall; leave it out, or temperature", problems)
       return
     end if
     law%restitution = group%real_of("restitution", otherwise%restitution)
@@ -114,7 +116,11 @@ contains
       if (group%given("rule")) law%rule = max(1, place_of(group%text_of("rule"), rules))
       call group%put_text("rule", trim(rules(law%rule)))
     end associate
-    call take_grip(group, otherwise, law, problems)
+    if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
+    if (law%rule /= normal_rule) call refuse_grip(group, "", problems)
+    if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
+    if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
+      call group%put_reals("friction", [law%grip%friction])
     if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("speed", &
       "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
   end subroutine take_law
@@ -151,45 +157,30 @@ contains
       "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
   end subroutine check_room
 
-  !> A thermal wall has no other law.
-  subroutine take_temperature(group, law, problems)
+  !> How rough disks or walls are, by variables whose names have a prefix in &contact.
+  subroutine take_grip(group, prefix, otherwise, grip, problems)
     type(parameter_group_t), intent(in) :: group
-    type(wall_law_t), intent(inout) :: law
+    character(len=*), intent(in) :: prefix
+    type(grip_t), intent(in) :: otherwise
+    type(grip_t), intent(out) :: grip
     type(problem_list_t), intent(inout) :: problems
-    character(len=*), parameter :: others(*) = [character(len=22) :: "restitution", "rule", "tangential_restitution", &
-      "friction"]
-    integer :: k
 
-    law%temperature = group%real_of("temperature", 0.0_real64)
-    do k = 1, size(others)
-      if (group%given(trim(others(k)))) call group%complain(trim(others(k)), &
-        "has no effect at a thermal wall; leave it out, or temperature", problems)
-    end do
-  end subroutine take_temperature
-
-  !> How rough a wall is. With the rule 'velocity' it leaves rotation alone.
-  subroutine take_grip(group, otherwise, law, problems)
-    type(parameter_group_t), intent(inout) :: group
-    type(wall_law_t), intent(in) :: otherwise
-    type(wall_law_t), intent(inout) :: law
-    type(problem_list_t), intent(inout) :: problems
-    character(len=*), parameter :: names(2) = [character(len=22) :: "tangential_restitution", "friction"]
-    integer :: k
-
-    if (law%rule /= normal_rule) then
-      do k = 1, 2
-        if (group%given(trim(names(k)))) call group%complain(trim(names(k)), &
-          "has no effect with rule = 'velocity'; take rule = 'normal'", problems)
-      end do
-      return
-    end if
-    law%grip%restitution = group%real_of("tangential_restitution", otherwise%grip%restitution)
-    law%grip%friction = group%real_of("friction", otherwise%grip%friction)
-    if (group%given("friction") .and. .not. law%grip%is_rough()) call group%complain("friction", &
-      "has no effect without tangential_restitution, which is -1 (smooth); give it, too", problems)
-    if (.not. law%grip%is_rough()) return
-    call group%put_reals("tangential_restitution", [law%grip%restitution])
-    if (law%grip%friction < huge(law%grip%friction)) call group%put_reals("friction", [law%grip%friction])
+    grip%restitution = group%real_of(prefix//"tangential_restitution", otherwise%restitution)
+    grip%friction = group%real_of(prefix//"friction", otherwise%friction)
+    if (group%given(prefix//"friction") .and. .not. grip%is_rough()) call group%complain(prefix//"friction", &
+      "has no effect without "//prefix//"tangential_restitution, which is -1 (smooth); give it, too", problems)
   end subroutine take_grip
+
+  !> A wall with the rule 'velocity' leaves rotation alone.
+  subroutine refuse_grip(group, prefix, problems)
+    type(parameter_group_t), intent(in) :: group
+    character(len=*), intent(in) :: prefix                !! as above
+    type(problem_list_t), intent(inout) :: problems
+    character(len=27) :: names(2)
+
+    names(1) = prefix//"tangential_restitution"
+    names(2) = prefix//"friction"
+    call group%refuse(names, "has no effect with "//prefix//"rule = 'velocity'; take "//prefix//"rule = 'normal'", problems)
+  end subroutine refuse_grip
 
 end module input_surfaces

@@ -5,13 +5,12 @@ module input_values
   use namelist_scanner, only: scanner_t, statement_t, token_t
   use parameter_values, only: parameter_value_t, text_length
   use parameters, only: allowed, largest, parameter_t, smallest, table, words_of
-  use texts, only: counted, lower_case, nearest_word, shown, written
+  use texts, only: counted, digits, lower_case, nearest_word, shown, written
   implicit none
   private
   public :: store_values, read_real
 
   integer, parameter :: most_values = 4000000
-  character(len=*), parameter :: digits = "0123456789"
 
 contains
 

@@ -6,7 +6,7 @@
 !> Anything else in the text is a problem with a line number.
 module namelist_scanner
   use input_problems, only: problem_list_t
-  use texts, only: lower_case, shown
+  use texts, only: digits, letters, lower_case, shown
   implicit none
   private
   public :: scanner_t, statement_t, token_t, plain
@@ -16,8 +16,6 @@ module namelist_scanner
   integer, parameter :: most_repeats = 10000000
 
   character(len=*), parameter :: eol = new_line("a"), blanks = " "//achar(9)
-  character(len=*), parameter :: digits = "0123456789"
-  character(len=*), parameter :: letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
   !> One value: `text(first:last)` of the scanner, without its quotes.

@@ -41,7 +41,7 @@ module parameter_values
     procedure :: integer_of, real_of, reals_of, text_of
     procedure :: given, faulty, line_of
     procedure :: put_text, put_reals
-    procedure :: complain, demand
+    procedure :: complain, demand, refuse
     procedure :: infer_choices, check_choices
   end type parameter_group_t
 
@@ -199,6 +199,19 @@ contains
       if (.not. slot%given) call self%complain(name, "is missing; give "//allowed(table(slot%row)), problems)
     end associate
   end subroutine demand
+
+  !> Reports those of some variables that the user has set.
+  pure subroutine refuse(self, names, why, problems)
+    class(parameter_group_t), intent(in) :: self
+    character(len=*), intent(in) :: names(:)
+    character(len=*), intent(in) :: why
+    type(problem_list_t), intent(inout) :: problems
+    integer :: k
+
+    do k = 1, size(names)
+      if (self%given(names(k))) call self%complain(trim(names(k)), why, problems)
+    end do
+  end subroutine refuse
 
   !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
   pure subroutine infer_choices(self)

@@ -9,10 +9,10 @@ module parameters
   implicit none
   private
   public :: parameter_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of, full_names
-  public :: words_of, allowed, either, smallest, largest, most_threads, name_length
+  public :: words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37
-  integer, parameter :: most_threads = 1024
+  integer, parameter :: most_threads = 1024, most_disks = 100000000
   real(real64), parameter :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
   real(real64), parameter :: largest = 1.0e100_real64      !! squared or multiplied
 
@@ -36,7 +36,7 @@ module parameters
   type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
   type(range_t), parameter :: tangential = range_t(-1, 1, "from -1 to 1")
   type(range_t), parameter :: moment = range_t(smallest, 1, "> 0 and <= 1")
-  type(range_t), parameter :: count_of_disks = range_t(1, 100000000, "from 1 to 100000000")
+  type(range_t), parameter :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")
 
   type :: parameter_t
     character(len=8) :: group

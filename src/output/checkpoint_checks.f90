@@ -2,6 +2,7 @@
 !> that nobody has changed the file since it was sealed. What is wrong is named by its dataset.
 module checkpoint_checks
   use cadence, only: cadence_t
+  use disks, only: species_by_id
   use kinds, only: int32, int64, never, real64
   use progress, only: progress_t
   use settings, only: settings_t
@@ -38,14 +39,9 @@ contains
     type(settings_t), intent(in) :: settings
     character(len=:), allocatable :: flaw
     integer(int32), allocatable :: species(:)
-    integer(int32) :: s, i, first
+    integer(int32) :: i
 
-    allocate (species(sim%n_disks()))
-    first = 1
-    do s = 1, size(sim%species, kind=int32)
-      species(first:first + sim%species(s)%count - 1) = s
-      first = first + sim%species(s)%count
-    end do
+    allocate (species, source=species_by_id(sim%species))
     flaw = ""
     do i = 1, sim%n_disks()
       associate (tag => sim%tag(i))
@@ -114,12 +110,14 @@ contains
     character(len=:), allocatable :: flaw
     real(real64) :: sunk(2), energy, fall
     integer(int32) :: i
+    logical :: driven
 
+    driven = sim%is_driven()
     sunk = 0.5_real64*abs(sim%box%gravity)*dt*sim%now
     fall = sum(sim%masses())*sum(abs(sim%box%gravity)*(sim%box%edges() + sum(sim%box%reach(), dim=2) + sunk))
     flaw = ""
     do i = 1, sim%n_disks()
-      associate (speed => merge(never, sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)), sim%is_driven()))
+      associate (speed => merge(never, sqrt(2*(sim%start_energy + fall)/sim%mass_of(i)), driven))
         call check_place(sim, i, speed, sim%box%reach() + spread(dt*speed + sunk, 2, 2), flaw)
       end associate
       if (flaw /= "") return

@@ -6,6 +6,7 @@ module run_description
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
   use checkpoint_contents, only: is_free
+  use disks, only: names_of
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
     parameters_group, provenance, species_counts, species_names
   use hdf5_handle, only: hdf5_version
@@ -243,14 +244,9 @@ contains
   subroutine describe_species(file, sim)
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: sim
-    character(len=64) :: names(size(sim%species))
-    integer :: k
 
-    do k = 1, size(names)
-      names(k) = sim%species(k)%name
-    end do
-    call file%put(species_names, names)
-    call file%put(species_counts, [size(names)], int(sim%species%count, int32))
+    call file%put(species_names, names_of(sim%species))
+    call file%put(species_counts, [size(sim%species)], int(sim%species%count, int32))
   end subroutine describe_species
 
   !> What the thermodynamics module of H5MD requires beside the observables of a group.

@@ -7,6 +7,7 @@ module disks
   implicit none
   private
   public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
+  public :: disks_before, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
   !> disks see it by extrapolation.
@@ -32,6 +33,8 @@ module disks
     integer(int32) :: window = 0                !! of time in which the queue filed the expected event
     integer(int32) :: partner_stamp = 0         !! the partner's stamp when the event was predicted
   end type tag_t
+
+  integer, parameter :: longest_name = 40            !! of a species
 
   !> Disks of one species share what the contact law says of them and, unless a file says otherwise, their mass.
   type :: species_t
@@ -62,7 +65,7 @@ module disks
 
   !> The table. The first columns are in records and tags, the others are optional.
   integer, parameter :: n_fixed = 10
-  integer, parameter, public :: clock_column = 5, radius_column = 6, species_column = 7, id_column = 8, met_column = 10
+  integer, parameter, public :: radius_column = 6, species_column = 7, id_column = 8, met_column = 10
   integer, parameter, public :: mass_column = 11, image_column = 12, contact_column = 14, spin_column = 15, angle_column = 16
   type(column_t), parameter :: columns(*) = [ &
     column_t("x1", "real", places), column_t("x2", "real", places), &
@@ -77,5 +80,39 @@ module disks
     column_t("angular_velocity", "real", anything, element="angular_velocity"), &   ! [1/time]
     column_t("orientation", "real", anything, element="orientation", rate=15)]      ! at `clock`, not wrapped [radian]
   integer, parameter :: n_columns = size(columns)
+
+contains
+
+  !> The names of the species.
+  pure function names_of(species) result(names)
+    class(species_t), intent(in) :: species(:)
+    character(len=longest_name) :: names(size(species))
+    integer :: s
+
+    do s = 1, size(species)
+      names(s) = species(s)%name
+    end do
+  end function names_of
+
+  !> How many disks the species before species s have: their ids are the lower ones.
+  pure function disks_before(species, s) result(n)
+    class(species_t), intent(in) :: species(:)
+    integer, intent(in) :: s
+    integer :: n
+
+    n = sum(species(:s - 1)%count)
+  end function disks_before
+
+  !> Of which species each disk is, by id.
+  pure function species_by_id(species) result(number)
+    class(species_t), intent(in) :: species(:)
+    integer(int32), allocatable :: number(:)
+    integer :: s
+
+    allocate (number(sum(species%count)))
+    do s = 1, size(species)
+      number(disks_before(species, s) + 1:disks_before(species, s + 1)) = int(s, int32)
+    end do
+  end function species_by_id
 
 end module disks

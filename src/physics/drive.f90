@@ -55,13 +55,15 @@ contains
     if (self%is_on()) t = k*self%interval
   end function time_of
 
-  !> Mean square of the velocity that a kick gives, or adds, to a disk of some mass; 0 without kicks.
-  elemental function speed2(self, mass)
+  !> Mean square of the velocity that a kick gives, or adds, to disks of a species and a mass; 0 if none reaches them.
+  elemental function speed2(self, species, mass)
     class(drive_t), intent(in) :: self
+    integer, intent(in) :: species                   !! its number
     real(real64), intent(in) :: mass                 !! [mass]
     real(real64) :: speed2
 
     speed2 = 0
+    if (.not. self%reaches(species)) return
     if (self%kind == noise) speed2 = 2*self%strength*self%interval
     if (self%kind >= andersen) speed2 = 2*self%temperature/mass + self%speed**2
   end function speed2

@@ -4,8 +4,8 @@ module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, n_fixed, species_t, &
-    spin_column, tag_t
+  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, n_fixed, species_by_id, &
+    species_t, spin_column, tag_t
   use drive, only: drive_t
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
@@ -50,6 +50,7 @@ module simulation_state
   contains
     procedure :: time
     procedure :: n_disks
+    procedure :: list_disks
     procedure :: make_room
     procedure :: mass_of
     procedure :: masses
@@ -90,6 +91,19 @@ contains
 
     n = size(self%disk, kind=int32)
   end function n_disks
+
+  !> Makes room for the disks of all species, in the order of the input; masses of their own are still to come.
+  pure subroutine list_disks(self)
+    class(simulation_t), intent(inout) :: self    !! with all that the input gives
+    integer(int32) :: i
+
+    call self%make_room(sum(self%species%count))
+    self%tag%id = [(i, i=1, self%n_disks())]
+    self%tag%species = species_by_id(self%species)
+    do i = 1, merge(self%n_disks(), 0, self%own_sizes)
+      self%extra(self%extra_row(mass_column), i) = self%species(self%tag(i)%species)%mass
+    end do
+  end subroutine list_disks
 
   !> Makes room for n disks.
   pure subroutine make_room(self, n, like)
@@ -372,10 +386,7 @@ contains
     real(real64) :: speed                         !! [length/time]
     integer :: s
 
-    speed = 0
-    do s = 1, size(self%species)
-      if (self%drive%reaches(s)) speed = max(speed, sqrt(self%drive%speed2(self%species(s)%mass)))
-    end do
+    speed = sqrt(maxval([0.0_real64, self%drive%speed2([(s, s=1, size(self%species))], self%species%mass)]))
   end function fastest_drive
 
   !> The units of the sums, from what a collision can contribute at most given the energy of the start, or what walls and
@@ -388,7 +399,7 @@ contains
     integer :: s
 
     mass = self%species%mass
-    kicked = merge(self%drive%speed2(mass), 0.0_real64, self%drive%reaches([(s, s=1, size(mass))]))
+    kicked = self%drive%speed2([(s, s=1, size(mass))], mass)
     energy = self%start_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
       + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
     impulse = sqrt(8*maxval(mass))*sqrt(energy)

@@ -6,7 +6,7 @@ module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
   use cell_grid, only: cell_grid_t
-  use disks, only: species_t
+  use disks, only: disks_before, species_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
@@ -99,17 +99,13 @@ contains
     type(box_t), intent(in) :: box
     type(species_t), intent(in) :: species(:)
     type(simulation_t), intent(inout) :: sim
-    integer :: n, k, s
 
-    n = sum(species%count)
     sim%box = box
     sim%box%gravity = 0
     sim%box%shear_rate = 0
     sim%species = species
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
-    call sim%make_room(int(n, int32))
-    sim%tag%id = [(int(k, int32), k=1, n)]
-    sim%tag%species = [([(int(s, int32), k=1, species(s)%count)], s=1, size(species))]
+    call sim%list_disks()
   end subroutine describe
 
   !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
@@ -147,7 +143,7 @@ contains
     integer :: k
     logical :: complete
 
-    wanted = pi*sum(sim%species%count*full([(1 + sum(sim%species(:k - 1)%count), k=1, size(sim%species))])**2) &
+    wanted = pi*sum(sim%species%count*full([(1 + disks_before(sim%species, k), k=1, size(sim%species))])**2) &
       /product(sim%box%edges())
     scale = sqrt(min(1.0_real64, loose/wanted))
     do
@@ -181,7 +177,7 @@ contains
     integer :: k
 
     waiting = .true.
-    first = [(1 + sum(species(:k - 1)%count), k=1, size(species))]
+    first = [(1 + disks_before(species, k), k=1, size(species))]
     do k = 1, size(species)
       s = maxloc(radius(first), dim=1, mask=waiting)
       waiting(s) = .false.

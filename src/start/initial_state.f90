@@ -4,7 +4,7 @@
 module initial_state
   use kinds, only: int32, real64
   use box_geometry, only: box_t
-  use disks, only: mass_column, spin_column
+  use disks, only: spin_column
   use errors, only: error_t, exit_usage, fail
   use kicks, only: orient
   use placement, only: place_disks
@@ -31,7 +31,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call describe_system(settings, sim)
-    call list_disks(sim)
+    call sim%list_disks()
     call check_lengths(sim%box, settings%species%radius, error)
     if (allocated(error)) return
     if (sim%law%orientation) call orient(sim)
@@ -98,23 +98,6 @@ contains
       sim%species(s) = settings%species(s)%species_t
     end do
   end subroutine describe_system
-
-  !> The disks by their species, in the order of the input; sizes of their own come with their places.
-  subroutine list_disks(sim)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32) :: s, i, k
-
-    call sim%make_room(sum(sim%species%count))
-    k = 0
-    do s = 1, size(sim%species, kind=int32)
-      do i = 1, sim%species(s)%count
-        k = k + 1
-        sim%tag(k)%species = s
-        sim%tag(k)%id = k
-      end do
-    end do
-    if (sim%own_sizes) sim%extra(sim%extra_row(mass_column), :) = sim%species(sim%tag%species)%mass
-  end subroutine list_disks
 
   !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero. In a sheared box rules
   !> and temperatures are relative to its velocity profile; given velocities are not.

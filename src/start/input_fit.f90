@@ -6,7 +6,7 @@ module input_fit
   use box_sides, only: bounds
   use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
-  use known_places, only: add_known, misfit_t, misfit_text
+  use known_places, only: add_known, misfit_t, misfit_text, rounding
   use packing, only: packing_t
   use parameters, only: obstacle_groups
   use parameter_values, only: parameter_group_t, range_of
@@ -19,7 +19,6 @@ module input_fit
   private
   public :: check_fit
 
-  real(real64), parameter :: rounding = 1.0e-12_real64        !! relative, of touching disks
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 

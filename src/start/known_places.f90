@@ -1,5 +1,6 @@
 !> Disks at places that are known before: whether each of them fits.
 module known_places
+  use disks, only: disks_before
   use kinds, only: int32, real64
   use packing, only: packing_t
   use regular_places, only: centre_range
@@ -7,10 +8,10 @@ module known_places
   use texts, only: written
   implicit none
   private
-  public :: add_known, misfit_t, misfit_text, offset
+  public :: add_known, misfit_t, misfit_text
 
   integer, parameter :: most_reports = 5                    !! of a kind, for one species
-  real(real64), parameter :: rounding = 1.0e-12_real64      !! relative, of disks that touch
+  real(real64), parameter, public :: rounding = 1.0e-12_real64      !! relative, of disks that touch
 
   !> A disk that does not fit.
   type :: misfit_t
@@ -19,15 +20,6 @@ module known_places
   end type misfit_t
 
 contains
-
-  !> Number of the disk before the first one of species s.
-  pure function offset(species, s) result(n)
-    type(species_settings_t), intent(in) :: species(:)
-    integer, intent(in) :: s
-    integer :: n
-
-    n = sum(species(:s - 1)%count)
-  end function offset
 
   !> Adds a species at known places. Disks that overlap others are added all the same and listed, as are
   !> those, not added, that are not wholly in their region.
@@ -44,7 +36,7 @@ contains
 
     allocate (misfits(0))
     largest = maxval(species%radius)
-    before = offset(species, s)
+    before = disks_before(species, s)
     call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
     call packing%open_species(int(s, int32), maxval(radius), size(radius), &
       min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
@@ -84,7 +76,7 @@ contains
       end associate
     else
       other = packing%disk(misfit%blocker)%species
-      text = text//" overlaps disk "//written(misfit%blocker - offset(species, other))// &
+      text = text//" overlaps disk "//written(misfit%blocker - disks_before(species, other))// &
         " of """//species(other)%name//'"'
     end if
   end function misfit_text

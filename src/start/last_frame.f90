@@ -7,15 +7,17 @@ module last_frame
     position, species_names, value_of, velocity
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
-  use parameters, only: largest, smallest
-  use position_file, only: angle_row, mass_row, radius_row, spin_row
+  use parameters, only: largest, most_disks, smallest
+  use position_file, only: mass_row, radius_row, spin_row
   use texts, only: counted, joined, written
   implicit none
   private
-  public :: is_run, read_last_frame
+  public :: datasets, is_run, read_last_frame
 
   integer, parameter :: name_length = 64
-  integer(int64), parameter :: most_disks = 100000000       !! that a run can have written
+  !> Where each of `position_file: column_names` is in the file of a run; what stands before the radius is in frames.
+  character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
+    velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
 contains
 
@@ -66,23 +68,22 @@ contains
     type(box_t), intent(in), optional :: box                !! to which the positions are stretched
     type(hdf5_file_t) :: file
     real(real64) :: lower(2), edges(2)
-    integer :: n, k
+    character(len=:), allocatable :: dataset
+    integer :: n, k, row
 
     there = .true.
     call file%open(path, .false.)
     call choose(file, name, n, chosen, error)
     allocate (table(size(there), size(chosen)), source=0.0_real64)
     if (size(chosen) > 0 .and. .not. allocated(error)) then
-      call read_element(file, position//value_of, n, chosen, table(1:2, :))
-      call read_element(file, velocity//value_of, n, chosen, table(3:4, :))
-      there(spin_row) = file%length(angular_velocity//value_of) >= 0
-      there(angle_row) = file%length(orientation//value_of) >= 0
-      if (there(spin_row)) call read_element(file, angular_velocity//value_of, n, chosen, table(spin_row:spin_row, :))
-      if (there(angle_row)) call read_element(file, orientation//value_of, n, chosen, table(angle_row:angle_row, :))
-      there(radius_row) = file%length(disk_radius) >= 0
-      there(mass_row) = file%length(disk_mass) >= 0
-      if (there(radius_row)) call read_numbers(file, disk_radius, n, chosen, table(radius_row, :))
-      if (there(mass_row)) call read_numbers(file, disk_mass, n, chosen, table(mass_row, :))
+      call read_element(file, trim(datasets(1)), n, chosen, table(1:2, :))
+      call read_element(file, trim(datasets(3)), n, chosen, table(3:4, :))
+      do row = spin_row, mass_row
+        dataset = trim(datasets(row))
+        there(row) = file%length(dataset) >= 0
+        if (there(row) .and. row < radius_row) call read_element(file, dataset, n, chosen, table(row:row, :))
+        if (there(row) .and. row >= radius_row) call read_numbers(file, dataset, n, chosen, table(row, :))
+      end do
       if (present(box)) then
         lower = 0
         edges = 1

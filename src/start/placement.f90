@@ -11,10 +11,9 @@ module placement
   use collisions, only: wall_law_t
   use circles, only: new_circle
   use dense_growth, only: grow_disks, smallest_scale
-  use disks, only: species_t
-  use disks, only: angle_column, mass_column, spin_column
+  use disks, only: angle_column, disks_before, mass_column, species_t, spin_column
   use errors, only: error_t, exit_usage, fail
-  use known_places, only: add_known, misfit_t, misfit_text, offset
+  use known_places, only: add_known, misfit_t, misfit_text
   use packing, only: packing_t
   use position_file, only: angle_row, column_names, mass_row, radius_row, spin_row
   use random_insertion, only: insert_at_random
@@ -120,7 +119,7 @@ contains
     x = table(1:2, :)
     radius = table(radius_row, :)
     do k = 1, size(rows)
-      if (species(s)%velocities == "file") sim%disk(offset(species, s) + k)%v = table(3:4, k)
+      if (species(s)%velocities == "file") sim%disk(disks_before(species, s) + k)%v = table(3:4, k)
     end do
     if (sim%own_sizes) call take(mass_column, mass_row)
     if (species(s)%spin_in_file) call take(spin_column, spin_row)
@@ -130,7 +129,7 @@ contains
     subroutine take(column, row)
       integer, intent(in) :: column, row
 
-      sim%extra(sim%extra_row(column), offset(species, s) + 1:offset(species, s) + size(rows)) = table(row, :)
+      sim%extra(sim%extra_row(column), disks_before(species, s) + 1:disks_before(species, s) + size(rows)) = table(row, :)
     end subroutine take
   end subroutine take_disks
 
@@ -178,7 +177,7 @@ contains
       ! The fewer the disks, the more the number that fits varies from trial to trial.
       do trial = 1, max(1, many_trials/me%count)
         call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
-        call insert_at_random(packing, int(s, int32), 1 + offset(species, s), stream, line, placed)
+        call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), stream, line, placed)
         if (placed == me%count) return
         if (me%count > nearly*placed + few) exit
       end do

@@ -4,11 +4,11 @@ module starting_disks
   use kinds, only: int64, real64
   use bounds, only: first_outside
   use box_geometry, only: box_t
+  use disks, only: names_of
   use errors, only: error_t, exit_usage, fail
-  use h5md_layout, only: angular_velocity, disk_mass, disk_radius, orientation, position, value_of, velocity
-  use last_frame, only: is_run, read_last_frame
+  use last_frame, only: datasets, is_run, read_last_frame
   use parameters, only: largest, smallest
-  use position_file, only: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
+  use position_file, only: column_names, mass_row, radius_row, read_positions, spin_row
   use settings, only: species_settings_t
   use texts, only: counted, written
   implicit none
@@ -28,19 +28,14 @@ contains
     logical, intent(out) :: there(:)                          !! (column_names) in the file
     integer, allocatable, intent(out) :: rows(:)              !! as in `origin`
     type(error_t), allocatable, intent(out) :: error
-    character(len=40) :: names(size(species))
     character(len=:), allocatable :: of_species
-    integer :: k
 
     associate (me => species(s))
-      do k = 1, size(species)
-        names(k) = species(k)%name
-      end do
       if (.not. is_run(me%file) .and. me%scale_positions) then
         call fail(error, exit_usage, me%file//": is not the file of a run (.h5), which scale_positions needs: it says " &
           //"how large the box was")
       else if (.not. is_run(me%file)) then
-        call read_positions(me%file, names, s, table, there, rows, error)
+        call read_positions(me%file, names_of(species), s, table, there, rows, error)
       else if (me%scale_positions) then
         call read_last_frame(me%file, me%name, table, there, rows, error, box)
       else
@@ -139,20 +134,7 @@ contains
     if (size(rows) == 0) then
       text = "species."//species%name//".placement"
     else if (is_run(species%file)) then
-      select case (column)
-      case (1:2)
-        text = position//value_of
-      case (3:4)
-        text = velocity//value_of
-      case (spin_row)
-        text = angular_velocity//value_of
-      case (angle_row)
-        text = orientation//value_of
-      case default
-        text = disk_mass
-        if (column == radius_row) text = disk_radius
-      end select
-      text = species%file//": "//text//": row "//written(rows(k))
+      text = species%file//": "//trim(datasets(column))//": row "//written(rows(k))
       if (column < radius_row) text = text//" of the last frame"
       if (column < 3 .and. species%scale_positions) text = text//", stretched to this box"
     else
