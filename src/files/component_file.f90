@@ -54,17 +54,14 @@ contains
     character(len=*), intent(in) :: name
     real(real64), intent(inout) :: values(:)
     real(real64), intent(in) :: range(2)
-    real(real64), allocatable :: buffer(:)
     integer :: k
 
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
-    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(values), values)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(values), values)
+    self%crc = crc_of(transfer(values, [0_int8]), self%crc)
     if (self%writing) return
-    values = buffer
-    k = first_outside(buffer, range)
-    if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))
+    k = first_outside(values, range)
+    if (k > 0) call self%object(name, k, size(values), written(values(k)), written(range(1))//" to "//written(range(2)))
   end subroutine exchange_reals
 
   !> Writes or reads an integer of 64 bits.
@@ -86,17 +83,14 @@ contains
     character(len=*), intent(in) :: name
     integer(int64), intent(inout) :: values(:)
     integer(int64), intent(in) :: range(2)
-    integer(int64), allocatable :: buffer(:)
     integer :: k
 
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
-    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(values), values)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(values), values)
+    self%crc = crc_of(transfer(values, [0_int8]), self%crc)
     if (self%writing) return
-    values = buffer
-    k = first_outside(buffer, range)
-    if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))
+    k = first_outside(values, range)
+    if (k > 0) call self%object(name, k, size(values), written(values(k)), written(range(1))//" to "//written(range(2)))
   end subroutine exchange_longs
 
   !> Writes or reads an array of integers of 32 bits.
@@ -105,17 +99,14 @@ contains
     character(len=*), intent(in) :: name
     integer(int32), intent(inout) :: values(:)
     integer(int64), intent(in) :: range(2)
-    integer(int32), allocatable :: buffer(:)
     integer :: k
 
-    allocate (buffer, source=values)
-    if (self%writing) call self%hdf5%put(self%name_of(name), shape(buffer), buffer)
-    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(buffer), buffer)
-    self%crc = crc_of(transfer(buffer, [0_int8]), self%crc)
+    if (self%writing) call self%hdf5%put(self%name_of(name), shape(values), values)
+    if (.not. self%writing) call self%hdf5%fetch(self%name_of(name), size(values), values)
+    self%crc = crc_of(transfer(values, [0_int8]), self%crc)
     if (self%writing) return
-    values = buffer
-    k = first_outside(int(buffer, int64), range)
-    if (k > 0) call self%object(name, k, size(buffer), written(buffer(k)), written(range(1))//" to "//written(range(2)))
+    k = first_outside(int(values, int64), range)
+    if (k > 0) call self%object(name, k, size(values), written(values(k)), written(range(1))//" to "//written(range(2)))
   end subroutine exchange_integers
 
   !> Remembers a value that is out of its range if it is the first one.
