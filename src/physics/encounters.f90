@@ -53,8 +53,7 @@ contains
     end if
     if (.not. counts) return
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
-    if (code > 0 .and. sim%law%detailed) call add_stress(sim, first, second, change)
-    if (code > 0 .and. sim%box%is_sheared()) call book_work(sim, first, second, change)
+    if (code > 0 .and. sim%law%detailed) call book_pair(sim, first, second, change)
     if (.not. log%is_on()) return
     associate (impulse => sim%mass_of(first)*magnitude(sim%disk(first)%v - v))
       if (code > 0) then
@@ -165,23 +164,9 @@ contains
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)
   end subroutine settle
 
-  !> Books what the shear has done in a collision of the disks i and j, whose momentum changes by `change` and its negative:
-  !> nothing but if they met through the bottom or the top.
-  subroutine book_work(sim, i, j, change)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-    real(real64), intent(in) :: change(2)        !! [mass length/time]
-    real(real64) :: dx(2), slip(2)
-
-    dx = sim%disk(j)%x - sim%disk(i)%x
-    slip = 0
-    call see_nearest(sim, sim%disk(i)%clock, dx, slip)
-    call sim%tally%sum(work)%add(slip(1)*change(1))
-    call settle(sim, i, j)
-  end subroutine book_work
-
-  !> Adds the change of momentum of disk i in a collision with disk j, times their distance.
-  subroutine add_stress(sim, i, j, change)
+  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change times their
+  !> distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
+  subroutine book_pair(sim, i, j, change)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: change(2)        !! [mass length/time]
@@ -196,7 +181,10 @@ contains
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
       end do
     end do
-  end subroutine add_stress
+    if (.not. sim%box%is_sheared()) return
+    call sim%tally%sum(work)%add(-slip(1)*change(1))
+    call settle(sim, i, j)
+  end subroutine book_pair
 
   !> Turns the separation of two disks at the time t, and its rate, into those of the nearest image of the second.
   pure subroutine see_nearest(sim, t, dx, dv)
