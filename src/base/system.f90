@@ -56,6 +56,13 @@ module system
       integer(c_int) :: status
     end function path_call
 
+    !> A question about a file or folder, in bytes.
+    function size_call(path) bind(C) result(bytes)
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t) :: bytes
+    end function size_call
+
     !> A call that gives a file another name; 0 for success.
     function naming_call(from, to) bind(C) result(status)
       import :: c_char, c_int
@@ -95,18 +102,6 @@ module system
       character(kind=c_char), intent(out) :: text(*)
       integer(c_size_t), value :: size
     end subroutine c_name_host
-
-    function c_free_bytes(folder) bind(C, name="system_free_bytes") result(bytes)
-      import :: c_char, c_int64_t
-      character(kind=c_char), intent(in) :: folder(*)
-      integer(c_int64_t) :: bytes
-    end function c_free_bytes
-
-    function c_file_size(path) bind(C, name="system_file_size") result(bytes)
-      import :: c_char, c_int64_t
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int64_t) :: bytes
-    end function c_file_size
 
     function c_read_bytes(path, position, bytes, count) bind(C, name="system_read_bytes") result(n)
       import :: c_char, c_int64_t
@@ -168,6 +163,8 @@ module system
   procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or a number above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
+  procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! on the disk of a folder
+  procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
   procedure(naming_call), bind(C, name="link") :: c_link
 
