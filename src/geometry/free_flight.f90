@@ -95,7 +95,7 @@ contains
   pure function time_to_circle_falling(d, v, g, rho, inside) result(s)
     real(real64), intent(in) :: d(2), v(2), g(2), rho
     logical, intent(in) :: inside
-    real(real64) :: s, cubic(0:3), edge(0:4), a, b, c, disc, bend(2), bound
+    real(real64) :: s, cubic(0:3), edge(0:4), a, b, c, disc, bend(2), bound, ends(4)
     integer :: k, n
 
     cubic = [2*dot_product(d, v), 2*(dot_product(v, v) + dot_product(d, g)), 3*dot_product(v, g), dot_product(g, g)]
@@ -104,11 +104,14 @@ contains
     disc = max(b*b - a*c, 0.0_real64)
     bend = [(-b - sign(sqrt(disc), a))/a, (-b + sign(sqrt(disc), a))/a]
 
+    ends = [0.0_real64, min(max(bend, 0.0_real64), bound), bound]
     edge(0) = 0                                        ! ends of the intervals on which F is monotone
     n = 0
-    call add_root(cubic, 0.0_real64, min(max(bend(1), 0.0_real64), bound), edge, n)
-    call add_root(cubic, min(max(bend(1), 0.0_real64), bound), min(max(bend(2), 0.0_real64), bound), edge, n)
-    call add_root(cubic, min(max(bend(2), 0.0_real64), bound), bound, edge, n)
+    do k = 1, 3
+      if ((value(cubic, ends(k)) > 0) .eqv. (value(cubic, ends(k + 1)) > 0)) cycle
+      n = n + 1
+      edge(n) = root_between(cubic, ends(k), ends(k + 1))
+    end do
     n = n + 1
     edge(n) = edge(n - 1) + bound
     do while (inside .and. apart(edge(n)) > 0)
@@ -169,18 +172,6 @@ contains
     end do
     s = left
   end function last_apart
-
-  !> Appends the root of `poly` in (lo, hi), if it changes sign there.
-  pure subroutine add_root(poly, lo, hi, edge, n)
-    real(real64), intent(in) :: poly(0:), lo, hi
-    real(real64), intent(inout) :: edge(0:)
-    integer, intent(inout) :: n
-
-    if (.not. hi > lo) return
-    if ((value(poly, lo) > 0) .eqv. (value(poly, hi) > 0)) return
-    n = n + 1
-    edge(n) = root_between(poly, lo, hi)
-  end subroutine add_root
 
   !> The root of `poly` between lo and hi, where it changes sign once; bisection to the last bit.
   pure function root_between(poly, lo, hi) result(s)

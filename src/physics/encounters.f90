@@ -29,7 +29,7 @@ contains
     logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout) :: log
     real(real64) :: v(2), change(2)
-    integer(int32) :: first, second
+    integer(int32) :: first, second, partner
 
     first = i
     second = min(code, 0)
@@ -55,13 +55,9 @@ contains
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
     if (code > 0 .and. sim%law%detailed) call book_pair(sim, first, second, change)
     if (.not. log%is_on()) return
-    associate (impulse => sim%mass_of(first)*magnitude(sim%disk(first)%v - v))
-      if (code > 0) then
-        call log%append(sim%epoch + t, sim%tag(first)%id, sim%tag(second)%id, impulse, change)
-      else
-        call log%append(sim%epoch + t, sim%tag(i)%id, code, impulse, change)
-      end if
-    end associate
+    partner = code
+    if (code > 0) partner = sim%tag(second)%id
+    call log%append(sim%epoch + t, sim%tag(first)%id, partner, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), change)
   end subroutine collide
 
   !> Turns disk i, whose clock is still to be set, to where it is at the time t.
