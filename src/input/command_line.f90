@@ -53,12 +53,13 @@ contains
     type(command_t), intent(out) :: command
     type(error_t), allocatable, intent(out) :: error
     logical :: only_files
-    integer :: k
+    integer :: k, n
 
     command%question = ""
     command%input = ""
     command%output = ""
-    allocate (command%overrides(size(arguments)))   ! each in the place of its argument, for the time being
+    allocate (command%overrides(size(arguments)))   ! as many as there can be, for the time being
+    n = 0
     only_files = .false.
     k = 1
     do while (k <= size(arguments))
@@ -66,7 +67,7 @@ contains
         if (.not. only_files .and. argument == "--") then
           only_files = .true.
         else if (.not. only_files .and. index(argument, "-") == 1) then
-          call take_option(arguments, k, command, error)
+          call take_option(arguments, k, command, n, error)
         else if (command%input == "" .and. argument /= "") then
           command%input = argument
         else if (argument == "") then
@@ -78,7 +79,7 @@ contains
       if (allocated(error) .or. command%question /= "") return
       k = k + 1
     end do
-    call close_ranks(command%overrides)
+    command%overrides = command%overrides(:n)
     if (command%input == "") then
       call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
     end if
@@ -91,10 +92,11 @@ contains
   end subroutine parse_arguments
 
   !> Takes one option, and the next argument if it is the option's value.
-  pure subroutine take_option(arguments, k, command, error)
+  pure subroutine take_option(arguments, k, command, n, error)
     type(text_t), intent(in) :: arguments(:)
     integer, intent(inout) :: k
     type(command_t), intent(inout) :: command
+    integer, intent(inout) :: n                    !! overrides so far
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: name, value
 
@@ -109,7 +111,8 @@ contains
       call take_value(arguments, k, name, command%output, error)
     case ("--set")
       call take_value(arguments, k, name, value, error)
-      command%overrides(k)%text = value
+      n = n + 1
+      command%overrides(n)%text = value
     case ("--explain")
       command%question = "explain"
       call take_value(arguments, k, name, command%topic, error)
@@ -129,22 +132,6 @@ contains
       call report_unknown(name, error)
     end select
   end subroutine take_option
-
-  !> Leaves out the places of a list that have no text. (The compiler loses memory when an array is built of texts.)
-  pure subroutine close_ranks(list)
-    type(text_t), allocatable, intent(inout) :: list(:)
-    type(text_t), allocatable :: shorter(:)
-    integer :: k, n
-
-    allocate (shorter(count([(allocated(list(k)%text), k=1, size(list))])))
-    n = 0
-    do k = 1, size(list)
-      if (.not. allocated(list(k)%text)) cycle
-      n = n + 1
-      call move_alloc(list(k)%text, shorter(n)%text)
-    end do
-    call move_alloc(shorter, list)
-  end subroutine close_ranks
 
   !> The value after `=` or in the next argument.
   pure subroutine take_value(arguments, k, name, value, error)

@@ -174,7 +174,7 @@ contains
     type(text_t), allocatable :: both(:)
     character(len=:), allocatable :: source, text
     character(len=1), parameter :: eol = new_line("a")
-    integer :: first, k, last, pass, n
+    integer :: first, k, last, n
 
     source = run_file(path, unfinished)
     if (.not. is_file(source)) source = path
@@ -182,24 +182,23 @@ contains
     call file%open(source, writable=.false.)
     call file%fetch_text(parameters_group//"overrides", text)
     call file%close()
-    do pass = 1, 2                                               ! counts, then takes
-      n = 0
-      first = 1
-      do while (first <= len(text))
-        last = first + index(text(first:)//eol, eol) - 2
-        if (.not. (is_free(name_in(text(first:last))) .or. &
-          any([(name_in(overrides(k)%text) == name_in(text(first:last)), k=1, size(overrides))]))) then
-          n = n + 1
-          if (pass == 2) both(n)%text = text(first:last)
-        end if
-        first = last + 2
-      end do
-      if (pass == 1) allocate (both(n + size(overrides)))
+    allocate (both(count([(text(k:k) == eol, k=1, len(text))]) + 1 + size(overrides)))
+    n = 0
+    first = 1
+    do while (first <= len(text))
+      last = first + index(text(first:)//eol, eol) - 2
+      if (.not. (is_free(name_in(text(first:last))) .or. &
+        any([(name_in(overrides(k)%text) == name_in(text(first:last)), k=1, size(overrides))]))) then
+        n = n + 1
+        both(n)%text = text(first:last)
+      end if
+      first = last + 2
     end do
     do k = 1, size(overrides)
-      both(n + k)%text = overrides(k)%text
+      n = n + 1
+      both(n)%text = overrides(k)%text
     end do
-    call move_alloc(both, overrides)
+    overrides = both(:n)
   end subroutine recall_overrides
 
   !> The variable of an override.
