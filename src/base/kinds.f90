@@ -3,11 +3,13 @@ module kinds
   use, intrinsic :: iso_fortran_env, only: int16, int32, int64, real64
   implicit none
   private
-  public :: int16, int32, int64, int128, real64, never, pi
+  public :: int16, int32, int64, int128, real64, most_exact, never, pi
 
   integer, parameter :: int128 = selected_int_kind(38)
 
   !> Later than any event. Finite, so that sums and products with it are finite too.
   real(real64), parameter :: never = 1.0e150_real64
+  !> Up to this whole numbers are exact as reals, and real numbers tell steps of 1 apart.
+  real(real64), parameter :: most_exact = 2.0_real64**53
   real(real64), parameter :: pi = 3.14159265358979323846264338327950288_real64
 end module kinds

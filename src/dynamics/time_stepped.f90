@@ -5,7 +5,7 @@
 !> As there, a disk's own state changes only at its own collisions, so no error accumulates from step to step.
 module time_stepped
   use images, only: images_t
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, most_exact, never, real64
   use box_geometry, only: box_t, strike_velocity, wall_normal
   use box_sides, only: bounds
   use disks, only: disk_t
@@ -26,7 +26,6 @@ module time_stepped
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
   integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
-  real(real64), parameter :: most_steps = 2.0_real64**53  !! that a real tells apart
   integer(int32), parameter :: many = 5000            !! disks: to test all pairs takes long
 
   type, extends(evolution_t) :: time_stepped_t
@@ -68,7 +67,7 @@ contains
     real(real64) :: t                              !! likewise
 
     t = time
-    if (time > most_steps*self%dt) return
+    if (time > most_exact*self%dt) return
     t = steps_taken(time, self%dt)*self%dt
     if (t < time) t = (steps_taken(time, self%dt) + 1)*self%dt
   end function pause_at

@@ -4,12 +4,13 @@ module parameter_values
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
   use parameters, only: allowed, either, name_length, row_of, table, words_of
-  use texts, only: growing_text_t, written, written_exactly
+  use texts, only: written, written_exactly
   implicit none
   private
-  public :: parameter_value_t, parameter_group_t, text_length, range_of, values_text
+  public :: parameter_value_t, parameter_group_t, text_length, range_of
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
+  integer, parameter, public :: most_written = 100      !! values of a variable in an assignment: longer lists are cut
 
   !> One variable. Numbers with a fraction are reals; everything else is kept as texts: integers as
   !> digits, so that 64 bits fit, logicals as `.true.` or `.false.`. Neither is allocated without a value.
@@ -43,6 +44,7 @@ module parameter_values
     procedure :: put_text, put_reals
     procedure :: complain, demand, refuse
     procedure :: infer_choices, check_choices
+    procedure :: assignment
   end type parameter_group_t
 
 contains
@@ -264,38 +266,28 @@ contains
     range(2) = range(1) + count(named) - 1
   end function range_of
 
-  !> Every value as it is used, one variable per line: `species.bed.radius = 0.005`.
-  pure function values_text(groups) result(text)
-    type(parameter_group_t), intent(in) :: groups(:)
+  !> What gives a variable its value: `species.bed.radius = 0.005`.
+  pure function assignment(self, k) result(text)
+    class(parameter_group_t), intent(in) :: self
+    integer, intent(in) :: k                   !! its place in the group
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: prefix
-    type(growing_text_t) :: growing
-    integer :: g, v
 
-    do g = 1, size(groups)
-      prefix = trim(groups(g)%name)//"."
-      if (groups(g)%instance /= "") prefix = prefix//trim(groups(g)%instance)//"."
-      do v = 1, size(groups(g)%values)
-        associate (value => groups(g)%values(v))
-          if (value%is_set()) call growing%add(prefix//trim(value%name)//" = "//value_text(value)//new_line("a"))
-        end associate
-      end do
-    end do
-    text = growing%text()
-  end function values_text
+    text = trim(self%name)//"."
+    if (self%instance /= "") text = text//trim(self%instance)//"."
+    text = text//trim(self%values(k)%name)//" = "//value_text(self%values(k))
+  end function assignment
 
   !> The values of a variable as they would be written in a file.
   pure function value_text(value) result(text)
     type(parameter_value_t), intent(in) :: value
     character(len=:), allocatable :: text
-    integer, parameter :: most = 100               !! longer lists are cut
     integer :: k, n
 
     n = 0
     if (allocated(value%reals)) n = size(value%reals)
     if (allocated(value%texts)) n = size(value%texts)
     text = ""
-    do k = 1, min(n, most)
+    do k = 1, min(n, most_written)
       if (k > 1) text = text//", "
       if (value%kind == "real") then
         text = text//written_exactly(value%reals(k))
@@ -305,7 +297,7 @@ contains
         text = text//trim(value%texts(k))
       end if
     end do
-    if (n > most) text = text//", ... ! "//written(n)//" values"
+    if (n > most_written) text = text//", ... ! "//written(n)//" values"
   end function value_text
 
   !> In quotes, with quotes inside doubled.

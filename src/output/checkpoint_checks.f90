@@ -3,7 +3,7 @@
 module checkpoint_checks
   use cadence, only: cadence_t
   use disks, only: species_by_id
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, most_exact, never, real64
   use progress, only: progress_t
   use settings, only: settings_t
   use simulation_state, only: simulation_t
@@ -13,7 +13,6 @@ module checkpoint_checks
   private
   public :: flaw_of_state, flaw_of_progress
 
-  real(real64), parameter :: countable = 2.0_real64**53     !! steps of time that a real tells apart
   real(real64), parameter :: rounding = 1.0e-6_real64       !! relative, more than that of any run
 
 contains
@@ -28,7 +27,7 @@ contains
     flaw = flaw_of_tags(sim, settings)
     if (flaw == "") flaw = flaw_of_counts(sim)
     dt = merge(settings%run%dt, 0.0_real64, settings%run%dynamics == "steps")
-    if (flaw == "" .and. dt > 0 .and. sim%time() > countable*dt) flaw = "now is more than 2**53 steps of time"
+    if (flaw == "" .and. dt > 0 .and. sim%time() > most_exact*dt) flaw = "now is more than 2**53 steps of time"
     if (flaw == "") flaw = flaw_of_kicks(sim, dt)
     if (flaw == "") flaw = flaw_of_motion(sim, dt)
   end function flaw_of_state
@@ -187,7 +186,7 @@ contains
 
     flaw = ""
     if (cadence%last_time > sim%time() .or. cadence%last_events > sim%tally%events .or. &
-      sim%time() > countable*cadence%every_time) flaw = "progress/"//name//": the last sample is of time " &
+      sim%time() > most_exact*cadence%every_time) flaw = "progress/"//name//": the last sample is of time " &
       //written(cadence%last_time)//" and event "//written(cadence%last_events)//", the state of time " &
       //written(sim%time())//" and event "//written(sim%tally%events)
   end function flaw_of_cadence

@@ -2,16 +2,16 @@
 !> come. It is written to a file of its own, and into the output of a finished run.
 module checkpoint_contents
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, most_exact, never, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use component_file, only: component_file_t
-  use disks, only: columns, id_column, image_column, mass_column, met_column, n_columns, radius_column, species_column
+  use disks, only: clocks, columns, id_column, image_column, mass_column, met_column, n_columns, radius_column, species_column
   use errors, only: error_t, exit_usage, fail
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
-  use parameter_values, only: parameter_group_t, values_text
+  use parameter_values, only: most_written, parameter_group_t
   use partners, only: obstacle_code
   use progress, only: progress_t
   use sample_track, only: samples_t
@@ -31,11 +31,10 @@ module checkpoint_contents
     "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
 
   ! Ranges of what is read
-  real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
   real(real64), parameter :: most = 1.0e300_real64          !! of sums: two of them do not overflow
-  real(real64), parameter :: times(2) = [0.0_real64, longest], clocks(2) = [-longest, longest]
+  real(real64), parameter :: times(2) = [0.0_real64, clocks(2)]
   real(real64), parameter :: anything(2) = [-most, most], not_negative(2) = [0.0_real64, most]
-  integer(int64), parameter :: counts(2) = [0_int64, 2_int64**53]   !! exact also as reals
+  integer(int64), parameter :: counts(2) = [0_int64, int(most_exact, int64)]
 
 contains
 
@@ -51,21 +50,21 @@ contains
   !> The input as it was used, without what is free to change: one variable to a line.
   pure function fixed_input(groups) result(text)
     type(parameter_group_t), intent(in) :: groups(:)
-    character(len=:), allocatable :: text, all
+    character(len=:), allocatable :: text, line
     type(growing_text_t) :: growing
-    integer :: k, g, first, last
+    integer :: k, g
 
-    all = values_text(groups)
-    first = 1
-    do while (first <= len(all))
-      last = first + index(all(first:), eol) - 1
-      if (.not. is_free(all(first:last))) call growing%add(all(first:last))
-      first = last + 1
+    do g = 1, size(groups)
+      do k = 1, size(groups(g)%values)
+        if (.not. groups(g)%values(k)%is_set()) cycle
+        line = groups(g)%assignment(k)
+        if (.not. is_free(line)) call growing%add(line//eol)
+      end do
     end do
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
-        if (size(groups(g)%values(k)%reals) <= 100) cycle      ! in the text with all digits
+        if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! in the text with all digits
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
       end do

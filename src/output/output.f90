@@ -16,7 +16,7 @@ module output
   use run_files, only: check_places, check_replaced, check_start, identify, is_file, lock, remove_checkpoints, &
     remove_temporaries, run_file, take_final_name, unfinished, unfinished_new
   use settings, only: run_input_t
-  use samples, only: check_counts, event_series, event_width, frame_sample, frame_series, observable_sample, observable_series
+  use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use signals, only: record_signals
@@ -254,7 +254,7 @@ contains
     type(event_log_t), intent(inout) :: log
 
     if (log%n == 0) return
-    call self%append(event_track, log%record(:event_width(self%input%settings%law%detailed), :log%n), sim)
+    call self%append(event_track, log%record(:sum(self%h5md%track(event_track)%series%width()), :log%n), sim)
     self%progress%events = self%progress%events + log%n
     call log%clear()
   end subroutine write_events

@@ -1,7 +1,7 @@
 !> What a frame, a sample of the observables and a sample of the event log consist of: the series of each,
 !> and the record with their values one after the other, in the same order.
 module samples
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, most_exact, real64
   use disks, only: columns, image_column, n_columns
   use errors, only: error_t, exit_broken, fail
   use h5md_layout, only: disk_collisions, disks_group, events_group, image, observables_group, position, step_of, time_of, &
@@ -11,7 +11,7 @@ module samples
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: frame_series, frame_sample, observable_series, observable_sample, event_series, event_width, check_counts
+  public :: frame_series, frame_sample, observable_series, observable_sample, event_series, check_counts
 
 contains
 
@@ -140,28 +140,18 @@ contains
     if (detailed) series = [series, series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
-  !> How many numbers of a record of the event log it takes.
-  pure function event_width(detailed) result(n)
-    logical, intent(in) :: detailed
-    integer :: n
-
-    n = merge(6, 4, detailed)
-  end function event_width
-
   !> Fails if a count of a simulation is too large for samples, which hold it as a real.
   subroutine check_counts(sim, error)
     type(simulation_t), intent(in) :: sim
     type(error_t), allocatable, intent(out) :: error
-    integer(int64), parameter :: most = 2_int64**digits(1.0_real64)
-
     integer(int32) :: i
     logical :: too_far
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%image(i)) >= most)         ! a frame may have to count one period more
+      too_far = too_far .or. any(abs(sim%image(i)) >= int(most_exact, int64))         ! a frame may have to count one period more
     end do
-    if (sim%tally%events > most .or. too_far) &
+    if (sim%tally%events > int(most_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")
   end subroutine check_counts
 

@@ -3,7 +3,7 @@
 !> columns that are there only where something needs them. What is derived is not in the table: it is rebuilt at every
 !> start.
 module disks
-  use kinds, only: int16, int32, int64, never, real64
+  use kinds, only: int16, int32, int64, most_exact, never, real64
   implicit none
   private
   public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
@@ -54,11 +54,11 @@ module disks
   end type column_t
 
   real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
-  real(real64), parameter :: clocks(2) = [-longest, longest]
+  real(real64), parameter, public :: clocks(2) = [-longest, longest]
   real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
   real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
   real(real64), parameter :: sizes(2) = [1.0e-100_real64, 1.0e100_real64]
-  real(real64), parameter :: counts(2) = [0.0_real64, 2.0_real64**53]   !! exact as reals
+  real(real64), parameter :: counts(2) = [0.0_real64, most_exact]
   real(real64), parameter :: periods(2) = [-counts(2), counts(2)]
   real(real64), parameter :: anything(2) = [-never, never]
   real(real64), parameter :: of_simulation(2) = 0.0_real64
