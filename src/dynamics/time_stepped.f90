@@ -279,7 +279,7 @@ contains
     integer(int32), intent(in) :: i, code
     real(real64) :: normal(2)
 
-    normal = wall_normal(sim%box, code, self%at%centre(i))
+    normal = wall_normal(sim%box, code, self%at%centre(i), sim%velocity(i))
     if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
       call collide(sim, i, code, sim%now, .true., self%log)
   end subroutine meet_wall

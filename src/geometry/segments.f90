@@ -53,11 +53,12 @@ contains
   end function direction
 
   !> From the middle of the image that is nearest to x: of a long wall not always the one with the nearest middle.
-  pure function from_nearest(self, x, images) result(d)
+  pure function from_nearest(self, x, images, heading) result(d)
     class(segment_t), intent(in) :: self
     real(real64), intent(in) :: x(2)
     type(images_t), intent(in) :: images
-    real(real64) :: d(2), nearest(2), candidate(2)
+    real(real64), intent(in), optional :: heading(2)
+    real(real64) :: d(2), nearest(2), candidate(2), touching
     integer :: k
 
     nearest = x - self%middle
@@ -66,6 +67,14 @@ contains
     do k = 1, images%count()
       candidate = nearest + images%shift(images%around(k))
       if (self%gap(candidate, 0.0_real64) < self%gap(d, 0.0_real64)) d = candidate
+    end do
+    if (.not. present(heading)) return
+    touching = self%gap(d, 0.0_real64)
+    touching = touching + spare**2*(touching + self%length + maxval(abs(x)))
+    do k = 1, images%count()
+      candidate = nearest + images%shift(images%around(k))
+      if (self%gap(candidate, 0.0_real64) > touching) cycle
+      if (dot_product(heading, self%normal(candidate)) > dot_product(heading, self%normal(d))) d = candidate
     end do
   end function from_nearest
 

@@ -2,7 +2,7 @@
 !> obstacle's shape all they need to know, and know no centre, radius or end themselves.
 module shapes
   use images, only: images_t
-  use kinds, only: real64
+  use kinds, only: never, real64
   implicit none
   private
   public :: shape_t, magnitude, spare
@@ -108,15 +108,24 @@ contains
     magnitude = sqrt(v(1)*v(1) + v(2)*v(2))
   end function magnitude
 
-  !> From the middle of its nearest image to x. What encloses the disks has no images.
-  pure function from_nearest(self, x, images) result(d)
+  !> From the middle of its nearest image to x. What encloses the disks has no images. Of two that are equally near, in
+  !> the middle between them, it is the one that `heading` points away from, if that is given: a disk may touch both.
+  pure function from_nearest(self, x, images, heading) result(d)
     class(shape_t), intent(in) :: self
     real(real64), intent(in) :: x(2)            !! [length]
     type(images_t), intent(in) :: images        !! of the box
+    real(real64), intent(in), optional :: heading(2)
     real(real64) :: d(2)
+    integer :: axis
 
     d = x - self%middle
     if (.not. self%encloses) d = d + images%shift(images%nearest_image(d))
+    if (self%encloses .or. .not. present(heading)) return
+    do axis = 1, 2
+      if (.not. (images%period(axis) < never .and. d(axis)*heading(axis) < 0)) cycle
+      if (abs(d(axis)) > 0.5_real64*images%period(axis) - spare**2*(images%period(axis) + abs(x(axis)))) &
+        d(axis) = d(axis) - sign(images%period(axis), d(axis))
+    end do
   end function from_nearest
 
   !> Unit vector along the outline where the normal is this one: counter-clockwise around its middle.

@@ -228,7 +228,7 @@ contains
         t_m = never
         left = never                            ! the image that it leaves
         if (last == obstacle_code(list(k)) .and. .not. (shape%encloses .or. box%falling())) &
-          left = shape%from_nearest(disk%x, images)
+          left = shape%from_nearest(disk%x, images, heading=disk%v)
         do image = 1, images%count()
           d = disk%x - (shape%middle + images%shift(images%around(image)))
           if (all(abs(d - left) < 0.5_real64*box%edges())) cycle
@@ -299,11 +299,12 @@ contains
     end associate
   end function strike_velocity
 
-  !> Unit vector from a side or obstacle to a disk at x that touches it.
-  pure function wall_normal(box, code, x) result(normal)
+  !> Unit vector from a side or obstacle to a disk at x that hits it with the velocity v.
+  pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: x(2)            !! [length]
+    real(real64), intent(in) :: v(2)            !! [length/time]
     real(real64) :: normal(2)
 
     if (is_side(code)) then
@@ -311,7 +312,7 @@ contains
       normal(axis_of(code)) = -sense_of(code)
     else
       associate (shape => box%obstacle(obstacle_number(code))%shape)
-        normal = shape%normal(shape%from_nearest(x, box%images()))
+        normal = shape%normal(shape%from_nearest(x, box%images(), heading=-v))
       end associate
     end if
   end function wall_normal

@@ -66,7 +66,7 @@ contains
     if (sim%law%contact_time > 0) call make_contact(sim, i, t, elastic)
     call land(sim%disk(i), sim%box%gravity, t)
     law = wall_law(sim%box, code)
-    normal = wall_normal(sim%box, code, sim%disk(i)%x)
+    normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
     strike = strike_velocity(sim%box, code, normal, t)
     u = surface_velocity(sim%box, code, normal) + strike
     v = sim%disk(i)%v
