@@ -130,7 +130,7 @@ contains
     sound = .false.
     if (s%radius <= 0 .or. s%count < 1 .or. group%faulty("region")) return
     do axis = 1, 2
-      call check_axis(group, s, box, axis, merge(1, 2, alone), problems, sound)
+      call check_axis(group, s, box, axis, alone, problems, sound)
       if (.not. sound) return
     end do
     if (.not. s%radius_in_file) call check_fraction(group, s, problems)
@@ -142,18 +142,18 @@ contains
     end do
   end subroutine check_species
 
-  !> Along each axis the region must lie in the box and hold a disk; a period must hold two, so that no disk touches two
-  !> images of another.
-  subroutine check_axis(group, s, box, axis, together, problems, sound)
+  !> Along each axis the region must lie in the box and hold a disk; a period must be longer than two, so that no disk
+  !> touches two images of another at once.
+  subroutine check_axis(group, s, box, axis, alone, problems, sound)
     type(parameter_group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
     integer, intent(in) :: axis
-    integer, intent(in) :: together                           !! disks that a period must hold
+    logical, intent(in) :: alone                              !! there is one disk in all
     type(problem_list_t), intent(inout) :: problems
     logical, intent(out) :: sound
     logical :: endless(2)
-    real(real64) :: lower, upper, room, farthest, low(2), high(2)
+    real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
 
     call bounds(box, 0.0_real64, low, high)
     sound = .false.
@@ -162,6 +162,7 @@ contains
     upper = s%region(2*axis)
     room = min(upper, high(axis)) - max(lower, low(axis))     ! less what sides out of their places take
     farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
+    least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
     if (lower >= upper) then
       call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
     else if (lower < min(box%lower(axis), low(axis)) .or. upper > max(box%upper(axis), high(axis))) then
@@ -169,9 +170,9 @@ contains
     else if (.not. endless(axis) .and. 2*s%radius > room*(1 + rounding)) then
       call complain("radius", "a disk of diameter "//written(2*s%radius)// &
         " does not fit in its region of width "//written(room))
-    else if (box%periodic(axis) .and. 2*together*s%radius > box%upper(axis) - box%lower(axis)) then
-      call complain("radius", "a periodic box must be at least "//trim(merge("one diameter ", "two diameters", together == 1)) &
-        //" wide: "//written(2*together*s%radius)//" > "//written(box%upper(axis) - box%lower(axis)))
+    else if (box%periodic(axis) .and. least > box%upper(axis) - box%lower(axis)) then
+      call complain("radius", "a periodic box must be "//trim(merge("at least one diameter wide", "wider than two diameters  ", &
+        alone))//", "//written(merge(2, 4, alone)*s%radius)//"; it is "//written(box%upper(axis) - box%lower(axis)))
     else if (s%radius < resolution*farthest) then
       call complain("radius", written(s%radius)//" is too small to be resolved at coordinates of "//written(farthest))
     else
