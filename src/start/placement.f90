@@ -179,7 +179,7 @@ contains
         call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
         call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), stream, line, placed)
         if (placed == me%count) return
-        if (me%count > nearly*placed + few) exit
+        if (placed == 0 .or. me%count > nearly*placed + few) exit    ! without room for one, no trial has any
       end do
       disk_packing = pi*me%radius**2/product(me%region([2, 4]) - me%region([1, 3]))
       advice = "use fewer or smaller disks"

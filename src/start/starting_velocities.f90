@@ -114,7 +114,11 @@ contains
     do i = 1, size(disk)
       temperature = temperature + 0.5_real64*mass(i)*sum((disk(i)%v - mean)**2)/size(disk)
     end do
-    if (.not. temperature > 0) then
+    if (size(disk) == 1) then
+      call fail(error, exit_usage, "species."//species%name//".exact_temperature: one disk does not move relative to the mean " &
+        //"of its species; leave it out, or take more disks")
+      return
+    else if (.not. temperature > 0) then
       call fail(error, exit_usage, "species."//species%name//".exact_temperature: the disks do not move relative to each " &
         //"other, which no factor changes; let them start with velocities = 'maxwell'")
       return

@@ -176,6 +176,20 @@ def test_velocities_from_a_file_are_scaled_to_an_exact_temperature(onward, tmp_p
     assert run.returncode == USAGE and "exact_temperature" in one_line(run)
 
 
+def test_one_disk_has_no_exact_temperature(ricochet, tmp_path):
+    gas = "&species count = 1 radius = 0.1 temperature = 1 exact_temperature = 1 /"
+    write_input(tmp_path, gas + " &stop time = 1 /")
+    run = ricochet("gas.nml", "--check")
+    assert run.returncode == USAGE and "one disk does not move relative" in one_line(run)
+
+
+def test_a_species_without_room_for_one_disk_is_refused_at_once(ricochet, tmp_path):
+    wide = "&species name = 'wide' grid = 5, 5 radius = 0.1 /\n"
+    write_input(tmp_path, wide + "&species count = 1 radius = 0.09 / &stop time = 1 /")
+    run = ricochet("gas.nml", "--check", "--quiet", seconds=1)
+    assert run.returncode == USAGE and "no more room after 0 of 1" in one_line(run)
+
+
 @pytest.mark.parametrize(("packing", "fits"), [(0.90685, True), (0.90689, True), (0.90691, False)])
 def test_a_crystal_may_be_as_dense_as_disks_can_be(ricochet, tmp_path, packing, fits):
     box = f"&box boundary = 'periodic', 'periodic' upper = 10, {5 * math.sqrt(3)!r} /\n"
