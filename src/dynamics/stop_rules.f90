@@ -69,7 +69,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = sim%time() >= self%limits%time .or. self%limits%reached(sim%tally)
+    yes = sim%has_reached(self%limits%time) .or. self%limits%reached(sim%tally)
   end function met
 
   !> Whether the motion relative to the common motion had practically died out when the epoch began.

@@ -47,7 +47,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = self%count == 0 .or. sim%time() >= self%next_time() &
+    yes = self%count == 0 .or. sim%has_reached(self%next_time()) &
       .or. sim%tally%collisions >= self%next_collisions .or. sim%tally%events >= self%next_events
   end function is_due
 
@@ -72,14 +72,16 @@ contains
   end subroutine take
 
   !> Finds when the next samples are due: at the first multiples ahead. This follows from the state alone, whenever
-  !> the last sample was taken.
+  !> the last sample was taken; but for one that is due now, when something may still happen.
   pure subroutine look_ahead(self, sim)
     class(cadence_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
+    logical :: over                               !! the present moment, for samples
 
     if (self%every_time < never) then
+      over = sim%settled .or. self%last_time >= sim%time()
       self%multiple = max(self%multiple, int(sim%time()/self%every_time, int64))
-      do while (self%next_time() <= sim%time())
+      do while (self%next_time() < sim%time() .or. (over .and. self%next_time() <= sim%time()))
         self%multiple = self%multiple + 1
       end do
     end if

@@ -37,6 +37,7 @@ module simulation_state
     integer :: extra_row(n_fixed + 1:n_columns) = 0   !! in which row of these a column is; 0: not there
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
+    logical :: settled = .false.                  !! all that happens up to `now` is behind
     real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
     real(real64) :: epoch_end = 0.0_real64        !! when the epoch moves, since the epoch; 0: not known yet [time]
     integer(int64) :: epoch_events = 0            !! events at the beginning of the epoch
@@ -49,6 +50,7 @@ module simulation_state
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
   contains
     procedure :: time
+    procedure :: has_reached
     procedure :: n_disks
     procedure :: list_disks
     procedure :: make_room
@@ -83,6 +85,15 @@ contains
 
     t = self%epoch + self%now
   end function time
+
+  !> Whether a moment has come, with all that happens then: in between, where the run may pause, it has not.
+  pure function has_reached(self, t) result(yes)
+    class(simulation_t), intent(in) :: self
+    real(real64), intent(in) :: t                 !! since the start of the run [time]
+    logical :: yes
+
+    yes = self%settled .and. self%time() >= t
+  end function has_reached
 
   !> Number of disks.
   pure function n_disks(self) result(n)

@@ -57,6 +57,44 @@ def test_a_run_that_ends_three_times_is_one_long_run(ricochet, tmp_path, stride)
         assert names == {"gas.nml", "whole.h5", "parts.h5"}
 
 
+#: Three collisions at the time 0.5, and walls from 2.25 on.
+AT_ONCE = """&box upper = 8, 8 /
+&species radius = 0.25 position = 1,1, 2,1, 1,3, 2,3, 1,5, 2,5
+  velocity = 0.5,0, -0.5,0, 0.5,0, -0.5,0, 0.5,0, -0.5,0 /
+"""
+
+
+@pytest.mark.parametrize(
+    "pause", ["event_log=T", "frames_every_events=1", "frames_every_collisions=2"]
+)
+def test_all_that_happens_at_the_end_happens_whatever_the_cadence(ricochet, tmp_path, pause):
+    write_input(tmp_path, AT_ONCE + "&stop time = 0.5 /")
+    run = ricochet("gas.nml", "-o", "gas.h5", "--set", f"output.{pause}")
+    assert run.returncode == FINISHED
+    with h5py.File(tmp_path / "gas.h5") as file:
+        assert file["observables/collisions/value"][-1] == 3
+        assert np.all(file["particles/disks/collisions/value"][-1] == 1)
+
+
+@pytest.mark.parametrize("end", ["events=1", "collisions=2"])
+def test_a_sample_between_collisions_of_one_moment_is_not_that_of_the_moment(
+    ricochet, tmp_path, end
+):
+    """The moment is not over, neither for samples nor for `stop.time`."""
+    write_input(
+        tmp_path, AT_ONCE + "&output frames_every_time = 0.25 observables_every_time = 0.5 /"
+    )
+    command = ["gas.nml", "-o", "parts.h5"]
+    for time in (0.5, 3):
+        last = ["--set", f"stop.{end[:-2]}=", "--set", f"stop.time={time}"]
+        assert ricochet("gas.nml", "-o", "whole.h5", *last, "--force").returncode == FINISHED
+        assert ricochet(*command, "--set", f"stop.{end}", "--force").returncode == FINISHED
+        assert ricochet(*command, *last, "--resume").returncode == FINISHED
+        assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+        run = ricochet(*command, *last, "--resume")
+        assert run.returncode == FILES and "finished run" in one_line(run)
+
+
 LONG = ["--set", "stop.time=30", "--set", "output.checkpoint_every=0.05"]
 
 
