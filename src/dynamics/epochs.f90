@@ -1,10 +1,12 @@
 !> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
 !> to go on from it agree.
 module epochs
+  use disks, only: columns, n_fixed
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
+  use team, only: many
   implicit none
   private
   public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
@@ -87,9 +89,31 @@ contains
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
-    call sim%move_origin(shift)
+    call move_origin(sim, shift)
     call begin_epoch(sim, length)
   end subroutine move_epoch
+
+  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
+  subroutine move_origin(sim, shift)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: shift             !! [time]
+    integer, allocatable :: moments(:)            ! rows of `extra`
+    integer(int32) :: i
+    logical :: shared
+
+    moments = pack(sim%extra_row, sim%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
+    shared = sim%n_disks() >= many
+    !$omp parallel do if (shared)
+    do i = 1, sim%n_disks()
+      sim%disk(i)%clock = sim%disk(i)%clock - shift
+      sim%disk(i)%stamp = 0
+      sim%extra(moments, i) = sim%extra(moments, i) - shift
+    end do
+    !$omp end parallel do
+    sim%now = sim%now - shift
+    sim%epoch = sim%epoch + shift
+    sim%last_advance = sim%last_advance - shift
+  end subroutine move_origin
 
   !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
   pure function most_events(sim) result(n)

@@ -44,7 +44,7 @@ module parameter_values
     procedure :: put_text, put_reals
     procedure :: complain, demand, refuse
     procedure :: infer_choices, check_choices
-    procedure :: assignment
+    procedure :: value_line
   end type parameter_group_t
 
 contains
@@ -267,7 +267,7 @@ contains
   end function range_of
 
   !> What gives a variable its value: `species.bed.radius = 0.005`.
-  pure function assignment(self, k) result(text)
+  pure function value_line(self, k) result(text)
     class(parameter_group_t), intent(in) :: self
     integer, intent(in) :: k                   !! its place in the group
     character(len=:), allocatable :: text
@@ -275,7 +275,7 @@ contains
     text = trim(self%name)//"."
     if (self%instance /= "") text = text//trim(self%instance)//"."
     text = text//trim(self%values(k)%name)//" = "//value_text(self%values(k))
-  end function assignment
+  end function value_line
 
   !> The values of a variable as they would be written in a file.
   pure function value_text(value) result(text)

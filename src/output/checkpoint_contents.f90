@@ -57,7 +57,7 @@ contains
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. groups(g)%values(k)%is_set()) cycle
-        line = groups(g)%assignment(k)
+        line = groups(g)%value_line(k)
         if (.not. is_free(line)) call growing%add(line//eol)
       end do
     end do

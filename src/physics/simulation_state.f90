@@ -10,7 +10,6 @@ module simulation_state
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
   use tally, only: tally_t
-  use team, only: many
   implicit none
   private
   public :: given_t, simulation_t
@@ -63,7 +62,6 @@ module simulation_state
     procedure :: values_of
     procedure :: values_now
     procedure :: take_values
-    procedure :: move_origin
     procedure :: position
     procedure :: velocity
     procedure :: spin
@@ -293,28 +291,6 @@ contains
       self%extra(self%extra_row(k), :) = values
     end select
   end subroutine take_values
-
-  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
-  subroutine move_origin(self, shift)
-    class(simulation_t), intent(inout) :: self
-    real(real64), intent(in) :: shift             !! [time]
-    integer, allocatable :: moments(:)            ! rows of `extra`
-    integer(int32) :: i
-    logical :: shared
-
-    moments = pack(self%extra_row, self%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
-    shared = self%n_disks() >= many
-    !$omp parallel do if (shared)
-    do i = 1, self%n_disks()
-      self%disk(i)%clock = self%disk(i)%clock - shift
-      self%disk(i)%stamp = 0
-      self%extra(moments, i) = self%extra(moments, i) - shift
-    end do
-    !$omp end parallel do
-    self%now = self%now - shift
-    self%epoch = self%epoch + shift
-    self%last_advance = self%last_advance - shift
-  end subroutine move_origin
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
