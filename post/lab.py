@@ -51,6 +51,8 @@ class Answers(Handler):
             return self.answer(path.strip("/").split("/"), unquote(query))
         except (Refused, RunError) as problem:
             return 409, "text/plain; charset=utf-8", f"{problem}\n".encode()
+        except FileNotFoundError:  # the program renames its file, or a newer run has replaced it
+            return 409, "text/plain; charset=utf-8", b"the file is not there any more: try again\n"
 
     def answer(self, parts: list[str], query: str) -> tuple[int, str, bytes]:
         """Status, kind and body of what is there."""

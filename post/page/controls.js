@@ -1,7 +1,8 @@
 // ---------- what the user chooses ----------
 
 const state = { playing: false, colour: '', traced: [], arrows: false, sofar: false, total: false };
-let pace;  // time of the film per second, at speed 1
+let pace;          // time of the film per second, at speed 1
+let usual = true;  // whether that is for the length of this film, not of another one
 
 function begin() {
   newMoment();
@@ -10,10 +11,14 @@ function begin() {
   state.traced = film.traced;
   state.sofar = disks < 200;
   state.total = spread(kinds.map(kind => kind.count)) < spread(kinds.map(() => 1));
-  // The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
-  pace = near(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1, [5, 2, 1]);
+  pace = usualPace();
   choose('colour', [['species', 'species'], ...Object.keys(film.scales).map(name => [name, name])], state.colour);
   prepareFilm();
+}
+
+// The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
+function usualPace() {
+  return near(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1, [5, 2, 1]);
 }
 
 // What depends on the frames that there are.
@@ -60,8 +65,10 @@ function show(time, anew = false) {
 
 function layout() {
   if (!film) return;  // it is still to come
+  const plots = ['histogram', 'energy', 'pressure'];
+  for (const name of plots) $(name).style.height = plotHeight(name) + 'px';  // the stage gets the room that is left
   layOutStage();
-  for (const name of ['histogram', 'energy', 'pressure']) layOutPlot($(name), plotHeight(name));
+  for (const name of plots) layOutPlot($(name), plotHeight(name));
   layEnergyOut();
   show(moment.time, true);
 }
@@ -215,6 +222,8 @@ const keys = {
   0: 'whole', f: 'full', v: 'arrows',
 };
 
+function pressed(key) { actions[keys[key]]?.(); }
+
 function theme(night) { document.documentElement.dataset.theme = night ? 'dark' : 'light'; }
 
 function listen() {
@@ -240,7 +249,7 @@ function listen() {
     if (event.target.matches('input') && event.key.startsWith('Arrow')) return;
     if (!keys[event.key] || (event.key === ' ' && event.target.matches('button'))) return;
     event.preventDefault();
-    actions[keys[event.key]]();
+    pressed(event.key);
   });
   addEventListener('resize', layout);
   addEventListener('hashchange', fromAddress);

@@ -294,7 +294,8 @@ function place(figure, base) {
     const player = frame.contentWindow, before = holder.firstChild;
     const old = before !== frame && before.dataset.input === frame.dataset.input ? before.contentWindow : kept;
     player.theme(isDark());
-    player.choices(old?.choices?.());
+    player.choices(old?.choices && { ...old.choices(), pace: kept?.choices?.().pace });
+    player.addEventListener('keydown', typed);
     while (holder.firstChild !== frame) holder.firstChild.remove();
     frame.className = '';
     if (kept) for (const one of [kept, player]) { one.go(-Infinity); one.play(true); }
@@ -344,7 +345,7 @@ function theme(night) {
   document.documentElement.dataset.theme = night ? 'dark' : 'light';
   for (const one of films()) {
     one.theme(night);
-    one.choices(one.choices());
+    one.refresh();
   }
 }
 
@@ -359,10 +360,18 @@ const actions = {
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', c: 'compare', s: 'settings' };
-addEventListener('keydown', event => {
-  if (event.target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
-  actions[keys[event.key]]();
-});
+
+// A key of the laboratory, wherever the focus is; its other keys are for all films, while none has the focus.
+function typed(event) {
+  const { key, target } = event, own = target.ownerDocument === document;
+  if (target.matches('input:not([type=range]), select') || event.ctrlKey || event.metaKey || event.altKey || $('inputs').open) return;
+  if (keys[key]) actions[keys[key]]();
+  else if (own && !(target.matches('input') && /^(Arrow|Home|End|Page)/.test(key)) && !(key === ' ' && target.matches('input, button, summary'))) {
+    for (const one of films()) one.pressed(key);
+  }
+}
+
+addEventListener('keydown', typed);
 $('form').addEventListener('submit', event => { event.preventDefault(); run(); });
 $('add').addEventListener('change', () => { if ($('add').value) addGroup(...$('add').value.split(' ')); });
 $('inputs').append(...lab.inputs.map(name => {

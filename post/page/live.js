@@ -2,7 +2,9 @@
 
 // A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
 // The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
-const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
+// As a part of another page it begins with the run, to be seen from its start.
+const isPart = parent !== window;
+const live = { on: false, stamp: '', newest: !isPart, heard: 0, pace: 0 };
 
 async function ask() {
   const answer = await fetch('film?known=' + encodeURIComponent(live.stamp)).catch(() => null);
@@ -26,7 +28,8 @@ function receive(news) {
   tellLive(news.end);
   if (!started) begin();
   else prepareFilm();
-  move(started ? time : last());
+  if (started && usual) pace = usualPace();
+  move(started ? time : live.newest ? last() : first());
   refresh();
   if (!started) play(true);
 }
@@ -47,13 +50,12 @@ function follow(newest) {
 // ---------- a part of another page ----------
 
 // The laboratory shows runs side by side: what is chosen in one of them can be chosen in the others.
-const isPart = parent !== window;
 document.documentElement.classList.toggle('part', isPart);
 
 function choices(wish) {
   if (wish) {
     const { pace: own, speed, colour, ...rest } = wish;
-    pace = own;
+    if (own) [pace, usual] = [own, false];
     $('pace').value = speed;
     if ([...$('colour').options].some(({ value }) => value === colour)) $('colour').value = state.colour = colour;
     Object.assign(state, rest);

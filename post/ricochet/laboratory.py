@@ -11,8 +11,8 @@ import shutil
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -86,6 +86,12 @@ class Laboratory:
         page.asked = time.monotonic()
         return page
 
+    @contextmanager
+    def held(self, number: object) -> Iterator[Page]:
+        """The page of this number, for one request at a time; it may have gone meanwhile."""
+        with self.page(number).lock:
+            yield self.page(number)
+
     def leave(self, number: object) -> None:
         """A page says goodbye."""
         page = self.page(number)
@@ -135,15 +141,14 @@ class Laboratory:
 
     def check(self, wish: Mapping) -> dict:
         """Whether the program takes these values."""
-        page = self.page(wish.get("page"))
-        with page.lock:
+        with self.held(wish.get("page")) as page:
             run = self.experiment(wish, page.folder / "check")
             return {"problems": check(run, self.table), "command": self.command(run)}
 
     def start(self, wish: Mapping) -> dict:
         """Start a run, or go on with the newest one; what is wrong, or the number of the run."""
-        page, resume = self.page(wish.get("page")), wish.get("resume") is True
-        with page.lock:
+        resume = wish.get("resume") is True
+        with self.held(wish.get("page")) as page:
             run = self.experiment(wish, page.folder / "check")
             if problems := check(run, self.table):
                 return {"problems": problems}

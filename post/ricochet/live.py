@@ -53,7 +53,8 @@ class Live:
         with self.lock:
             self.asked = time.monotonic()
             end = self.end
-            with suppress(RunError):  # caught at an unlucky moment: the next look will do
+            # Caught at an unlucky moment, as when the file is renamed: the next look will do.
+            with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.frames} {end}"
                 if stamp != self.stamp:

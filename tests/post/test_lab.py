@@ -429,6 +429,35 @@ def test_wishes_that_make_no_sense_are_refused_in_one_line(lab, server, change):
     assert lab.page(page).runs == {}
 
 
+def test_a_wish_that_waits_for_its_page_to_go_is_refused(lab):
+    page, answers = lab.new_page(), []
+
+    def start():
+        with pytest.raises(Refused, match="does not know this page"):
+            wish(lab, page)
+        answers.append("refused")
+
+    own, held = lab.page(page), laboratory.Laboratory.page
+    with own.lock:
+        asked = threading.Event()
+        lab.page = lambda number: (held(lab, number), asked.set())[0]
+        thread = threading.Thread(target=start)
+        thread.start()
+        asked.wait(PATIENCE)
+        lab.pages.pop(page)
+    thread.join(PATIENCE)
+    assert answers == ["refused"]
+
+
+def test_a_file_that_is_renamed_meanwhile_is_asked_for_again(lab, server, monkeypatch):
+    def gone(*_):
+        raise FileNotFoundError
+
+    monkeypatch.setattr(lab, "run", gone)
+    host = f"Host: 127.0.0.1:{server}\r\n\r\n".encode()
+    assert status_of(server, b"GET /1/2/output HTTP/1.1\r\n" + host) == 409
+
+
 def test_bodies_that_are_no_wishes_are_refused(server):
     for body in (b"", b"{", b"[]", b"\xff", b"1", b"[" * 100000, b"nan"):
         assert post(server, "/start", body)[0] in (400, 409), body
@@ -645,6 +674,44 @@ def test_the_keyboard_is_enough(opened):
         opened.press("\ue004")  # tab
         seen.add(opened.run("return document.activeElement.id || document.activeElement.tagName"))
     assert len(seen) > 5
+
+
+def test_keys_work_wherever_the_focus_is(opened):
+    """Those of the film on the page, those of the page in the film."""
+    opened.press("p")
+    opened.press("\ue011")  # Home
+    opened.press("\ue014")  # arrow right
+    assert "frame 2/" in opened.run("return inFilm(films()[0], 'clock').textContent")
+    opened.run("document.querySelector('iframe').contentWindow.focus()")
+    opened.press("r")
+    wait_for(lambda: opened.run("return state.shown[0].number") == 2)
+    shows(opened)
+
+
+def test_a_film_begins_with_its_run_however_far_that_is(opened, lab):
+    page = lab.page(opened.run("return lab.page"))
+    opened.run("Object.assign(state.settings, arguments[0]); run()", LONG)
+    wait_for(lambda: 2 in page.runs and page.newest.running)
+    shows(opened)
+    assert "End follows it" in opened.run("return inFilm(films()[0], 'live').textContent")
+    opened.press("\ue010")  # End
+    assert "the film follows it" in opened.run("return inFilm(films()[0], 'live').textContent")
+
+
+def test_the_box_has_all_the_room_that_the_histogram_leaves(opened):
+    """Also where that was larger before, in a wider window."""
+    opened.click("compare")
+    change(opened, "species.gas.speed", "2")
+    shows(opened, 2)
+    heights = opened.run(
+        """films().forEach(one => one.play(false));
+        return films().map(one => [0, 500].map(height => {
+          if (height) inFilm(one, 'histogram').height = height;
+          one.layout();
+          return inFilm(one, 'stage').offsetHeight;
+        }));"""
+    )
+    assert all(before == after for before, after in heights), heights
 
 
 def test_what_is_chosen_in_a_film_stays_for_the_next_run(opened):
