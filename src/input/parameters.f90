@@ -231,19 +231,19 @@ module parameters
     parameter_t("output", "frames_every_time", "real", 1, "optional", "0.1", &
       "positions and velocities; default the first and the last", positive, "time"), &
     parameter_t("output", "frames_every_collisions", "integer", 1, "optional", "1000", &
-      "the same, by collisions between disks", positive), &
+      "a frame after so many collisions between disks", positive), &
     parameter_t("output", "frames_every_events", "integer", 1, "optional", "1000", &
-      "the same, by collisions of any kind", positive), &
+      "a frame after so many collisions of any kind", positive), &
     parameter_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
-      "the same, by collisions per disk, 2 collisions/N", positive), &
+      "a frame whenever 2 collisions/N has grown by this", positive), &
     parameter_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "energies, pressure, ...; default the first and the last", positive, "time"), &
     parameter_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
-      "the same, by collisions between disks", positive), &
+      "a sample after so many collisions between disks", positive), &
     parameter_t("output", "observables_every_events", "integer", 1, "optional", "100", &
-      "the same, by collisions of any kind", positive), &
+      "a sample after so many collisions of any kind", positive), &
     parameter_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
-      "the same, by collisions per disk, 2 collisions/N", positive), &
+      "a sample whenever 2 collisions/N has grown by this", positive), &
     parameter_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
     parameter_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
