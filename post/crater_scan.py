@@ -227,7 +227,8 @@ def draw(scans: dict[str, list[Curve]], runs: list[Run]) -> plt.Figure:
     number = "-".join(map(str, sorted({f([p.runs for p in points]) for f in (min, max)})))
     count = span(np.array([run.count for run in runs]))
     figure.suptitle(
-        f"N = {count},  {number} runs per point,  ended at {100 * fraction:g} % of the energy"
+        f"N = {count},  {number} run{'s' * (number != '1')} per point,"
+        f"  ended at {100 * fraction:g} % of the energy"
         + (" (open: the box takes part, or ended by time)" * any(not p.free for p in points)),
         fontsize=10,
     )

@@ -221,10 +221,12 @@ def excess_kurtosis(speed: np.ndarray) -> float:
     return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
 
 
-def to_error(mean: float, error: float) -> tuple[str, str]:
-    """Both with the two digits of the error that say something; without an error, six digits."""
-    if not (np.isfinite(error) and error > 0):
-        return f"{mean:.6g}", f"{error:g}"
+def to_error(mean: float, error: float) -> tuple[str, ...]:
+    """Both with the two digits of the error that say something; the mean alone without an error."""
+    if not np.isfinite(error):
+        return (f"{mean:.4g}",)
+    if error == 0:
+        return f"{mean:.6g}", "0"
     places = max(0, 1 - int(np.floor(np.log10(float(f"{error:.1e}")))))
     return f"{mean:z.{places}f}", f"{error:.{places}f}"
 

@@ -488,6 +488,7 @@ def test_a_scan_of_one_parameter_is_one_column_that_says_what_varies(tmp_path):
     scans = crater_scan.scanned(keys, runs, sizes)
     figure = crater_scan.draw(scans, runs)
     assert figure.axes[0].get_title("left") == "speed 5,  radius 5,  restitution 0.5"
+    assert ",  1 run per point," in figure.get_suptitle()
     assert crater_scan.unused(keys, scans) == []
     assert len(figure.axes) == 2 and figure.axes[1].get_xlabel() == crater_scan.AXES["mass"]
     assert "=" not in figure.get_suptitle().split("\n")[0].split(",", 1)[1]  # but for N

@@ -1,5 +1,6 @@
 """Pressure, correlations and cooling in post/: closed formulas, and each figure drawn once."""
 
+import re
 import csv
 import warnings
 from pathlib import Path
@@ -262,9 +263,7 @@ def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
     v = np.array([[1.0, 0.0], [-1.0, 0.0]])[None].repeat(51, axis=0)
     flight = 0.5 + v * time[:, None, None]
     image = np.floor(flight).astype(int)
-    run = written(
-        tmp_path / "run.h5", flight - image, v, image=image, time=time, periodic=PERIODIC
-    )
+    run = written(tmp_path / "run.h5", flight - image, v, image=image, time=time, periodic=PERIODIC)
     at = np.array([1, 5, 20])
     np.testing.assert_allclose(diffusion.displacement(run, slice(51), at), (0.1 * at) ** 2)
 
@@ -569,6 +568,18 @@ def test_a_gas_cools_by_haff(bulk):
     ):
         early = law(x, 0.9) > 0.1
         np.testing.assert_allclose(y[early], law(x, 0.9)[early], rtol=0.2)
+
+
+def test_the_cooling_rate_of_a_single_run_has_no_error(bulk):
+    run = read_run(bulk[2])
+    figure = haff.draw([(0.9, [run])], [haff.cooled([haff.energy_left(run)], 0.9)])
+    words = [
+        text.get_text()
+        for axes in figure.axes
+        if axes.get_legend()
+        for text in axes.get_legend().texts
+    ]
+    assert any(re.search(r"rate 0\.\d+  \(", word) for word in words), words
 
 
 @pytest.mark.parametrize("end", [25.0, None])
