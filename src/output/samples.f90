@@ -9,6 +9,7 @@ module samples
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
   use observables, only: observable_list_t, observed
   use simulation_state, only: simulation_t
+  use team, only: many
   implicit none
   private
   public :: frame_series, frame_sample, observable_series, observable_sample, event_series, check_counts
@@ -43,11 +44,11 @@ contains
   end function in_frames
 
   !> The frame of this moment, disks in the order of the input.
-  pure function frame_sample(sim, step) result(sample)
+  function frame_sample(sim, step) result(sample)
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the frame, from 0
     real(real64), allocatable :: sample(:, :)     !! (width,1)
-    logical :: periodic
+    logical :: periodic, shared
     integer(int32) :: i, k, n
     integer :: c, last
 
@@ -56,8 +57,10 @@ contains
     last = 2 + merge(7, 5, periodic)*n
     allocate (sample(last + n*count([(in_frames(sim, c), c=1, n_columns)]), 1))
     sample(:2, 1) = [real(step, real64), sim%time()]
+    shared = n >= many
     associate (x => sample(3:2 + 2*n, 1), v => sample(3 + 2*n:2 + 4*n, 1), &
       collisions => sample(3 + 4*n:2 + 5*n, 1), images => sample(3 + 5*n:last, 1))
+      !$omp parallel do private(k) if (shared)
       do i = 1, n
         k = sim%tag(i)%id
         x(2*k - 1:2*k) = sim%position(i)
@@ -67,6 +70,7 @@ contains
         images(2*k - 1:2*k) = sim%image(i)
         call wrap(sim, x(2*k - 1:2*k), v(2*k - 1:2*k), images(2*k - 1:2*k))
       end do
+      !$omp end parallel do
     end associate
     do c = 1, n_columns
       if (.not. in_frames(sim, c)) cycle

@@ -11,6 +11,7 @@ module known_places
   public :: add_known, misfit_t, misfit_text
 
   integer, parameter :: most_reports = 5                    !! of a kind, for one species
+  integer(int32), parameter :: ahead = 8                    !! disks, whose surroundings are being loaded
   real(real64), parameter, public :: rounding = 1.0e-12_real64      !! relative, of disks that touch
 
   !> A disk that does not fit.
@@ -23,7 +24,7 @@ contains
 
   !> Adds a species at known places. Disks that overlap others are added all the same and listed, as are
   !> those, not added, that are not wholly in their region.
-  pure subroutine add_known(packing, species, s, x, radius, misfits)
+  subroutine add_known(packing, species, s, x, radius, misfits)
     type(packing_t), intent(inout) :: packing
     type(species_settings_t), intent(in) :: species(:)
     integer, intent(in) :: s
@@ -41,6 +42,8 @@ contains
     call packing%open_species(int(s, int32), maxval(radius), size(radius), &
       min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
     do k = 1, species(s)%count
+      if (k + 2*ahead <= species(s)%count) call packing%load_cells(int(s, int32), x(:, k + 2*ahead))
+      if (k + ahead <= species(s)%count) call packing%load_disks(int(s, int32), x(:, k + ahead))
       slack = rounding*(radius(k) + largest)
       call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
       blocker = 0
