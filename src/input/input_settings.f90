@@ -267,9 +267,9 @@ contains
 
     associate (stop_rules => settings%stop, law => settings%law, box => settings%box)
       if (min(stop_rules%time, stop_rules%wall_clock) < never) return
-      if (settings%drive%is_on() .and. settings%n_disks() == 1 .and. all(box%periodic) .and. box%n_obstacles() == 0) &
-        call problems%add(0, "stop", "a single disk that is kicked (drive.kind) in a periodic box meets nothing, for ever; " &
-        //"give time")
+      if ((settings%drive%is_on() .or. box%is_sheared()) .and. settings%n_disks() == 1 .and. all(box%periodic) &
+        .and. box%n_obstacles() == 0) call problems%add(0, "stop", "a single disk in a periodic box that is sheared " &
+        //"(box.shear_rate) or where disks are kicked (drive.kind) meets nothing, for ever; give time")
       if (stop_rules%events < unlimited) return
       by_collisions = stop_rules%collisions < unlimited .or. stop_rules%collisions_per_disk < never
       if (stop_rules%energy_fraction > 0 .and. .not. settings%drive%is_on()) then

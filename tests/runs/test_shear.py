@@ -260,6 +260,15 @@ def test_what_does_not_go_with_shear_is_refused_by_name(ricochet, tmp_path, othe
     assert "box.shear_rate" in lines[0]
 
 
+def test_one_disk_that_meets_nothing_needs_an_end_in_time(ricochet, tmp_path):
+    one = SHEARED.replace("count = 120", "count = 1").replace("time = 20", "events = 9")
+    write_input(tmp_path, one)
+    result = ricochet("gas.nml", "--check")
+    assert result.returncode == USAGE
+    assert "stop" in one_line(result.stderr) and "box.shear_rate" in result.stderr
+    assert ricochet("gas.nml", "--check", "--set=stop.time=1").returncode == FINISHED
+
+
 def test_a_run_does_not_go_on_with_another_shear_rate(ricochet, tmp_path):
     write_input(tmp_path, SHEARED)
     finish(ricochet, "gas", *overrides("stop.time=1"))
