@@ -39,16 +39,6 @@ module system
   end type reserve_t
 
   abstract interface
-    !> A call that changes what the process is subject to.
-    subroutine plain_call() bind(C)
-    end subroutine plain_call
-
-    !> A question about the process.
-    function question() bind(C) result(yes)
-      import :: c_bool
-      logical(c_bool) :: yes
-    end function question
-
     !> A call on a file, or on a text to be written; 0 for success.
     function path_call(path) bind(C) result(status)
       import :: c_char, c_int
@@ -77,6 +67,17 @@ module system
       import :: c_double
       real(c_double) :: t
     end function seconds
+
+    !> Opens /dev/null for standard streams that the caller has closed. Otherwise the first files that are opened
+    !> would take their places, and messages would end up in them.
+    subroutine fill_standard_streams() bind(C, name="system_fill_standard_streams")
+    end subroutine fill_standard_streams
+
+    !> Whether standard error is a terminal.
+    function talks_to_terminal() bind(C, name="system_talks_to_terminal") result(yes)
+      import :: c_bool
+      logical(c_bool) :: yes
+    end function talks_to_terminal
 
     ! The calls of system_calls.c, which says more.
     function cores_of_process() result(n) bind(C, name="system_cores")
@@ -149,12 +150,6 @@ module system
       integer(c_int), value :: code
     end subroutine c_exit
   end interface
-
-  !> Opens /dev/null for standard streams that the caller has closed. Otherwise the first files that are opened
-  !> would take their places, and messages would end up in them.
-  procedure(plain_call), bind(C, name="system_fill_standard_streams") :: fill_standard_streams
-
-  procedure(question), bind(C, name="system_talks_to_terminal") :: talks_to_terminal  !! on standard error
 
   procedure(path_call), bind(C, name="system_synchronize") :: c_synchronize
   procedure(path_call), bind(C, name="system_find_folder") :: c_find_folder

@@ -181,15 +181,18 @@ contains
     place = 0
   end function place_of
 
-  !> Advice after an unknown word: the known word that was probably meant, or all known words.
-  pure function suggestion(word, known) result(advice)
+  !> Advice after an unknown word: the known word that was probably meant, or all known words, or what else is to be listed.
+  pure function suggestion(word, known, listed) result(advice)
     character(len=*), intent(in) :: word
     character(len=*), intent(in) :: known(:)
+    character(len=*), intent(in), optional :: listed(:)
     character(len=:), allocatable :: advice
 
     advice = nearest_word(word, known)
     if (advice /= "") then
       advice = "did you mean """//advice//"""?"
+    else if (present(listed)) then
+      advice = "known: "//joined(listed, ", ")
     else
       advice = "known: "//joined(known, ", ")
     end if

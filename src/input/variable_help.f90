@@ -2,7 +2,7 @@
 module variable_help
   use errors, only: error_t, exit_usage, fail
   use parameters, only: allowed, group_names, name_length, parameter_t, table, wall_groups
-  use texts, only: lower_case, nearest_word, shown, suggestion
+  use texts, only: lower_case, shown, suggestion
   implicit none
   private
   public :: defaults_text, explain
@@ -70,7 +70,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=len(name)) :: wanted
     character(len=name_length + 9) :: full(size(table))
-    character(len=:), allocatable :: meant
     integer :: k
 
     wanted = lower_case(name)
@@ -82,13 +81,8 @@ contains
       text = text//explanation(table(k))
     end do
     if (text /= "") return
-    meant = nearest_word(wanted, [character(len=len(full)) :: table%name, full, group_names])
-    if (meant /= "") then
-      meant = "did you mean """//meant//"""?"
-    else
-      meant = suggestion(wanted, group_names)
-    end if
-    call fail(error, exit_usage, "--explain "//shown(name)//": unknown variable; "//meant)
+    call fail(error, exit_usage, "--explain "//shown(name)//": unknown variable; " &
+      //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
   end subroutine explain
 
   !> Name and unit of a variable, its meaning, what is allowed, and its default or an example.

@@ -40,7 +40,8 @@ contains
     call describe_disks(file, sim)
     call describe_origin(file)
     call describe_input(file, input)
-    call describe_species(file, sim)
+    call file%put(species_names, names_of(sim%species))
+    call file%put(species_counts, [size(sim%species)], int(sim%species%count, int32))
     call describe_populations(file, sim)
     do k = 1, size(obstacle_groups)
       range = range_of(input%groups, obstacle_groups(k:k))
@@ -238,15 +239,6 @@ contains
       end if
     end select
   end subroutine describe_value
-
-  !> Names and numbers of disks of the species.
-  subroutine describe_species(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
-
-    call file%put(species_names, names_of(sim%species))
-    call file%put(species_counts, [size(sim%species)], int(sim%species%count, int32))
-  end subroutine describe_species
 
   !> What the thermodynamics module of H5MD requires beside the observables of a group.
   subroutine describe_populations(file, sim)

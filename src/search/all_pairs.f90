@@ -13,8 +13,6 @@ module all_pairs
   public :: all_pairs_t
 
   type, extends(neighbour_search_t) :: all_pairs_t
-    private
-    integer(int32), allocatable :: obstacle(:)     !! 1, 2, ...
   contains
     procedure :: build
     procedure :: predict
@@ -23,13 +21,10 @@ module all_pairs
 
 contains
 
-  !> Notes how many obstacles there are.
+  !> There is nothing to sort the disks into.
   subroutine build(self, sim)
     class(all_pairs_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    integer(int32) :: m
-
-    self%obstacle = [(m, m=1, sim%box%n_obstacles())]
   end subroutine build
 
   !> The earliest of: side, obstacle, any disk. All disks are inside the box until one passes a periodic
@@ -41,12 +36,12 @@ contains
     type(prospect_t) :: near
     type(images_t) :: images
     real(real64) :: t
-    integer(int32) :: first, k
+    integer(int32) :: first, k, m
     integer :: image
 
     near%disk = i
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, self%obstacle, near%time, near%partner)
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(m, m=1, sim%box%n_obstacles())], near%time, near%partner)
     images = sim%images()
     t = images%look_again(sim%now)
     if (t < near%time) near%partner = looks_again
