@@ -265,7 +265,7 @@ def test_one_disk_that_meets_nothing_needs_an_end_in_time(ricochet, tmp_path):
     write_input(tmp_path, one)
     result = ricochet("gas.nml", "--check")
     assert result.returncode == USAGE
-    assert "stop" in one_line(result.stderr) and "box.shear_rate" in result.stderr
+    assert "stop" in one_line(result) and "box.shear_rate" in result.stderr
     assert ricochet("gas.nml", "--check", "--set=stop.time=1").returncode == FINISHED
 
 
