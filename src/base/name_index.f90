@@ -25,16 +25,15 @@ contains
   pure function new_name_index(names) result(new)
     character(len=*), intent(in) :: names(:)
     type(name_index_t) :: new
-    integer :: k
+    integer :: k, chain
 
     allocate (new%names, source=names)
     allocate (new%first(size(names)), source=0)
     allocate (new%next(size(names)))
     do k = size(names), 1, -1                  ! the first of equal names comes first in its chain
-      associate (chain => new%first(chain_of(names(k), size(names))))
-        new%next(k) = chain
-        chain = k
-      end associate
+      chain = chain_of(names(k), size(names))
+      new%next(k) = new%first(chain)
+      new%first(chain) = k
     end do
   end function new_name_index
 
