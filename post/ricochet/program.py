@@ -76,8 +76,10 @@ def find_program() -> str:
     for place in places:
         if place.is_file() and os.access(place, os.X_OK):
             return str(place.resolve())
-    where = f"at {wish}" if wish else f"in {root / 'build'} or on PATH"
-    raise ProgramError(f"no program ricochet {where}: run make, or set RICOCHET to its place", 3)
+    build = [f"in {root / 'build'}"] if (root / "Makefile").is_file() else []  # else installed
+    where = f"at {wish}" if wish else " or ".join([*build, "on PATH"])
+    make = "run make" if build else "run make install in a clone of Ricochet"
+    raise ProgramError(f"no program ricochet {where}: {make}, or set RICOCHET to its place", 3)
 
 
 def watched(command: list[str]) -> tuple[int, list[str]]:

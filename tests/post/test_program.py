@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ricochet as package
-from ricochet import ProgramError
+from ricochet import ProgramError, program
 from synthetic_run import ROOT
 from whole_runs import STOPPED, USAGE, differences, is_asleep, wait_for
 
@@ -166,4 +166,12 @@ def test_file_names_may_begin_with_a_dash(tmp_path):
 def test_a_missing_program_is_named(monkeypatch):
     monkeypatch.setenv("RICOCHET", "nowhere")
     with pytest.raises(ProgramError, match="no program ricochet at nowhere: run make"):
+        package.run(GROUPS)
+
+
+def test_without_a_clone_the_program_is_looked_for_on_the_path(monkeypatch, tmp_path):
+    monkeypatch.delenv("RICOCHET", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(program, "__file__", str(tmp_path / "lib/ricochet/program.py"))
+    with pytest.raises(ProgramError, match="^no program ricochet on PATH: run make install in a "):
         package.run(GROUPS)
