@@ -262,10 +262,29 @@ contains
         call reset(reading%groups(k)%values(row), reading%problems)
       else
         call assign_text(reading%groups(k)%values(row), text(equals + 1:), line, reading%problems)
+        call replace_cadence(reading%groups(k), name, reading%problems)
       end if
       call name_instance(reading%groups(k))
     end if
   end subroutine override
+
+  !> A cadence set by an override takes the place of those that the file has for the same samples.
+  subroutine replace_cadence(group, name, problems)
+    type(parameter_group_t), intent(inout) :: group
+    character(len=*), intent(in) :: name                  !! of the variable that is set
+    type(problem_list_t), intent(inout) :: problems
+    character(len=*), parameter :: every = "_every_"
+    integer :: k, length
+
+    length = index(name, every)
+    if (length == 0) return
+    do k = 1, size(group%values)
+      associate (slot => group%values(k))
+        if (slot%line > 0 .and. slot%name /= name .and. index(slot%name, name(:length)//every(2:)) == 1) &
+          call reset(slot, problems)
+      end associate
+    end do
+  end subroutine replace_cadence
 
   !> Cuts at the first and the last dot: `species.bed.mass`; the group and variable in lower case.
   pure subroutine split_path(path, group, instance, name)

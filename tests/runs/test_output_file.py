@@ -273,6 +273,28 @@ def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
     assert differences(tmp_path / "one.h5", tmp_path / "two.h5") == []
 
 
+def test_a_cadence_that_is_set_takes_the_place_of_that_in_the_file(ricochet, tmp_path):
+    """For the same samples only; one that is set anew stays beside others that are set."""
+    write_input(
+        tmp_path,
+        "&species count = 20 radius = 0.02 speed = 1 / &stop collisions = 40 /"
+        " &output frames_every_collisions = 10 observables_every_collisions = 10 /\n",
+    )
+
+    def samples(name, *settings):
+        run = ricochet("gas.nml", "-o", name, *(f"--set=output.{each}" for each in settings))
+        assert run.returncode == FINISHED, run.stderr
+        with h5py.File(tmp_path / name) as file:
+            tracks = "particles/disks/position", "observables/total_energy"
+            return tuple(len(file[track]["step"]) for track in tracks)
+
+    assert samples("a.h5") == (5, 5)
+    assert samples("b.h5", "frames_every_collisions_per_disk=2") == (3, 5)
+    assert samples("c.h5", "observables_every_collisions=20") == (5, 3)
+    both = "frames_every_collisions_per_disk=2", "frames_every_collisions=15"
+    assert samples("d.h5", *both) == (5, 5)
+
+
 def test_the_cadence_leaves_no_trace_in_the_trajectory(ran, tmp_path):
     often = ran(MIXTURE, "--set", "output.frames_every_time=0.0125", name="often")
     seldom = ran(MIXTURE, "--set", "output.observables_every_collisions=7", name="seldom")
