@@ -281,9 +281,9 @@ def test_a_crater_that_broke_off_says_so(ricochet, tmp_path, capsys):
 
 
 def test_every_script_draws_a_running_simulation():
-    """All but `cost`, which wants the time that a whole run took, and `coverage`: ten runs."""
+    """All but `cost` and `scaling`, which want times of whole runs, and `coverage`: ten runs."""
     drawn = {script for _, scripts in RUNNING.values() for script in scripts}
-    assert drawn == {*SCRIPTS} - {"cost", "coverage"}
+    assert drawn == {*SCRIPTS} - {"cost", "coverage", "scaling"}
 
 
 @pytest.mark.parametrize("ending", ["png", "csv", "xyz", "html", "gif"])
