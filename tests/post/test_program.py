@@ -173,5 +173,5 @@ def test_without_a_clone_the_program_is_looked_for_on_the_path(monkeypatch, tmp_
     monkeypatch.delenv("RICOCHET", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(program, "__file__", str(tmp_path / "lib/ricochet/program.py"))
-    with pytest.raises(ProgramError, match="^no program ricochet on PATH: run make install in a "):
+    with pytest.raises(ProgramError, match=r"^no program ricochet on PATH: run make install in a "):
         package.run(GROUPS)
