@@ -60,8 +60,8 @@ def same(a, b) -> bool:
 def imbalance(path: Path) -> float:
     """How far the energy is from what was given and lost, in parts of the greatest of them.
 
-    What cancels counts in full: kinetic and potential energy, and kicks of noise whose momentum is
-    taken back.
+    What cancels counts in full: kinetic and potential energy, kicks of noise whose momentum is
+    taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
     """
     with h5py.File(path) as file:
         found = {
@@ -71,12 +71,20 @@ def imbalance(path: Path) -> float:
         }
         drive = file["parameters/drive"].attrs if "parameters/drive" in file else {}
         kick = drive.get("strength", 0) * drive.get("interval", 0)
+        hottest = max(
+            (
+                np.nanmax([0, *file[f"parameters/{kind}/temperature"][:]])
+                for kind in ("side", "wall", "obstacle")
+                if f"parameters/{kind}/temperature" in file
+            ),
+            default=0.0,
+        )
         mass = file["particles/disks/mass"][:]
         kinetic = len(mass) * file["observables/all/kinetic_energy/value"][:]  # a mean in the file
     signs = {"total_energy": 1, "dissipated_energy": 1}
     balance = sum(signs.get(name, -1) * values for name, values in found.items())
     parts = [kinetic, found["total_energy"] - kinetic, *found.values()]
-    most = max([kick * mass.max(), *(abs(values).max(initial=0) for values in parts)])
+    most = max([kick * mass.max(), hottest, *(abs(values).max(initial=0) for values in parts)])
     return np.ptp(balance) / most if most else 0.0
 
 

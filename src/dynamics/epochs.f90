@@ -1,6 +1,7 @@
 !> When the origin of time moves, and when a collapse is looked for. Both follow from the state alone, so that all ways
 !> to go on from it agree.
 module epochs
+  use box_sides, only: keep_off_sides
   use disks, only: columns, n_fixed
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
@@ -113,6 +114,11 @@ contains
     sim%now = sim%now - shift
     sim%epoch = sim%epoch + shift
     sim%last_advance = sim%last_advance - shift
+    sim%box%epoch = sim%epoch
+    if (.not. any(sim%box%side%motion%travels())) return
+    do i = 1, sim%n_disks()
+      call keep_off_sides(sim%box, sim%disk(i), sim%now)
+    end do
   end subroutine move_origin
 
   !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.

@@ -111,12 +111,20 @@ contains
       if (turns == 0 .and. .not. sim%now < t_limit) turns = 1    ! a sample of this moment waits for all its events
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (.not. event%time <= t_limit) then
+        if (is_stale(sim, event)) then             ! what is to come must not depend on who was predicted when
+          call predict(self, sim, event%disk)
+          cycle
+        end if
         if (event%time /= event%time) &
           call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! there images move for ever
         if (allocated(error)) return
         if (self%idle .or. limits%time - sim%epoch <= sim%epoch_end) then
-          if (limits%time < last_time) sim%now = max(sim%now, limits%time - sim%epoch)
+          if (limits%time < last_time) then
+            sim%now = max(sim%now, limits%time - sim%epoch)
+          else                                     ! a stale event may have moved it
+            sim%now = max(maxval(sim%disk%clock), sim%settled_until - sim%epoch)
+          end if
           self%arrived = .true.
           return
         end if
@@ -136,6 +144,16 @@ contains
       if (limits%epochs) return
     end do
   end subroutine advance
+
+  !> Whether the partner of an event has collided since it was predicted.
+  pure function is_stale(sim, event) result(yes)
+    type(simulation_t), intent(in) :: sim
+    type(event_t), intent(in) :: event
+    logical :: yes
+
+    yes = event%partner > 0
+    if (yes) yes = sim%disk(event%partner)%stamp /= sim%tag(event%disk)%partner_stamp
+  end function is_stale
 
   !> The loop: event after event, up to the number `pause_at` of collisions, to the limit of time, or as long as
   !> there are turns. Hot path only; rare work is left to the caller.

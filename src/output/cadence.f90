@@ -79,7 +79,7 @@ contains
     logical :: over                               !! the present moment, for samples
 
     if (self%every_time < never) then
-      over = sim%settled .or. self%last_time >= sim%time()
+      over = max(sim%settled_until, self%last_time) >= sim%time()
       self%multiple = max(self%multiple, int(sim%time()/self%every_time, int64))
       do while (self%next_time() < sim%time() .or. (over .and. self%next_time() <= sim%time()))
         self%multiple = self%multiple + 1

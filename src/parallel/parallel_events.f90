@@ -222,8 +222,11 @@ contains
     if (outcome == kept) then
       call self%parts%gather_all(sim, t)
       if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
-      if (all(self%parts%domain%engine%idle)) self%plain_until = sim%tally%events + 1
       if (self%parts%threads > 1) call self%heed_cores(sim)
+      if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds that so are all together
+        outcome = left_alone
+        self%plain_until = sim%tally%events + 1
+      end if
     else
       self%holder = nobody
     end if

@@ -8,7 +8,7 @@ module box_sides
   use partners, only: axis_of, n_sides, sense_of, wall_index
   implicit none
   private
-  public :: bounds, next_side, side_time
+  public :: bounds, keep_off_sides, next_side, side_time
 
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)     !! relative, of a gap to a side that moves
 
@@ -81,5 +81,26 @@ contains
       end if
     end do
   end subroutine next_side
+
+  !> Takes from a disk the approach to a moving side that rounding has left, when its clock got another origin: where it
+  !> stuck to the side, they would hit once more, in the past. No side is met before `now`; the change is in the last digits.
+  pure subroutine keep_off_sides(box, disk, now)
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(inout) :: disk
+    real(real64), intent(in) :: now             !! since the epoch [time]
+    real(real64) :: step
+    integer(int32) :: side
+
+    do side = 0, 1 - n_sides, -1
+      associate (motion => box%side(wall_index(side))%motion, v => disk%v(axis_of(side)))
+        if (.not. motion%travels()) cycle
+        step = max(epsilon(step)*max(abs(v), motion%top_speed()), tiny(step))
+        do while (side_time(box, disk, side) < now)
+          v = v - sense_of(side)*step
+          step = 2*step
+        end do
+      end associate
+    end do
+  end subroutine keep_off_sides
 
 end module box_sides
