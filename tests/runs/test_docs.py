@@ -404,10 +404,15 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
         copy(ROOT / name, tmp_path / name)
     steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)
     assert steps >= 14
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    style = [sys.executable, "tests/support/check_style.py"]
+    said = subprocess.run(style, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert (said.returncode, said.stdout) == (0, "")
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    law = ["tests=tests/unit/test_observables.pf", "unit-tests"]
-    for goal in ([], law):  # laws hold for what is new, too
+    about = "observables", "parameters", "namelist_input"
+    laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
+    for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
         made = subprocess.run(
             build + goal, cwd=tmp_path, env=environment, capture_output=True, text=True
         )
