@@ -301,12 +301,14 @@ def test_there_is_one_version(program):
     assert f"\nversion: {version}\ndate-released: {date}\n" in cited
 
 
+COMPLETION = ROOT / "docs" / "ricochet-completion.bash"
+
+
 def completed(program, *words):
     """What bash proposes for the last word."""
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
     printf '%s\\n' "${COMPREPLY[@]}" """
-    source = ROOT / "docs" / "ricochet-completion.bash"
-    command = ["bash", "-c", script, "bash", source, program, *words]
+    command = ["bash", "-c", script, "bash", COMPLETION, program, *words]
     result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
     assert result.stderr == ""
     return result.stdout.split()
@@ -341,6 +343,9 @@ def test_completion_knows_ensembles(program, tmp_path):
     assert completed(ensemble, "input/gas") == ["input/gas.nml"]
     assert completed(ensemble, "--scan", "species.mass") == ["species.mass="]
     assert completed(ensemble, "--scan", "run.queue", "=", "he") == ["heap"]
+    assert completed("runs/ensemble.sh", "--sc") == ["--scan"]
+    known = 'source "$1"; complete -p ricochet ricochet-ensemble runs/ensemble.sh'
+    subprocess.run(["bash", "-c", known, "bash", COMPLETION], stdout=subprocess.PIPE, check=True)
 
 
 def code_after(text: str, start: int) -> tuple[str, int]:
