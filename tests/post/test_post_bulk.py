@@ -537,13 +537,42 @@ def test_a_gas_that_cools_has_free_paths_and_no_pressure(bulk, tmp_path, capsys)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
 
 
+def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
+    """Of runs, and of one run in blocks: paths without memory, 4000 to a run."""
+
+    def free_paths(run, skip):
+        return rng.exponential(2.0, 4000), np.ones(4000)
+
+    monkeypatch.setattr(rates, "free_paths", free_paths)
+    monkeypatch.setattr(rates, "has_log", lambda run: True)
+    for runs, samples in ((1, 4000), (50, 200000)):
+        mean, density = rates.histogram([None] * runs)
+        assert abs(mean.mean - 2) < 4 * mean.error
+        assert mean.error == pytest.approx(2 / np.sqrt(samples), rel=0.9 if runs == 1 else 0.4)
+        law = np.exp(-rates.BINS)
+        off = (density.mean + np.diff(law) / np.diff(rates.BINS))[:16] / density.error[:16]
+        assert np.mean(np.abs(off) < 3) > 0.8
+
+
+def test_the_table_of_rates_has_the_points_of_the_figure(bulk, tmp_path):
+    table = tmp_path / "a.csv"
+    assert run_script("rates", bulk[0], "-o", tmp_path / "a.png", "--csv", table) == 0
+    points = [row for row in csv.DictReader(table.open()) if row["x"]]
+    names = [row["quantity"] for row in points]
+    assert names.count("free_path_density") == len(rates.BINS) - 1
+    assert names.count("pressure_virial(t)") > 10
+    paths = [row for row in points if row["quantity"] == "free_path_density"]
+    assert all(float(row["error"]) > 0 for row in paths[:16])
+
+
 def test_rates_of_a_gas_agree_with_each_other(bulk):
     run = read_run(bulk[0])
     found = rates.quantities(run)
     per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
     assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
     assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
-    mean, density = rates.histogram([run])
+    (mean, error), (density, _) = rates.histogram([run])
+    assert 0 < error < 0.03 * mean
     speed = np.mean(run.speed(slice(None)))
     assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
     assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
