@@ -599,6 +599,25 @@ def test_a_gas_cools_by_haff(bulk):
         np.testing.assert_allclose(y[early], law(x, 0.9)[early], rtol=0.2)
 
 
+def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, ricochet, tmp_path):
+    """Of equal disks both ways agree; a gas of two sizes cools by the same laws."""
+    run = read_run(bulk[2])
+    assert haff.counted_rate(run) == pytest.approx(haff.first_rate(run), rel=0.1)
+    (tmp_path / "gas.nml").write_text(
+        """&box boundary = 'periodic', 'periodic' / &contact restitution = 0.9 /
+        &species name = 'small' count = 400 radius = 0.005 temperature = 1 /
+        &species name = 'large' count = 400 radius = 0.008 temperature = 1 /
+        &stop collisions_per_disk = 15 /
+        &output observables_every_collisions_per_disk = 0.1 /""",
+    )
+    assert ricochet("gas.nml", "-o", tmp_path / "two.h5", "--quiet").returncode == 0
+    two = read_run(tmp_path / "two.h5")
+    w0_t, tau, left = haff.energy_left(two)
+    np.testing.assert_allclose(left, hd.haff_by_collisions(tau, 0.9), rtol=0.1)
+    np.testing.assert_allclose(left, hd.haff_by_time(w0_t, 0.9), rtol=0.15)
+    assert run_script("haff", two.path, "-o", tmp_path / "two.png") == 0
+
+
 def test_the_cooling_rate_of_a_single_run_has_no_error(bulk):
     run = read_run(bulk[2])
     figure = haff.draw([(0.9, [run])], [haff.cooled([haff.energy_left(run)], 0.9)])
