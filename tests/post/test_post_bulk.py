@@ -618,6 +618,19 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, ric
     assert run_script("haff", two.path, "-o", tmp_path / "two.png") == 0
 
 
+@pytest.mark.parametrize(("restitution", "how"), [(1, ", written by frames_every_time"), (0.9, "")])
+def test_a_gas_that_cools_may_take_its_frames_by_collisions(
+    ricochet, tmp_path, capsys, restitution, how
+):
+    """Nothing of it is drawn against time: the advice is more frames, not even ones."""
+    few = ["species.disks.count=100", "stop.collisions_per_disk=2"]
+    few.append(f"contact.restitution={restitution}")
+    options = [word for value in few for word in ("--set", value)]
+    assert ricochet(BULK, *options, "--quiet", "-o", tmp_path / "a.h5").returncode == 0
+    assert run_script("correlations", tmp_path / "a.h5", "-o", tmp_path / "a.png") == 2
+    assert capsys.readouterr().err.endswith(f": needs 10 frames and more{how}\n")
+
+
 def test_the_cooling_rate_of_a_single_run_has_no_error(bulk):
     run = read_run(bulk[2])
     figure = haff.draw([(0.9, [run])], [haff.cooled([haff.energy_left(run)], 0.9)])
