@@ -80,4 +80,4 @@ _ricochet() {
   esac
 }
 
-complete -F _ricochet ricochet ricochet-ensemble
+complete -F _ricochet ricochet ricochet-ensemble runs/ensemble.sh # the last is that of a clone

@@ -84,7 +84,8 @@ def check(run: Run, first: Run) -> None:
     steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)
     even = loses_energy(first) or np.ptp(steps) <= 1e-6 * steps[0]  # the last may be out of step
     if run.frames < 10 or not even:
-        raise RunError(f"{run.path}: needs 10 frames and more, written by frames_every_time")
+        how = "" if loses_energy(first) else ", written by frames_every_time"
+        raise RunError(f"{run.path}: needs 10 frames and more{how}")
 
 
 def later(run: Run, skip: float | None, cool: bool) -> slice:

@@ -1,11 +1,13 @@
-"""Cooling of a gas of equal disks: Haff's law, and where the gas leaves it.
+"""Cooling of a gas: Haff's law, and where the gas leaves it.
 
     python post/haff.py runs/haff/*.h5 -o haff.png --csv haff.csv
 
 Runs are combined by restitution xi.  Left: K against time in units of the first mean free time,
 K0 / (1 + (1 - xi^2) w0 t / 4)^2 (Haff 1983).  Right: K against collisions per disk, an exponential
 (van Noije and Ernst 1998).  Below: K over the law.  Both hold while the gas stays homogeneous;
-later, streams carry the energy and it falls more slowly.  Periodic boxes at rest as a whole.
+later, streams carry the energy and it falls more slowly.  Periodic boxes at rest as a whole.  w0 is
+by the equation of state; of unequal disks, for which there is none, by their first collisions, and
+both laws take all sizes to be at one temperature: not so for very different masses.
 
 The cooling rate is -d ln K / d tau, tau collisions per disk.  The homogeneous state ends where its
 mean over two collisions per disk and over the runs falls below 90 % of the law for good; from there
@@ -20,7 +22,7 @@ from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import band, caption, colours, plt
 from ricochet.script import command_line, grouped, launch, measured, read_all, report
 from ricochet.statistics import Estimate, estimate, to_error
-from ricochet.thermodynamics import free_disks, packing, temperature
+from ricochet.thermodynamics import equal_disks, free_disks, packing, temperature
 
 import numpy as np
 
@@ -31,12 +33,22 @@ RATIO_TOP = 2.0  # of the axis of ratios, at most
 
 
 def first_rate(run: Run) -> float:
-    """w0: collisions per disk and time at the start, by the equation of state."""
-    if not run.periodic.all() or np.ptp(run.radius) > 0 or np.ptp(run.mass) > 0:
-        raise RunError(f"{run.path}: Haff's law is for equal disks in a periodic box")
+    """w0: collisions per disk and time at the start, by the equation of state, or as counted."""
+    if not run.periodic.all() or np.isnan(run.restitution):
+        raise RunError(f"{run.path}: Haff's law is for a periodic box, and one restitution")
+    if not equal_disks(run):
+        return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
     kt = temperature(run)
     return hard_disks.collision_rate(z, 2 * run.radius[0], free_disks(run), kt, run.mass[0])
+
+
+def counted_rate(run: Run) -> float:
+    """w0 by the first collision of each disk; meanwhile Haff's law has slowed the disks down."""
+    time, tau = run.collisions_per_disk
+    first = min(int(np.searchsorted(tau, 1.0)), len(tau) - 1)
+    slower = (1 - run.restitution**2) * tau[first] / 4
+    return float(tau[first] / time[first] * (np.expm1(slower) / slower if slower > 0 else 1))
 
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

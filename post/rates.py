@@ -10,15 +10,25 @@ collisions, and by the impulses on each side (a little larger: centres keep a ra
 sides).  With an event log also w_ij, the collisions of a disk of species i with disks of species j
 per time, and the free paths: in a frame each disk is on one, as long as its speed times the time
 between its collisions before and after.  Frames meet long paths more often; therefore each counts 1
-over its time.  The line is for equal disks that meet without memory (Boltzmann, Enskog).  Of runs
-that lose energy in collisions and have no equilibrium only the free paths are found, in the frames
-after --skip, or else 15 collisions per disk.
+over its time; errors are from the scatter of runs, or of one run's frames in blocks.  The line is
+for equal disks that meet without memory (Boltzmann, Enskog).  Of runs that lose energy in
+collisions and have no equilibrium only the free paths are found, in the frames after --skip, or
+else 15 collisions per disk.
 """
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, launch, read_all, report
-from ricochet.statistics import FINE, SeriesMean, combined, doubts, estimate, series_mean
+from ricochet.statistics import (
+    FINE,
+    Estimate,
+    SeriesMean,
+    combined,
+    doubts,
+    estimate,
+    series_mean,
+    to_error,
+)
 from ricochet.thermodynamics import (
     after_start,
     all_cool,
@@ -37,6 +47,8 @@ import scipy
 
 SIDES = ("left", "right", "bottom", "top")
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
+MIDDLES = (BINS[1:] + BINS[:-1]) / 2
+BLOCKS = 8  # of the frames of a single run
 
 
 def check(runs: list[Run]) -> None:
@@ -139,15 +151,28 @@ def path_density(x: np.ndarray) -> np.ndarray:
     return np.array([np.sum(weight * rate * np.exp(-rate * value)) for value in x])
 
 
-def histogram(runs: list[Run], skip: float | None = None) -> tuple[float, np.ndarray] | None:
-    """The mean free path, and the density of the paths in units of it."""
+def histogram(runs: list[Run], skip: float | None = None) -> tuple[Estimate, Estimate] | None:
+    """The mean free path, and the density of the paths in units of it.
+
+    Their errors are from the scatter of the runs, or of a single run's frames in blocks.
+    """
     parts = [free_paths(run, skip) for run in runs if has_log(run)]
     if not parts or sum(len(path) for path, _ in parts) == 0:
         return None
     path, weight = (np.concatenate(part) for part in zip(*parts, strict=True))
     mean = float(np.average(path, weights=weight))
-    counts, _ = np.histogram(path / mean, BINS, weights=weight)
-    return mean, counts / (np.sum(weight) * np.diff(BINS))
+    if len(parts) == 1:
+        parts = list(zip(np.array_split(path, BLOCKS), np.array_split(weight, BLOCKS), strict=True))
+    known = [part for part in parts if len(part[0]) > 0]
+    means = estimate([np.average(path, weights=weight) for path, weight in known])
+    shapes = estimate([density(path, weight, mean) for path, weight in known])
+    return Estimate(mean, means.error), Estimate(density(path, weight, mean), shapes.error)
+
+
+def density(path: np.ndarray, weight: np.ndarray, unit: float) -> np.ndarray:
+    """Of paths, in the bins."""
+    counts, _ = np.histogram(path / unit, BINS, weights=weight)
+    return counts / (np.sum(weight) * np.diff(BINS))
 
 
 # --- figure ---
@@ -173,9 +198,14 @@ def pressures_in_time(runs: list[Run], cuts: np.ndarray) -> dict[str, np.ndarray
     return ways
 
 
+def cuts_of(runs: list[Run]) -> np.ndarray:
+    """Times between which a pressure is drawn."""
+    return np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
+
+
 def draw_pressure(axes: plt.Axes, runs: list[Run], means: dict, start: float) -> None:
     """The pressure in time, mean over the runs with its error; its mean in equilibrium."""
-    cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
+    cuts = cuts_of(runs)
     middle, colours = (cuts[1:] + cuts[:-1]) / 2, iter(COLOURS)
     for way, values in pressures_in_time(runs, cuts).items():
         band(axes, middle, *estimate(values), color=next(colours), label=way)
@@ -191,7 +221,7 @@ def draw_pressure(axes: plt.Axes, runs: list[Run], means: dict, start: float) ->
 
 
 def draw(
-    runs: list[Run], means: dict, start: float, paths: tuple[float, np.ndarray] | None
+    runs: list[Run], means: dict, start: float, paths: tuple[Estimate, Estimate] | None
 ) -> plt.Figure:
     """The pressure in time, of a gas with means; with an event log also the free paths."""
     count = bool(means) + bool(paths)
@@ -199,9 +229,10 @@ def draw(
     if means:
         draw_pressure(panels[0, 0], runs, means, start)
     if paths:
-        mean, density = paths
-        axes = panels[0, -1]
-        axes.stairs(density, BINS, color=COLOURS[0], label=f"measured, $\\ell$ = {mean:.4g}")
+        mean, (height, error) = paths
+        axes, label = panels[0, -1], f"measured, $\\ell$ = {' ± '.join(to_error(*mean))}"
+        axes.stairs(height, BINS, color=COLOURS[0], label=label)
+        axes.errorbar(MIDDLES, height, error, fmt="none", color=COLOURS[0], elinewidth=1)
         fine = np.linspace(0, BINS[-1], 200)
         if equal_disks(runs[0]):
             axes.plot(fine, path_density(fine), color="black", lw=1.2, label="without memory")
@@ -213,7 +244,7 @@ def draw(
     return figure
 
 
-def table(runs: list[Run], means: dict, start: float, path: float | None) -> dict[str, list]:
+def table(runs: list[Run], means: dict, start: float, path: Estimate | None) -> dict[str, list]:
     """A row per quantity: exact ones first, then those with an error."""
     momentum = np.mean([run.observable("momentum").value for run in runs], axis=(0, 1))
     exact = {
@@ -223,15 +254,31 @@ def table(runs: list[Run], means: dict, start: float, path: float | None) -> dic
         "momentum_y": float(momentum[1]),
         "from_time" if not means else "equilibrium_from": start,
     }
-    if path is not None:
-        exact["mean_free_path"] = path
+    known = {} if path is None else {"mean_free_path": path}
+    known |= means
     return {
-        "quantity": [*exact, *means],
-        "mean": [*exact.values(), *(one.mean for one in means.values())],
-        "error": ["exact" if name != "mean_free_path" else "" for name in exact]
-        + [one.error for one in means.values()],
-        "samples": [""] * len(exact) + [round(one.samples, 1) for one in means.values()],
+        "quantity": [*exact, *known],
+        "mean": [*exact.values(), *(float(one.mean) for one in known.values())],
+        "error": ["exact"] * len(exact) + [float(one.error) for one in known.values()],
+        "samples": [""] * (len(exact) + (path is not None))
+        + [round(one.samples, 1) for one in means.values()],
     }
+
+
+def curves(runs: list[Run], means: dict, paths: tuple[Estimate, Estimate] | None) -> list[dict]:
+    """A row for each point of the figure: the pressure at a time x, the density at a length x."""
+    shown = {}
+    if means:
+        cuts = cuts_of(runs)
+        for way, values in pressures_in_time(runs, cuts).items():
+            shown[f"pressure_{way}(t)"] = ((cuts[1:] + cuts[:-1]) / 2, *estimate(values))
+    if paths:
+        shown["free_path_density"] = (MIDDLES, *paths[1])
+    return [
+        {"quantity": name, "mean": float(y), "error": float(error), "samples": "", "x": float(x)}
+        for name, curve in shown.items()
+        for x, y, error in zip(*curve, strict=True)
+    ]
 
 
 def main() -> None:
@@ -252,7 +299,9 @@ def main() -> None:
     notes = [note for name, ones in members.items() for note in doubts(name, ones)]
     notes += ["the gas loses energy, no equilibrium: kT is that of the start"] * cool
     title = "Pressure, rates and free paths of hard disks"
-    report(args, runs, title, draw(runs, means, start, paths), rows, notes=notes)
+    values = [dict(zip(rows, row, strict=True), x="") for row in zip(*rows.values(), strict=True)]
+    data = values + curves(runs, means, paths)
+    report(args, runs, title, draw(runs, means, start, paths), rows, data=data, notes=notes)
 
 
 if __name__ == "__main__":

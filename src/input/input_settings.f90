@@ -9,7 +9,7 @@ module input_settings
   use input_problems, only: problem_list_t
   use input_species, only: take_species
   use parameter_values, only: parameter_group_t, range_of
-  use parameters, only: obstacle_groups, row_of, variables_of, words_of
+  use parameters, only: obstacle_groups, row_of, track_of, variables_of, words_of
   use settings, only: output_settings_t, run_settings_t, settings_t, species_settings_t
   use stop_rules, only: stop_settings_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
@@ -42,6 +42,7 @@ contains
     call take_drive(groups(place_of("drive", groups%name)), settings%species, settings%drive, problems)
     call take_stop(groups(place_of("stop", groups%name)), settings%stop, problems)
     call take_output(groups(place_of("output", groups%name)), settings%output)
+    call check_cadences(groups(place_of("output", groups%name)), problems)
     call settle_features(settings, problems)
     call check_samples(groups(place_of("output", groups%name)), settings, problems)
     if (settings%drive%is_on()) call check_drive(groups(place_of("drive", groups%name)), settings, problems)
@@ -195,6 +196,22 @@ contains
     output%virial_tensor = group%text_of("virial_tensor") == ".true."
     output%checkpoint_every = group%real_of("checkpoint_every", never)
   end subroutine take_output
+
+  !> Frames and observables have one cadence each.
+  subroutine check_cadences(group, problems)
+    type(parameter_group_t), intent(in) :: group          !! &output
+    type(problem_list_t), intent(inout) :: problems
+    integer :: j, k
+
+    do k = 2, size(group%values)
+      if (.not. group%values(k)%given .or. track_of(group%values(k)%name) == "") cycle
+      do j = 1, k - 1
+        if (group%values(j)%given .and. track_of(group%values(j)%name) == track_of(group%values(k)%name)) exit
+      end do
+      if (j < k) call group%complain(trim(group%values(k)%name), "is given with "//trim(group%values(j)%name) &
+        //"; give one of them", problems)
+    end do
+  end subroutine check_cadences
 
   !> A cadence in time, or a time step, must be coarse enough for the clock and for a sane number of samples.
   subroutine check_samples(group, settings, problems)

@@ -7,7 +7,7 @@ module namelist_input
   use input_values, only: store_values
   use namelist_scanner, only: group_start, plain, scanner_t, setting, statement_t, token_t
   use parameter_values, only: parameter_group_t, parameter_value_t
-  use parameters, only: full_names, group_names, is_repeated, row_of, table, variables_of
+  use parameters, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   use settings, only: settings_t
   use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
   implicit none
@@ -268,20 +268,17 @@ contains
     end if
   end subroutine override
 
-  !> A cadence set by an override takes the place of those that the file has for the same samples.
+  !> A cadence set by an override takes the place of that which the file has for the same samples.
   subroutine replace_cadence(group, name, problems)
     type(parameter_group_t), intent(inout) :: group
     character(len=*), intent(in) :: name                  !! of the variable that is set
     type(problem_list_t), intent(inout) :: problems
-    character(len=*), parameter :: every = "_every_"
-    integer :: k, length
+    integer :: k
 
-    length = index(name, every)
-    if (length == 0) return
+    if (track_of(name) == "") return
     do k = 1, size(group%values)
       associate (slot => group%values(k))
-        if (slot%line > 0 .and. slot%name /= name .and. index(slot%name, name(:length)//every(2:)) == 1) &
-          call reset(slot, problems)
+        if (slot%line > 0 .and. slot%name /= name .and. track_of(slot%name) == track_of(name)) call reset(slot, problems)
       end associate
     end do
   end subroutine replace_cadence

@@ -9,7 +9,7 @@ module parameters
   implicit none
   private
   public :: parameter_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of, full_names
-  public :: words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
+  public :: track_of, words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37
   integer, parameter :: most_threads = 1024, most_disks = 100000000
@@ -301,6 +301,14 @@ contains
       text = text//trim(table(k)%group)//"."//name
     end do
   end function full_names
+
+  !> Whose samples a variable times: `frames` of frames_every_time; empty if it is no cadence.
+  pure function track_of(name) result(track)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: track
+
+    track = name(:max(index(name, "_every_") - 1, 0))
+  end function track_of
 
   !> The words of a line.
   pure function words_of(line) result(words)

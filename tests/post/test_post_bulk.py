@@ -537,13 +537,42 @@ def test_a_gas_that_cools_has_free_paths_and_no_pressure(bulk, tmp_path, capsys)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
 
 
+def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
+    """Of runs, and of one run in blocks: paths without memory, 4000 to a run."""
+
+    def free_paths(run, skip):
+        return rng.exponential(2.0, 4000), np.ones(4000)
+
+    monkeypatch.setattr(rates, "free_paths", free_paths)
+    monkeypatch.setattr(rates, "has_log", lambda run: True)
+    for runs, samples in ((1, 4000), (50, 200000)):
+        mean, density = rates.histogram([None] * runs)
+        assert abs(mean.mean - 2) < 4 * mean.error
+        assert mean.error == pytest.approx(2 / np.sqrt(samples), rel=0.9 if runs == 1 else 0.4)
+        law = np.exp(-rates.BINS)
+        off = (density.mean + np.diff(law) / np.diff(rates.BINS))[:16] / density.error[:16]
+        assert np.mean(np.abs(off) < 3) > 0.8
+
+
+def test_the_table_of_rates_has_the_points_of_the_figure(bulk, tmp_path):
+    table = tmp_path / "a.csv"
+    assert run_script("rates", bulk[0], "-o", tmp_path / "a.png", "--csv", table) == 0
+    points = [row for row in csv.DictReader(table.open()) if row["x"]]
+    names = [row["quantity"] for row in points]
+    assert names.count("free_path_density") == len(rates.BINS) - 1
+    assert names.count("pressure_virial(t)") > 10
+    paths = [row for row in points if row["quantity"] == "free_path_density"]
+    assert all(float(row["error"]) > 0 for row in paths[:16])
+
+
 def test_rates_of_a_gas_agree_with_each_other(bulk):
     run = read_run(bulk[0])
     found = rates.quantities(run)
     per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
     assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
     assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
-    mean, density = rates.histogram([run])
+    (mean, error), (density, _) = rates.histogram([run])
+    assert 0 < error < 0.03 * mean
     speed = np.mean(run.speed(slice(None)))
     assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
     assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
@@ -568,6 +597,38 @@ def test_a_gas_cools_by_haff(bulk):
     ):
         early = law(x, 0.9) > 0.1
         np.testing.assert_allclose(y[early], law(x, 0.9)[early], rtol=0.2)
+
+
+def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, ricochet, tmp_path):
+    """Of equal disks both ways agree; a gas of two sizes cools by the same laws."""
+    run = read_run(bulk[2])
+    assert haff.counted_rate(run) == pytest.approx(haff.first_rate(run), rel=0.1)
+    (tmp_path / "gas.nml").write_text(
+        """&box boundary = 'periodic', 'periodic' / &contact restitution = 0.9 /
+        &species name = 'small' count = 400 radius = 0.005 temperature = 1 /
+        &species name = 'large' count = 400 radius = 0.008 temperature = 1 /
+        &stop collisions_per_disk = 15 /
+        &output observables_every_collisions_per_disk = 0.1 /""",
+    )
+    assert ricochet("gas.nml", "-o", tmp_path / "two.h5", "--quiet").returncode == 0
+    two = read_run(tmp_path / "two.h5")
+    w0_t, tau, left = haff.energy_left(two)
+    np.testing.assert_allclose(left, hd.haff_by_collisions(tau, 0.9), rtol=0.1)
+    np.testing.assert_allclose(left, hd.haff_by_time(w0_t, 0.9), rtol=0.15)
+    assert run_script("haff", two.path, "-o", tmp_path / "two.png") == 0
+
+
+@pytest.mark.parametrize(("restitution", "how"), [(1, ", written by frames_every_time"), (0.9, "")])
+def test_a_gas_that_cools_may_take_its_frames_by_collisions(
+    ricochet, tmp_path, capsys, restitution, how
+):
+    """Nothing of it is drawn against time: the advice is more frames, not even ones."""
+    few = ["species.disks.count=100", "stop.collisions_per_disk=2"]
+    few.append(f"contact.restitution={restitution}")
+    options = [word for value in few for word in ("--set", value)]
+    assert ricochet(BULK, *options, "--quiet", "-o", tmp_path / "a.h5").returncode == 0
+    assert run_script("correlations", tmp_path / "a.h5", "-o", tmp_path / "a.png") == 2
+    assert capsys.readouterr().err.endswith(f": needs 10 frames and more{how}\n")
 
 
 def test_the_cooling_rate_of_a_single_run_has_no_error(bulk):

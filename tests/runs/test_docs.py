@@ -301,12 +301,14 @@ def test_there_is_one_version(program):
     assert f"\nversion: {version}\ndate-released: {date}\n" in cited
 
 
+COMPLETION = ROOT / "docs" / "ricochet-completion.bash"
+
+
 def completed(program, *words):
     """What bash proposes for the last word."""
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
     printf '%s\\n' "${COMPREPLY[@]}" """
-    source = ROOT / "docs" / "ricochet-completion.bash"
-    command = ["bash", "-c", script, "bash", source, program, *words]
+    command = ["bash", "-c", script, "bash", COMPLETION, program, *words]
     result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
     assert result.stderr == ""
     return result.stdout.split()
@@ -341,6 +343,9 @@ def test_completion_knows_ensembles(program, tmp_path):
     assert completed(ensemble, "input/gas") == ["input/gas.nml"]
     assert completed(ensemble, "--scan", "species.mass") == ["species.mass="]
     assert completed(ensemble, "--scan", "run.queue", "=", "he") == ["heap"]
+    assert completed("runs/ensemble.sh", "--sc") == ["--scan"]
+    known = 'source "$1"; complete -p ricochet ricochet-ensemble runs/ensemble.sh'
+    subprocess.run(["bash", "-c", known, "bash", COMPLETION], stdout=subprocess.PIPE, check=True)
 
 
 def code_after(text: str, start: int) -> tuple[str, int]:
@@ -404,10 +409,15 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
         copy(ROOT / name, tmp_path / name)
     steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)
     assert steps >= 14
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    style = [sys.executable, "tests/support/check_style.py"]
+    said = subprocess.run(style, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert (said.returncode, said.stdout) == (0, "")
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    law = ["tests=tests/unit/test_observables.pf", "unit-tests"]
-    for goal in ([], law):  # laws hold for what is new, too
+    about = "observables", "parameters", "namelist_input"
+    laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
+    for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
         made = subprocess.run(
             build + goal, cwd=tmp_path, env=environment, capture_output=True, text=True
         )

@@ -274,7 +274,7 @@ def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
 
 
 def test_a_cadence_that_is_set_takes_the_place_of_that_in_the_file(ricochet, tmp_path):
-    """For the same samples only; one that is set anew stays beside others that are set."""
+    """For the same samples only."""
     write_input(
         tmp_path,
         "&species count = 20 radius = 0.02 speed = 1 / &stop collisions = 40 /"
@@ -291,8 +291,25 @@ def test_a_cadence_that_is_set_takes_the_place_of_that_in_the_file(ricochet, tmp
     assert samples("a.h5") == (5, 5)
     assert samples("b.h5", "frames_every_collisions_per_disk=2") == (3, 5)
     assert samples("c.h5", "observables_every_collisions=20") == (5, 3)
-    both = "frames_every_collisions_per_disk=2", "frames_every_collisions=15"
-    assert samples("d.h5", *both) == (5, 5)
+
+
+def test_two_cadences_of_the_same_samples_are_refused(ricochet, tmp_path):
+    """In the file or on the command line; neither would be left out without a word."""
+    disks = "&species count = 20 radius = 0.02 speed = 1 / &stop collisions = 40 /\n"
+    write_input(tmp_path, disks)
+    both = "output.frames_every_collisions_per_disk=2", "output.frames_every_collisions=15"
+    twice = ricochet("gas.nml", *(f"--set={each}" for each in both))
+    words = "is given with frames_every_collisions; give one of them\n"
+    assert twice.returncode == USAGE
+    assert twice.stderr == f"--set {both[0]}: output.frames_every_collisions_per_disk: {words}"
+    write_input(
+        tmp_path,
+        disks + "&output frames_every_collisions = 15\nframes_every_collisions_per_disk = 2 /\n",
+    )
+    twice = ricochet("gas.nml")
+    assert twice.returncode == USAGE
+    assert twice.stderr == f"gas.nml:3: output.frames_every_collisions_per_disk: {words}"
+    assert ricochet("gas.nml", f"--set={both[1]}").returncode == FINISHED
 
 
 def test_the_cadence_leaves_no_trace_in_the_trajectory(ran, tmp_path):

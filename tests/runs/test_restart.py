@@ -61,8 +61,8 @@ CHOICES = {
         " event_log = .true. / &stop time = 20 /",
         "planned": "&output frames_every_events = 77 observables_every_events = 31"
         " precision = 'single' / &stop events = 4000 /",
-        "mixed": "&output frames_every_collisions = 50 frames_every_time = 0.3"
-        " observables_every_time = 0.1 / &stop collisions_per_disk = 80 /",
+        "mixed": "&output frames_every_collisions = 50 observables_every_time = 0.1 /"
+        " &stop collisions_per_disk = 80 /",
         "per disk": "&output frames_every_collisions_per_disk = 3.3"
         " observables_every_collisions_per_disk = 0.7 / &stop collisions_per_disk = 80 /",
         "ends": "&stop time = 20 /",

@@ -310,7 +310,7 @@ class Draw:
             every = max(every, self.events // 5, 1)
         for track in "frames", "observables":
             kinds = ["time", "collisions", "events", "collisions_per_disk"]
-            for kind in rng.sample(kinds, rng.choice([0, 1, 1, 1, 2])):
+            for kind in rng.sample(kinds, rng.choice([0, 1, 1, 1])):
                 step = every
                 if kind == "time":
                     step = rng.uniform(0.02, 0.3) * min(self.edges) / self.speed
