@@ -67,6 +67,7 @@ function layout() {
   if (!film) return;  // it is still to come
   const plots = ['histogram', 'energy', 'pressure'];
   for (const name of plots) $(name).style.height = plotHeight(name) + 'px';  // the stage gets the room that is left
+  tell();  // also to the words
   layOutStage();
   for (const name of plots) layOutPlot($(name), plotHeight(name));
   layEnergyOut();
