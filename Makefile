@@ -178,7 +178,7 @@ demo:  ## sets up, builds, runs crater and gas, draws both: runs/demo/
 FILM ?= runs/film
 film: name = $(FILM)/$(basename $(notdir $(INPUT)))
 film: $(if $(wildcard $(BUILD)/ricochet),,all)  ## runs INPUT=FILE.nml SET="group.name=value", opens the film
-	@$(if $(INPUT),:,$(error Which input? make film INPUT=input/crater.nml))
+	@$(if $(INPUT),:,$(error Which input? make film INPUT=input/crater.nml SET=output.frames_every_time=0.002))
 	$(BUILD)/ricochet '$(INPUT)' -o '$(name).h5' --force $(addprefix --set ,$(SET))
 	$(PYTHON) post/player.py '$(name).h5' -o '$(name).html' --open
 

@@ -117,10 +117,10 @@ def lab_page(lab: Laboratory) -> str:
 
 def picture(lab: Laboratory, name: str) -> bytes:
     """The last frame of an input, as PNG."""
-    run = lab.sample(name) if name in lab.inputs else None
-    if run is None:
-        raise Refused("there is no picture")
-    with drawing:
+    with drawing:  # one at a time: a form must not wait long
+        run = lab.sample(name) if name in lab.inputs else None
+        if run is None:
+            raise Refused("there is no picture")
         return drawn(run)
 
 

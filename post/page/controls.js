@@ -67,6 +67,7 @@ function layout() {
   if (!film) return;  // it is still to come
   const plots = ['histogram', 'energy', 'pressure'];
   for (const name of plots) $(name).style.height = plotHeight(name) + 'px';  // the stage gets the room that is left
+  tell();  // also to the words
   layOutStage();
   for (const name of plots) layOutPlot($(name), plotHeight(name));
   layEnergyOut();
@@ -93,24 +94,25 @@ function refresh() {
 
 const paceNow = () => live.on && live.newest ? live.pace : pace * 10 ** +$('pace').value;
 
+let ticking;  // what comes with the next picture
 function play(on) {
   if (state.playing === on) return;
   state.playing = on;
   press({ play: on });
   $('play').setAttribute('aria-label', on ? 'pause' : 'play');
   if (!on) {
+    cancelAnimationFrame(ticking);
     show(moment.time, true);
     remember();
     return;
   }
   if (moment.time === last() && !live.on) show(first());
   let before = performance.now();
-  requestAnimationFrame(function tick(stamp) {
-    if (!state.playing) return;
+  ticking = requestAnimationFrame(function tick(stamp) {
     const passed = Math.min(0.1, Math.max(0, stamp - before) / 1000);
     before = stamp;
     show(moment.time + passed * paceNow());
-    if (moment.time === last() && !live.on) play(false); else requestAnimationFrame(tick);
+    if (moment.time === last() && !live.on) play(false); else ticking = requestAnimationFrame(tick);
   });
 }
 

@@ -9,6 +9,7 @@ const state = {
   settings: {}, added: [],     // what the form changes: variable -> text; groups that are not in the file: [kind, name]
   cadences: {},                // those of the settings that the laboratory proposes
   running: false, stopped: false,  // the newest run goes on; or it can go on
+  paused: false,               // films stand, also the one that is coming
   shown: [],                   // runs side by side: { number, figure }, the newest last
 };
 
@@ -234,6 +235,7 @@ function showProblems(problems) {
 let busy = false, again = false;  // one wish at a time; whether values have changed meanwhile
 async function run(resume = false) {
   clearTimeout(timer);
+  state.paused = false;
   if (busy) {
     again = true;
     return;
@@ -262,7 +264,8 @@ const changes = () => Object.entries(state.settings).filter(([name, value]) => s
 
 // A run beside the one that is kept, or in the place of the one before.
 function show({ run: number, command }) {
-  const most = isComparing() ? 2 : 1, before = state.shown.length === most ? state.shown.pop() : null;
+  const most = isComparing() ? 2 : 1, same = state.shown.at(-1)?.number === number;
+  const before = same || state.shown.length === most ? state.shown.pop() : null;
   const figure = before?.figure ?? make('section', { className: 'run' }, make('header'), make('div'));
   const base = `${lab.page}/${number}/`, name = `${state.input}_${number}`;
   const link = (words, part, ending) => make('a', { textContent: words, href: base + part, download: name + ending });
@@ -274,7 +277,8 @@ function show({ run: number, command }) {
   figure.firstChild.replaceChildren(words, link('Input', 'input', '.nml'), link('Output', 'output', '.h5'), copy);
   state.shown.push({ number, figure });
   if (!figure.isConnected) $('runs').append(figure);  // moved, it would load its film again
-  place(figure, base);
+  if (!same || figure.querySelector('.coming')) place(figure, base);
+  else films().forEach(one => { if (one === film(figure)) one.goOn(); else one.play(true); });
 }
 
 // The film of a new run replaces the one before when it is there, and keeps what was chosen in it.
@@ -287,7 +291,7 @@ function place(figure, base) {
   const kept = state.shown.length > 1 ? film(state.shown[0].figure) : null;
   const wait = () => {
     if (!frame.isConnected) return;
-    if (!frame.contentDocument?.getElementById('clock')?.textContent) {
+    if (!isThere(frame)) {
       setTimeout(wait, 30);
       return;
     }
@@ -298,18 +302,21 @@ function place(figure, base) {
     player.addEventListener('keydown', typed);
     while (holder.firstChild !== frame) holder.firstChild.remove();
     frame.className = '';
-    if (kept) for (const one of [kept, player]) { one.go(-Infinity); one.play(true); }
+    for (const one of films()) { one.go(-Infinity); one.play(!state.paused); }
   };
   wait();
 }
 
-const film = figure => figure.querySelector('iframe')?.contentWindow;
-const films = () => state.shown.map(({ figure }) => film(figure)).filter(one => one?.choices);
+const frameOf = figure => figure.querySelector('iframe'), film = figure => frameOf(figure)?.contentWindow;
+const isThere = frame => frame?.contentDocument?.getElementById('clock')?.textContent;
+const films = () => state.shown.map(({ figure }) => frameOf(figure)).filter(isThere).map(frame => frame.contentWindow);
 const inFilm = (one, id) => one.document.getElementById(id);
 const isPlaying = one => inFilm(one, 'play').ariaPressed === 'true';
 
+const isGoing = () => state.running || films().some(isPlaying) || (!state.paused && (busy || document.querySelector('.coming')));
 function pauseOrGoOn() {
-  if (state.running || films().some(isPlaying)) {
+  state.paused = isGoing();
+  if (state.paused) {
     films().forEach(one => one.play(false));
     if (state.running) ask('stop', {});
   } else if (state.stopped || films().every(one => +inFilm(one, 'scrub').value === 1)) run(true);
@@ -333,7 +340,7 @@ async function look() {
 }
 
 setInterval(look, 2000);
-setInterval(() => { $('pause').textContent = state.running || films().some(isPlaying) ? 'Pause' : 'Go on'; }, 200);
+setInterval(() => { $('pause').textContent = isGoing() ? 'Pause' : 'Go on'; }, 200);
 addEventListener('pagehide', () => navigator.sendBeacon('leave', JSON.stringify({ page: lab.page })));
 addEventListener('pageshow', event => { if (event.persisted) location.reload(); });
 
@@ -349,6 +356,12 @@ function theme(night) {
   }
 }
 
+// Pictures are asked for while one looks at them: a choice need not wait for the rest.
+function lookAtInputs() {
+  for (const image of $('inputs').querySelectorAll('img:not([src])')) image.src = image.dataset.src;
+  $('inputs').showModal();
+}
+
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
@@ -356,7 +369,7 @@ function bare(on) {
 
 const actions = {
   run, pause: pauseOrGoOn, compare: compareOrNot, settings: () => bare(!document.body.classList.contains('bare')),
-  choose: () => $('inputs').showModal(), theme: () => theme(!isDark()),
+  choose: lookAtInputs, theme: () => theme(!isDark()),
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', c: 'compare', s: 'settings' };
@@ -375,11 +388,13 @@ addEventListener('keydown', typed);
 $('form').addEventListener('submit', event => { event.preventDefault(); run(); });
 $('add').addEventListener('change', () => { if ($('add').value) addGroup(...$('add').value.split(' ')); });
 $('inputs').append(...lab.inputs.map(name => {
-  const image = make('img', { src: 'picture?' + encodeURIComponent(name), loading: 'lazy', alt: '' });
+  const image = make('img', { loading: 'lazy', alt: '' });
+  image.dataset.src = 'picture?' + encodeURIComponent(name);
   const button = make('button', { type: 'button' }, image, name);
   button.addEventListener('click', () => { $('inputs').close(); choose(name); });
   return button;
 }));
+$('inputs').addEventListener('close', () => { for (const image of $('inputs').querySelectorAll('img')) image.complete || image.removeAttribute('src'); });
 theme(matchMedia('(prefers-color-scheme: dark)').matches);
 bare(matchMedia('(max-width: 900px), (max-height: 500px)').matches);
 choose(lab.inputs.includes('gas') ? 'gas' : lab.inputs[0]);

@@ -47,6 +47,15 @@ function follow(newest) {
   if (newest) { show(last(), true); play(true); }
 }
 
+// The run goes on after its end.
+function goOn() {
+  if (!live.on) {
+    live.on = true;
+    ask();
+  }
+  play(true);
+}
+
 // ---------- a part of another page ----------
 
 // The laboratory shows runs side by side: what is chosen in one of them can be chosen in the others.

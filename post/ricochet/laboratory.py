@@ -61,7 +61,8 @@ class Laboratory:
         self.table = table(find_program())
         self.pages: dict[str, Page] = {}
         self.samples: dict[str, Run | None] = {}
-        self.lock, self.sample_lock = threading.Lock(), threading.Lock()
+        self.lock = threading.Lock()
+        self.sample_locks = {name: threading.Lock() for name in self.inputs}
 
     # --- pages ---
 
@@ -240,7 +241,7 @@ class Laboratory:
 
     def sample(self, name: str) -> Run | None:
         """The input file as it is, run once for a few seconds at most; None if it cannot run."""
-        with self.sample_lock:
+        with self.sample_locks[name]:
             if name not in self.samples:
                 folder = self.folder / name
                 run = self.experiment({"input": name, "settings": {}, "added": []}, folder)

@@ -29,6 +29,11 @@ LONG = {
     "output.frames_every_collisions": "1000000000",
     "output.observables_every_collisions": "1000000000",
 }
+MANY = LONG | {
+    "stop.collisions_per_disk": "40000",
+    "output.frames_every_collisions": "20000",
+    "output.observables_every_collisions": "20000",
+}
 
 
 @pytest.fixture(scope="session")
@@ -291,6 +296,27 @@ def test_a_page_may_ask_while_its_run_begins(lab, monkeypatch):
     )
     assert wish(lab, page)["run"] == 1
     assert seen == [{"running": False, "stopped": False, "reason": ""}]
+
+
+def test_a_form_waits_for_the_sample_of_its_own_input_only(lab, monkeypatch):
+    begin, held, entered = experiment.Experiment.begin, threading.Event(), threading.Event()
+
+    def slow(run, resume):
+        if run.name == "crater":
+            entered.set()
+            held.wait(PATIENCE)
+        begin(run, resume)
+
+    monkeypatch.setattr(experiment.Experiment, "begin", slow)
+    thread = threading.Thread(target=script.picture, args=[lab, "crater"])
+    thread.start()
+    entered.wait(PATIENCE)
+    other = threading.Thread(target=lab.form, args=["gas"], daemon=True)
+    other.start()
+    other.join(PATIENCE)
+    assert not other.is_alive() and not held.is_set()
+    held.set()
+    thread.join()
 
 
 def test_a_film_waits_for_no_progress_bar(lab):
@@ -635,6 +661,14 @@ def test_two_runs_stand_side_by_side_at_one_pace(opened):
     shows(opened, 2)
     paces = opened.run("return films().map(one => one.choices().pace)")
     assert paces[0] == paces[1]
+    words = [
+        "films()[1].document.getElementById('live').textContent = ''",
+        "document.querySelectorAll('.run > header p')[1].textContent = 'long '.repeat(50)",
+    ]
+    for one in words:  # that the other does not have
+        opened.run(f"{one}; films().forEach(one => one.play(false))")
+        heights = "films().map(one => (one.layout(), inFilm(one, 'stage').offsetHeight))"
+        assert opened.run(f"return new Set({heights}).size") == 1
     change(opened, "species.gas.speed", "2")
     wait_for(lambda: opened.run("return state.shown.at(-1).number") == 3)
     shows(opened, 2)
@@ -657,6 +691,45 @@ def test_pause_stops_the_run_and_go_on_goes_on(opened, lab):
     assert list(page.runs) == [2]
     opened.open("about:blank")  # the page says goodbye
     wait_for(lambda: lab.pages == {})
+
+
+def test_a_film_that_is_paused_while_it_comes_stands_at_its_first_frame(opened):
+    for key in ("r", "p", "\ue011"):  # Home
+        opened.press(key)
+    wait_for(lambda: opened.run("return state.shown[0].number") == 2)
+    shows(opened)
+    assert opened.run("return !films().some(isPlaying)")
+    assert "frame 1/" in opened.run("return inFilm(films()[0], 'clock').textContent")
+    wait_for(lambda: opened.run("return $('pause').textContent") == "Go on")
+
+
+def test_the_film_goes_on_where_it_was_paused(opened, lab):
+    page = lab.page(opened.run("return lab.page"))
+    opened.run("Object.assign(state.settings, arguments[0]); run()", MANY)
+    wait_for(lambda: 2 in page.runs and page.newest.running)
+    shows(opened)
+    time = "return +inFilm(films()[0], 'clock').querySelector('b').textContent"
+    opened.press("\ue010")  # End
+    wait_for(lambda: opened.run(time) > 0)
+    opened.press("p")
+    wait_for(lambda: opened.run("return state.stopped"))
+    paused = opened.run(time)
+    opened.press("c")
+    opened.press("p")
+    wait_for(lambda: opened.run("return state.running"))
+    wait_for(lambda: opened.run(time) > paused)
+    assert opened.run("return state.shown.map(one => one.number)") == [2]
+
+
+def test_a_choice_does_not_wait_for_the_pictures_of_others(opened, lab, monkeypatch):
+    held = threading.Event()
+    monkeypatch.setattr(script, "picture", lambda *_: (held.wait(PATIENCE), b"")[1])
+    opened.click("choose")
+    wait_for(lambda: opened.run("return document.querySelector('#inputs img').src") != "")
+    opened.run("[...$('inputs').children].find(one => one.textContent === 'crater').click()")
+    wait_for(lambda: opened.run("return state.input") == "crater")
+    assert not held.is_set()
+    held.set()
 
 
 def test_the_keyboard_is_enough(opened):
@@ -699,7 +772,11 @@ def test_a_film_begins_with_its_run_however_far_that_is(opened, lab):
 
 
 def test_the_box_has_all_the_room_that_the_histogram_leaves(opened):
-    """Also where that was larger before, in a wider window."""
+    """Also where that was larger before, in a wider window; and all that the words leave."""
+    height = "return inFilm(films()[0], 'stage').offsetHeight"
+    first = opened.run(height)
+    opened.run("films()[0].go(0); films()[0].layout()")
+    assert opened.run(height) == first
     opened.click("compare")
     change(opened, "species.gas.speed", "2")
     shows(opened, 2)

@@ -304,6 +304,18 @@ def test_play_plays_to_the_end_and_pause_pauses(opened):
     assert opened.run("return moment.time") == stopped
 
 
+def test_a_film_that_is_paused_and_played_at_once_keeps_its_pace(opened):
+    steps = opened.run(
+        """const own = requestAnimationFrame;
+        let asked = 0;
+        requestAnimationFrame = action => { asked += 1; return own(action); };
+        for (const on of [false, true, false, true]) play(on);
+        asked = 0;
+        return new Promise(done => own(() => { asked = 0; own(() => done(asked)); }));"""
+    )
+    assert steps <= 1
+
+
 def test_the_scrub_bar_and_the_choices_act(opened):
     opened.run("$('scrub').value = 25.5 / 39; $('scrub').dispatchEvent(new Event('input'))")
     assert opened.run("return moment.time") == pytest.approx(25.5)

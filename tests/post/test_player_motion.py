@@ -416,15 +416,22 @@ def place_of(browser, name):
 def test_the_histogram_is_seen_with_the_disks(gas, browser):
     for size in ("lying", "upright"):
         browser.resize(*SIZES[size])
-        browser.run("layout(); layout(); scrollTo(0, 0)")
+        browser.draw(2)
+        turned = place_of(browser, "histogram")
+        browser.run("layout(); scrollTo(0, 0)")
+        assert place_of(browser, "histogram") == turned
         disks, speeds, controls = (
             place_of(browser, name) for name in ("stage", "histogram", "controls")
         )
         assert speeds["bottom"] < SIZES[size][1] and speeds["height"] > 70
+        assert place_of(browser, "now")["left"] >= speeds["right"]
         if size == "lying":
             assert speeds["left"] > disks["right"] and speeds["top"] < disks["bottom"]
         else:
             assert disks["bottom"] < speeds["top"] and speeds["bottom"] < controls["top"]
+    browser.resize(390, 320, True)  # as of two runs one above the other
+    browser.run("layout()")
+    assert place_of(browser, "histogram")["height"] > 70
 
 
 def test_a_wide_screen_is_used(gas, browser):
