@@ -248,8 +248,8 @@ lint:  ## warnings, style, and the rules of the design
 
 lints := lint-compiler lint-flang lint-fortran lint-python lint-shell
 lint-compiler:
-	@$(MAKE) -s BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' \
-	  $(BUILD)/lint/ricochet $(patsubst tests/support/%.f90,$(BUILD)/lint/substitute/%.o,$(wildcard tests/support/*.f90))
+	@$(MAKE) -s BUILD=$(BUILD)/lint HINTS= PFUNIT_DIR= OPT='-O2 -pedantic -Wimplicit-interface -Werror' suites=tests/long \
+	  $(BUILD)/lint/ricochet $(patsubst %,$(BUILD)/lint/substitute/%.o,$(basename $(notdir $(wildcard tests/support/*.f90 tests/long/*.pf))))
 flang = $(lastword $(sort $(wildcard $(foreach name,flang flang-[0-9]* flang-new*,$(addsuffix /$(name),$(subst :, ,$(PATH)))))))
 lint-flang:
 	@$(if $(flang),$(MAKE) -s BUILD=$(BUILD)/flang FC=$(flang) HINTS= PFUNIT_DIR= OPT=-O0 $(BUILD)/flang/without_hdf5,:)
