@@ -213,11 +213,11 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    integer(int64) :: turns, kicks
+    integer(int64) :: turns, kicks, events
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time                        ! of the simulation [time]
+    real(real64) :: first_time, time                  ! of the simulation [time]
 
     turns = 1
     requests_served = 0
@@ -231,9 +231,13 @@ contains
       now = seconds()
       kicks = run%sim%kicks
       call spend_time_on(part_events)
+      events = run%sim%tally%events
+      time = run%sim%time()
       call run%evolution%advance(run%sim, limits, error)
       call spend_time_on(part_samples)
-      if (run%evolution%arrived) run%sim%settled_until = run%sim%time()
+      associate (sim => run%sim)
+        sim%settled = run%evolution%arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > time)
+      end associate
       turns = adapted(turns, seconds() - now, limits%reached(run%sim%tally) .or. run%sim%time() >= limits%time &
         .or. run%sim%kicks > kicks)
       call run%output%write_events(run%sim, run%evolution%log)

@@ -123,7 +123,7 @@ contains
           if (limits%time < last_time) then
             sim%now = max(sim%now, limits%time - sim%epoch)
           else                                     ! a stale event may have moved it
-            sim%now = max(maxval(sim%disk%clock), sim%settled_until - sim%epoch)
+            sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%epoch)
           end if
           self%arrived = .true.
           return

@@ -22,6 +22,7 @@ module evolution
     real(real64) :: most(n_grown) = huge(0.0_real64)     !! of what is in `grown`
     logical :: epochs = .false.                          !! whenever the epoch has moved
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
+    real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
   contains
     procedure :: reached
     procedure :: outgrown

@@ -79,7 +79,7 @@ contains
     logical :: over                               !! the present moment, for samples
 
     if (self%every_time < never) then
-      over = max(sim%settled_until, self%last_time) >= sim%time()
+      over = sim%settled .or. self%last_time >= sim%time()
       self%multiple = max(self%multiple, int(sim%time()/self%every_time, int64))
       do while (self%next_time() < sim%time() .or. (over .and. self%next_time() <= sim%time()))
         self%multiple = self%multiple + 1
@@ -98,6 +98,7 @@ contains
     limits%time = min(limits%time, self%next_time())
     limits%collisions = min(limits%collisions, self%next_collisions)
     limits%events = min(limits%events, self%next_events)
+    limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
   !> The first multiple of `step` beyond n; huge if there is no step.

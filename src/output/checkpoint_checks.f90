@@ -78,8 +78,6 @@ contains
         flaw = "epoch_begin is "//written(sim%epoch_begin)//", epoch_end "//written(sim%epoch_end)
       else if (sim%last_advance > sim%now) then
         flaw = "last_advance is "//written(sim%last_advance)//", now "//written(sim%now)
-      else if (sim%settled_until > sim%time()) then
-        flaw = "settled_until is "//written(sim%settled_until)//" at time "//written(sim%time())
       else if (sim%events_then > sim%tally%events) then
         flaw = "events_then is "//written(sim%events_then)//" after "//written(sim%tally%events)//" events"
       end if

@@ -187,11 +187,14 @@ contains
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
     logical :: stored
+    integer(int64) :: settled
     integer :: k
 
     call file%exchange("epoch", sim%epoch, times)
     call file%exchange("now", sim%now, times)
-    call file%exchange("settled_until", sim%settled_until, [-1.0_real64, never])
+    settled = merge(1, 0, sim%settled)
+    call file%exchange("settled", settled, [0_int64, 1_int64])
+    sim%settled = settled == 1
     call file%exchange("epoch_begin", sim%epoch_begin, times)
     call file%exchange("epoch_end", sim%epoch_end, [0.0_real64, never])
     call file%exchange("epoch_events", sim%epoch_events, counts)

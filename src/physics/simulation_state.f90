@@ -36,7 +36,7 @@ module simulation_state
     integer :: extra_row(n_fixed + 1:n_columns) = 0   !! in which row of these a column is; 0: not there
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
-    real(real64) :: settled_until = -1.0_real64   !! all that happens up to then is behind, since the start [time]
+    logical :: settled = .false.                  !! all that happens up to `now` is behind
     real(real64) :: epoch_begin = 0.0_real64      !! since the epoch [time]
     real(real64) :: epoch_end = 0.0_real64        !! when the epoch moves, since the epoch; 0: not known yet [time]
     integer(int64) :: epoch_events = 0            !! events at the beginning of the epoch
@@ -90,7 +90,7 @@ contains
     real(real64), intent(in) :: t                 !! since the start of the run [time]
     logical :: yes
 
-    yes = self%settled_until >= t
+    yes = self%settled .and. self%time() >= t
   end function has_reached
 
   !> Number of disks.
