@@ -6,6 +6,7 @@ module box_sides
   use free_flight, only: time_to_line
   use kinds, only: int32, never, real64
   use partners, only: axis_of, n_sides, sense_of, wall_index
+  use side_motion, only: side_motion_t
   implicit none
   private
   public :: bounds, keep_off_sides, next_side, side_time
@@ -54,7 +55,7 @@ contains
       if (motion%travels()) then
         tau = motion%moment(box%epoch, disk%clock)
         gap = gap - motion%place(tau)
-        if (gap < rounding*(abs(disk%x(axis)) + disk%radius + motion%amplitude)) gap = 0
+        if (gap < no_gap(disk, axis, motion)) gap = 0
         t = disk%clock + motion%contact_time(tau, gap, -sense*disk%v(axis), -sense*box%gravity(axis))
       else
         t = disk%clock + time_to_line(max(gap, 0.0_real64), sense*disk%v(axis), sense*box%gravity(axis))
@@ -82,8 +83,9 @@ contains
     end do
   end subroutine next_side
 
-  !> Takes from a disk the approach to a moving side that rounding has left, when its clock got another origin: where it
-  !> stuck to the side, they would hit once more, in the past. No side is met before `now`; the change is in the last digits.
+  !> Moves a disk whose clock got another origin off the sides that it would meet before `now`: with its clock the place and
+  !> the velocity of a side that moves are rounded, and a disk that was all but in contact then would hit it once more, in
+  !> the past. It is moved by what counts as no gap, or little more.
   pure subroutine keep_off_sides(box, disk, now)
     type(box_t), intent(in) :: box
     type(disk_t), intent(inout) :: disk
@@ -92,15 +94,25 @@ contains
     integer(int32) :: side
 
     do side = 0, 1 - n_sides, -1
-      associate (motion => box%side(wall_index(side))%motion, v => disk%v(axis_of(side)))
+      associate (motion => box%side(wall_index(side))%motion, x => disk%x(axis_of(side)))
         if (.not. motion%travels()) cycle
-        step = max(epsilon(step)*max(abs(v), motion%top_speed()), tiny(step))
+        step = no_gap(disk, axis_of(side), motion)
         do while (side_time(box, disk, side) < now)
-          v = v - sense_of(side)*step
+          x = x - sense_of(side)*step
           step = 2*step
         end do
       end associate
     end do
   end subroutine keep_off_sides
+
+  !> What is no more than the rounding of a gap between a disk and a side that moves.
+  pure function no_gap(disk, axis, motion) result(gap)
+    type(disk_t), intent(in) :: disk
+    integer, intent(in) :: axis
+    type(side_motion_t), intent(in) :: motion
+    real(real64) :: gap                         !! [length]
+
+    gap = rounding*(abs(disk%x(axis)) + disk%radius + motion%amplitude)
+  end function no_gap
 
 end module box_sides

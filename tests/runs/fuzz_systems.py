@@ -2,11 +2,11 @@
 
     python tests/runs/fuzz_systems.py --count 200 --seed 5
 
-Each system runs plainly; then on several threads, with another search and queue, and in parts
-that are stopped by a signal and resumed, each part in another way. All must end alike: with the
-same exit code, the same message and the same bytes; and what the energy has changed by must be what
-the observables say was lost and given. A system that is refused, or is too long for the plain run,
-says nothing.
+Each system runs plainly; then on several threads, with another search and queue, in parts that are
+stopped by a signal and resumed, each part in another way, and to an earlier end, from which it is
+continued. All must end alike: with the same exit code, the same message and the same bytes; and
+what the energy has changed by must be what the observables say was lost and given. A system that is
+refused, or is too long for the plain run, says nothing.
 """
 
 import random
@@ -20,6 +20,7 @@ from collections import Counter
 from pathlib import Path
 
 import fuzzing
+import h5py
 
 sys.path[:0] = [str(fuzzing.ROOT / "tests"), str(fuzzing.ROOT / "tests" / "support")]
 
@@ -30,6 +31,7 @@ HARMLESS = {"same", "refused", "too long", "nothing to compare"}
 SECONDS_PLAIN, SECONDS = 10, 200  # of processor time; the second only something endless takes
 MOST_PARTS = 12
 BYTES = 4_000_000_000
+LATEST = 1e100  # that an input can name
 BALANCE = 1e-12  # of the energy, what was lost, and what was given
 UNREAD = "stopped; the run is finished"  # a signal may come when all is done
 #: What does not belong to the results: what says how they were computed.
@@ -85,6 +87,22 @@ class Runs:
                 break
         return code, message
 
+    def continued(self, rng: random.Random, way) -> tuple[int, str]:
+        """Lets a run end early, and continues it."""
+        with h5py.File(self.result("plain")) as file:
+            end = float(file["particles/disks/position/time"][-1])
+        if end == 0:
+            return self.whole("continued", SECONDS, *way(rng))
+        code, message = self.whole(
+            "continued",
+            SECONDS,
+            *way(rng),
+            f"--set=stop.time={min(rng.uniform(0, 0.99) * end, LATEST)!r}",
+        )
+        if code == FINISHED:
+            return self.whole("continued", SECONDS, *way(rng), "--resume")
+        return code, message
+
 
 def ended(process: subprocess.Popen) -> tuple[int, str]:
     """Exit code and last line of a process; `endless` if it has used its processor time."""
@@ -137,6 +155,8 @@ def judge(program: str, folder: Path, seed: str) -> tuple[str, str]:
         options = way(rng)
         others[name] = options, runs.whole(name, SECONDS, *options)
     others["parts"] = [], runs.in_parts(rng, seconds, way)
+    if plain[0] == FINISHED:
+        others["continued"] = [], runs.continued(rng, way)
     for name, (options, end) in others.items():
         if (end[0], end[1].replace(f"{name}.h5", "plain.h5")) != plain:
             return (
