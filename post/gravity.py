@@ -17,16 +17,17 @@ their errors come from ten blocks of time.
 from typing import NamedTuple
 
 from ricochet import Run, RunError, read_run, thermodynamics
-from ricochet.drawing import caption, colours, plt
+from ricochet.drawing import bars, caption, colours, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, estimate
+from ricochet.statistics import Estimate, binned, estimate
 
 import numpy as np
 import scipy
 
 SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
+BLOCKS = 10  # of time, for errors
 
 
 class Samples(NamedTuple):
@@ -56,9 +57,9 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
     return -float(np.polyfit(middle[good], np.log(counts[good]), 1, w=np.sqrt(counts[good]))[0])
 
 
-def slope_estimate(values: np.ndarray, limits: tuple[float, float], blocks: int = 10) -> Estimate:
+def slope_estimate(values: np.ndarray, limits: tuple[float, float]) -> Estimate:
     """Slope of all values with an error from blocks of time."""
-    parts = [log_slope(part, limits) for part in np.array_split(values, blocks)]
+    parts = [log_slope(part, limits) for part in np.array_split(values, BLOCKS)]
     return Estimate(log_slope(values, limits), estimate(parts).error)
 
 
@@ -141,11 +142,13 @@ def table(run: Run, species: list[Samples], temperature: float) -> list[dict]:
 
 
 def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: str) -> None:
-    """The same histogram, normalised, in a linear and a logarithmic panel."""
+    """The same histogram, normalised, in a linear and a logarithmic panel; errors by blocks."""
     bins = np.linspace(0, top, 51)
-    density = np.histogram(values, bins)[0] / (values.size * np.diff(bins))
+    blocks = np.array_split(values, min(BLOCKS, len(values)))
+    parts = [binned(part.ravel(), bins).mean for part in blocks]
+    height = Estimate(binned(values.ravel(), bins).mean, estimate(parts).error)
     for axes in panels:
-        axes.stairs(density, bins, color=colour, fill=True, alpha=0.3, label=label)
+        bars(axes, height, bins, color=colour, fill=True, alpha=0.3, label=label)
 
 
 def draw_laws(panels, x: np.ndarray, solid: np.ndarray, dashed: np.ndarray, colour: str) -> None:
@@ -174,10 +177,10 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     h_labels = slopes(run, result, "height", "crowded")
     for k, (s, colour) in enumerate(zip(species, colours(len(species)), strict=True)):
         v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
-        draw_histogram(panels[0], s.square.ravel(), squares[-1], colour, v_labels[k])
+        draw_histogram(panels[0], s.square, squares[-1], colour, v_labels[k])
         shared = sharing(0.5 * s.mass * squares, kt, run.count) * v_law * (1 - 0.5 / run.count)
         draw_laws(panels[0], squares, v_law * np.exp(-v_law * squares), shared, colour)
-        draw_histogram(panels[1], s.height.ravel(), grid[-1], colour, h_labels[k])
+        draw_histogram(panels[1], s.height, grid[-1], colour, h_labels[k])
         draw_laws(panels[1], grid, normalised(grid, np.exp(-h_law * grid)), crowded[k], colour)
     titles = (
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),

@@ -10,9 +10,9 @@ the share of the disk in the mass of all.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.drawing import COLOURS, bars, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, read_all, report
-from ricochet.statistics import Estimate, estimate, hold_against, series_mean
+from ricochet.statistics import Estimate, binned, estimate, hold_against, series_mean
 from ricochet.theory import maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
@@ -87,9 +87,9 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         colour = COLOURS[k % len(COLOURS)]
         for axes, chosen in zip(row, (start, frames), strict=True):
             v = pooled_speeds(runs, chosen, kind.name)
-            density = np.histogram(v, bins)[0] / (len(v) * np.diff(bins))
-            axes.stairs(
-                density,
+            bars(
+                axes,
+                binned(v, bins),
                 bins,
                 fill=True,
                 alpha=0.45,

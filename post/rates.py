@@ -17,7 +17,7 @@ else 15 collisions per disk.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, band, caption, plt
+from ricochet.drawing import COLOURS, band, bars, caption, plt
 from ricochet.script import command_line, launch, read_all, report
 from ricochet.statistics import (
     FINE,
@@ -229,10 +229,9 @@ def draw(
     if means:
         draw_pressure(panels[0, 0], runs, means, start)
     if paths:
-        mean, (height, error) = paths
+        mean, height = paths
         axes, label = panels[0, -1], f"measured, $\\ell$ = {' ± '.join(to_error(*mean))}"
-        axes.stairs(height, BINS, color=COLOURS[0], label=label)
-        axes.errorbar(MIDDLES, height, error, fmt="none", color=COLOURS[0], elinewidth=1)
+        bars(axes, height, BINS, color=COLOURS[0], label=label)
         fine = np.linspace(0, BINS[-1], 200)
         if equal_disks(runs[0]):
             axes.plot(fine, path_density(fine), color="black", lw=1.2, label="without memory")

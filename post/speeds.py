@@ -21,9 +21,9 @@ from argparse import Namespace
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.drawing import caption, colours, dilute_limit, noise_band, plt
+from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.script import command_line, grouped, late_frames, launch, read_all, report
-from ricochet.statistics import Law, estimate, excess_kurtosis, hold_against
+from ricochet.statistics import Estimate, Law, binned, estimate, excess_kurtosis, hold_against
 from ricochet.theory import RELAXATION, finite_n_cdf, maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import (
     after_start,
@@ -123,17 +123,17 @@ def table(groups: list, pools: list[Pool]) -> list[dict]:
     return rows
 
 
-def draw_histogram(axes: plt.Axes, samples: list[np.ndarray], labels: list[str]) -> None:
+def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -> None:
     """Step histograms over the Maxwell curve."""
-    for u, label, colour in zip(samples, labels, colours(len(labels)), strict=True):
-        density, _ = np.histogram(u, BINS)
-        axes.stairs(
-            density / (len(u) * np.diff(BINS)),
+    for height, label, colour in zip(heights, labels, colours(len(labels)), strict=True):
+        bars(
+            axes,
+            height,
             BINS,
             color=colour,
             label=label,
-            fill=len(samples) == 1,
-            alpha=0.45 if len(samples) == 1 else 1,
+            fill=len(heights) == 1,
+            alpha=0.45 if len(heights) == 1 else 1,
             lw=1.6,
         )
     fine = np.linspace(0, 3, 301)
@@ -174,12 +174,12 @@ def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.
     everyone = [run for _, runs in groups for run in runs]
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
-    draw_histogram(first, [reduced_speeds(largest, [0])], [f"first frame, N = {largest.count}"])
+    label = f"first frame, N = {largest.count}"
+    draw_histogram(first, [binned(reduced_speeds(largest, [0]), BINS)], [label])
     first.set_title("Start")
     time = largest.time[-1]
-    draw_histogram(
-        last, [reduced_speeds(largest, [-1])], [f"one frame, t = {time:.4g}, N = {largest.count}"]
-    )
+    label = f"one frame, t = {time:.4g}, N = {largest.count}"
+    draw_histogram(last, [binned(reduced_speeds(largest, [-1]), BINS)], [label])
     last.set_title("One frame at the end")
     labels = []
     for row in tests:
@@ -190,7 +190,7 @@ def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.
             + f"\nKS D = {row['KS_D']:.4f}, p-value {row['KS_p']:.2g}"
             + ("" if exact is None else f",\nof the law at fixed energy {exact:.2g}")
         )  # fmt: skip
-    draw_histogram(late, [pool.speeds for pool in pools], labels)
+    draw_histogram(late, [late_density(pool) for pool in pools], labels)
     late.set_title(
         "No equilibrium: each frame at its own kT" if cool else "Equilibrium, many frames"
     )
@@ -201,17 +201,16 @@ def draw(groups: list, pools: list[Pool], tests: list[dict], cool: bool) -> plt.
     return figure
 
 
-def histograms(groups: list, pools: list[Pool]) -> dict[str, np.ndarray]:
-    """Densities of the late frames, with the mean of the Maxwell density over each bin.
+def late_density(pool: Pool) -> Estimate:
+    """The histogram of the late frames."""
+    return binned(pool.speeds, BINS, pool.independent)
 
-    Errors are those of so many independent speeds as there are.
-    """
+
+def histograms(groups: list, pools: list[Pool]) -> dict[str, np.ndarray]:
+    """Densities of the late frames, with the mean of the Maxwell density over each bin."""
     columns = {"u_low": BINS[:-1], "u_high": BINS[1:]}
-    for (count, _), (u, independent, _) in zip(groups, pools, strict=True):
-        share = np.histogram(u, BINS)[0] / len(u)
-        columns[f"density_N{count}"] = share / np.diff(BINS)
-        error = np.sqrt(share * (1 - share) / independent) / np.diff(BINS)
-        columns[f"density_error_N{count}"] = error
+    for (count, _), pool in zip(groups, pools, strict=True):
+        columns[f"density_N{count}"], columns[f"density_error_N{count}"] = late_density(pool)
     return {**columns, "maxwell": np.diff(maxwell_cdf(BINS)) / np.diff(BINS)}
 
 

@@ -16,7 +16,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from .files import destination
 from .reader import Run, RunError
-from .statistics import kurtosis_noise
+from .statistics import Estimate, kurtosis_noise
 from .structure import bond_order
 
 STYLE = Path(__file__).with_name("style.mplstyle")
@@ -220,6 +220,13 @@ def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **styl
     """A line with its standard error."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
+
+
+def bars(axes: plt.Axes, height: Estimate, bins: np.ndarray, **style) -> None:
+    """A histogram with its standard errors."""
+    axes.stairs(height.mean, bins, **style)
+    middle = (bins[1:] + bins[:-1]) / 2
+    axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)
 
 
 def noise_band(axes: plt.Axes, count: int, colour: str) -> None:

@@ -215,6 +215,13 @@ def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarr
     return time[0] + (np.arange(count) + 0.5) * width, sums / np.maximum(numbers, 1)
 
 
+def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:
+    """Histogram (B,) with integral 1; errors as of so many `independent` values, or of all."""
+    share = np.histogram(values, bins)[0] / len(values)
+    error = np.sqrt(share * (1 - share) / (independent or len(values)))
+    return Estimate(share / np.diff(bins), error / np.diff(bins))
+
+
 def excess_kurtosis(speed: np.ndarray) -> float:
     """a2 = <v^4> / (2 <v^2>^2) - 1: zero for a Maxwell law, -1/2 for equal speeds."""
     square = np.square(speed)

@@ -60,6 +60,18 @@ def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng):
     assert largest == pytest.approx(0.232 / 100, rel=0.02)
 
 
+def test_errors_of_a_histogram_are_its_scatter():
+    """Of independent values, and of values of which each counts as four."""
+    rng, bins = np.random.default_rng(3), np.linspace(0, 1, 6)
+    for copies in 1, 4:
+        draws = np.repeat(rng.beta(2, 3, (4000, 100)), copies, axis=1)
+        heights = [statistics.binned(values, bins, independent=100) for values in draws]
+        assert np.sum(heights[0].mean) / 5 == pytest.approx(1)
+        scatter = np.std([height.mean for height in heights], axis=0)
+        error2 = np.mean([height.error**2 for height in heights], axis=0)
+        assert np.sqrt(error2) == pytest.approx(scatter, rel=0.05)
+
+
 def test_finite_n_law_in_a_periodic_box(rng):
     v = rng.normal(size=(40000, 4, 2))
     v -= v.mean(axis=1, keepdims=True)
