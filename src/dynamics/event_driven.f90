@@ -49,6 +49,7 @@ contains
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
+    if (.not. self%is_part) sim%box%epoch = sim%epoch    ! later `move_epoch` sees to it
     call rebuild(self, sim)
     call sim%start_sums()
     self%idle = .false.
@@ -61,7 +62,6 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
 
-    if (.not. self%is_part) sim%box%epoch = sim%epoch
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`

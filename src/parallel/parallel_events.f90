@@ -223,7 +223,7 @@ contains
       call self%parts%gather_all(sim, t)
       if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
       if (self%parts%threads > 1) call self%heed_cores(sim)
-      if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds that so are all together
+      if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
         outcome = left_alone
         self%plain_until = sim%tally%events + 1
       end if
