@@ -6,7 +6,8 @@ module run
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system, restless_disk
-  use kinds, only: int64, never, real64
+  use kicks, only: kick
+  use kinds, only: int32, int64, never, real64
   use memory, only: check_memory
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
@@ -217,7 +218,8 @@ contains
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time, time                  ! of the simulation [time]
+    real(real64) :: first_time, time, kick_time       ! of the simulation [time]
+    integer(int32), allocatable :: kicked(:)
 
     turns = 1
     requests_served = 0
@@ -228,13 +230,17 @@ contains
       limits = run%stop_rule%limits
       limits%turns = turns
       call run%output%tighten(limits)
+      kick_time = next_kick(run)
+      limits%time = min(limits%time, kick_time)
       now = seconds()
       kicks = run%sim%kicks
-      call spend_time_on(part_events)
       events = run%sim%tally%events
       time = run%sim%time()
       call run%evolution%advance(run%sim, limits, error)
-      call spend_time_on(part_samples)
+      do while (run%evolution%arrived .and. run%sim%time() >= kick_time .and. next_kick(run) <= kick_time)
+        call kick(run%sim, kicked)
+        call run%evolution%renew(run%sim, kicked)
+      end do
       associate (sim => run%sim)
         sim%settled = run%evolution%arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > time)
       end associate
@@ -289,8 +295,16 @@ contains
     logical :: yes
 
     yes = run%stop_rule%met(run%sim) .or. run%stop_rule%too_cold(run%sim) .or. &
-      (run%evolution%idle .and. .not. run%stop_rule%limits%time < never)
+      (run%evolution%idle .and. .not. min(run%stop_rule%limits%time, next_kick(run)) < never)
   end function is_over
+
+  !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
+  pure function next_kick(run) result(t)
+    type(run_t), intent(in) :: run
+    real(real64) :: t                                 !! since the start of the run; `never` without kicks
+
+    t = run%evolution%pause_at(run%sim%drive%time_of(run%sim%kicks + 1))
+  end function next_kick
 
   !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
   !> would have any number of them, and when the samples cease it would not look up for hours.

@@ -1,9 +1,6 @@
 !> From the command line's file to a run: reads and checks the input, builds the state, and turns words of the
 !> input into types. The only place that knows every search and every dynamics.
 module run_setup
-  use all_pairs, only: all_pairs_t
-  use cell_grid, only: cell_grid_t
-  use driven_evolution, only: driven_evolution_t
   use errors, only: error_t, exit_files, exit_usage
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t, log_capacity
@@ -18,7 +15,6 @@ module run_setup
   use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
   use settings, only: run_input_t, settings_t
-  use sheared_cells, only: sheared_cells_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: text_t
@@ -78,7 +74,6 @@ contains
     type(event_driven_t), allocatable :: events
     type(parallel_events_t), allocatable :: parallel
     type(time_stepped_t), allocatable :: steps
-    type(driven_evolution_t), allocatable :: driven
     logical :: cuts_space
 
     cuts_space = settings%wants_domains()
@@ -90,16 +85,9 @@ contains
       call move_alloc(steps, evolution)
     else
       allocate (events)
-      if (settings%run%search == "cells") then
-        if (settings%box%is_sheared()) then
-          allocate (sheared_cells_t :: events%search)
-        else
-          allocate (cell_grid_t :: events%search)
-        end if
-      else
-        allocate (all_pairs_t :: events%search)
-        events%search%everyone = settings%run%search == "rescan"
-      end if
+      allocate (events%search)
+      events%search%undivided = settings%run%search /= "cells"
+      events%search%everyone = settings%run%search == "rescan"
       events%windowed = settings%run%queue == "calendar"
       if (cuts_space) then
         allocate (parallel)
@@ -109,11 +97,6 @@ contains
       else
         call move_alloc(events, evolution)
       end if
-    end if
-    if (settings%drive%is_on()) then
-      allocate (driven)
-      call move_alloc(evolution, driven%free)
-      call move_alloc(driven, evolution)
     end if
     if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution

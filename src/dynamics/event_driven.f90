@@ -7,17 +7,17 @@ module event_driven
   use kinds, only: int32, int64, real64
   use box_geometry, only: wall_law
   use calendar, only: most_coming, stages
+  use cell_grid, only: cell_grid_t
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
-  use neighbour_search, only: neighbour_search_t
   use partners, only: is_wall
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
-  use time_use, only: part_epochs, part_events, spend_time_on
+  use tracks, only: tracks_t
   use wall_hits, only: collide_wall
   implicit none
   private
@@ -28,11 +28,12 @@ module event_driven
   integer(int64), parameter :: events_ahead = 8    !! after which to prefetch again
 
   type, extends(evolution_t) :: event_driven_t
-    class(neighbour_search_t), allocatable :: search
+    class(cell_grid_t), allocatable :: search      !! a class, so that its rare parts are not inlined into the hot path
     type(event_queue_t) :: queue
     logical :: windowed = .true.                   !! the queue uses its calendar, not the heap alone
     logical :: thorough = .false.                  !! a collision is more than a change of two velocities
     logical :: is_part = .false.                   !! of a simulation: only collisions of disks that belong here count
+    class(tracks_t), allocatable :: tracks         !! of its disks, in a part
     integer(int64) :: turns_left = 0               !! of those that the last advance was allowed
   contains
     procedure :: start
@@ -65,7 +66,7 @@ contains
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
-      call self%search%predict(sim, i)
+      if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! else a vacant slot
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
   end subroutine rebuild
@@ -137,10 +138,8 @@ contains
           //encounter_text(sim, event%disk, event%partner)//remedy(sim, event%disk, event%partner))
         return
       end if
-      call spend_time_on(part_epochs)
       call move_epoch(sim)
       call rebuild(self, sim)
-      call spend_time_on(part_events)
       if (limits%epochs) return
     end do
   end subroutine advance
@@ -203,6 +202,7 @@ contains
     do stage = 1, stages
       call self%queue%list_coming(sim%tag, stage, n, disks)
       call self%search%read_ahead(sim, stage, disks(:n))
+      if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
     end do
     pause_at = min(pause_at, sim%tally%events + events_ahead)
   end subroutine read_ahead
@@ -216,7 +216,7 @@ contains
     logical :: counts
 
     counts = .true.
-    if (self%is_part) counts = self%search%counts(sim%tag, i, code)
+    if (self%is_part) counts = self%tracks%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         if (self%thorough .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
@@ -226,6 +226,7 @@ contains
         end if
         call self%queue%forget(code)
         call self%search%predict_both(sim, i, code)
+        if (self%is_part) call self%tracks%note_collision(sim%disk, sim%tag, i, code)
         call self%queue%schedule(sim%disk, sim%tag, code)
         call self%queue%schedule(sim%disk, sim%tag, i)
         return
@@ -239,6 +240,7 @@ contains
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)
+      if (self%is_part) call self%tracks%note(sim%tag(i)%cell, i)
       call self%queue%schedule(sim%disk, sim%tag, i)
       return
     end if

@@ -6,17 +6,14 @@
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, most_exact, never, real64
-  use box_geometry, only: box_t, strike_velocity, wall_normal
+  use box_geometry, only: obstacle_gap, strike_velocity, wall_normal
   use box_sides, only: bounds
-  use disks, only: disk_t
   use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
-  use near_pairs, only: near_pairs_t
-  use pair_lists, only: list_pairs, pair_list_t, places_t
-  use partners, only: axis_of, n_sides, nothing, sense_of
-  use signals, only: stop_requested
+  use near_pairs, only: gap_between, near_pairs_t
+  use partners, only: axis_of, n_sides, nothing, obstacle_number, sense_of
   use simulation_state, only: simulation_t
   use texts, only: written
   implicit none
@@ -26,16 +23,12 @@ module time_stepped
   !> A disk should move less than this share of the smallest radius in one step.
   real(real64), parameter :: longest_way = 0.5_real64
   integer(int64), parameter :: steps_per_look = 1024  !! whether anything still moves
-  integer(int32), parameter :: many = 5000            !! disks: to test all pairs takes long
 
   type, extends(evolution_t) :: time_stepped_t
     real(real64) :: dt = 0.0_real64                 !! [time]
     logical :: every_pair = .false.                 !! test all pairs at every step, not only near ones
     type(near_pairs_t), private :: near
-    ! Of the current step
-    type(places_t), private :: at                   !! where they are
-    integer(int32), allocatable, private :: outside(:)  !! (disks) those beyond a side come first
-    type(pair_list_t), private :: contacts
+    real(real64), allocatable, private :: x(:, :)    !! (2,disks) where they are in this step [length]
   contains
     procedure :: warning
     procedure :: pause_at
@@ -51,11 +44,9 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    if (allocated(self%outside)) deallocate (self%at%x, self%outside)
-    allocate (self%at%x(sim%n_disks(), 2), self%outside(sim%n_disks()))
-    self%at%radius = sim%disk%radius
-    self%at%period = sim%box%periods()
-    call self%near%start()
+    if (allocated(self%x)) deallocate (self%x)
+    allocate (self%x(2, sim%n_disks()))
+    call self%near%forget()
     call sim%start_sums()
     self%idle = .false.
   end subroutine start
@@ -87,9 +78,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
-    type(simulation_t) :: before
     integer(int64) :: k, turn
-    integer :: logged
 
     self%arrived = .false.
     k = steps_taken(sim%now, self%dt)
@@ -101,29 +90,12 @@ contains
         self%arrived = .true.
         return
       end if
-      if (slow(self, sim)) before = sim
-      logged = self%log%n
       k = k + 1
       sim%now = k*self%dt
       call take_step(self, sim, error)
       if (allocated(error)) return
-      if (.not. slow(self, sim)) cycle
-      if (stop_requested()) then                    ! the step is not complete
-        sim = before
-        self%log%n = logged
-        return
-      end if
     end do
   end subroutine advance
-
-  !> Whether a step takes so long that a request to stop cannot wait for its end.
-  pure function slow(self, sim) result(yes)
-    class(time_stepped_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    logical :: yes
-
-    yes = self%every_pair .and. sim%n_disks() > many
-  end function slow
 
   !> The largest k with k*dt <= now: it follows from the state alone.
   pure function steps_taken(now, dt) result(k)
@@ -155,91 +127,39 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(inout) :: error
-    integer(int32) :: n_outside, i
-    integer :: k
+    real(real64) :: low(2), high(2), inset(2), period(2)
+    integer(int32) :: i, k
 
-    call fly(sim%disk, sim%box, sim%now, self%at, self%outside, n_outside)
-    do k = 1, n_outside
-      i = self%outside(k)
-      if (any(self%at%centre(i) /= self%at%centre(i))) then
+    call bounds(sim%box, sim%now, low, high)
+    period = sim%box%periods()
+    inset = merge(0.0_real64, 1.0_real64, sim%box%periodic)
+    do i = 1, sim%n_disks()
+      associate (d => sim%disk(i), x => self%x(1, i), y => self%x(2, i))
+        x = flight(d%x(1), d%v(1), sim%box%gravity(1), sim%now - d%clock)
+        y = flight(d%x(2), d%v(2), sim%box%gravity(2), sim%now - d%clock)
+        if (x >= low(1) + inset(1)*d%radius .and. x <= high(1) - inset(1)*d%radius .and. &
+          y >= low(2) + inset(2)*d%radius .and. y <= high(2) - inset(2)*d%radius) cycle
+      end associate
+      if (any(self%x(:, i) /= self%x(:, i))) then
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
       call meet_sides(self, sim, i)
     end do
-    if (self%every_pair) then
-      call list_pairs(self%contacts, sim%box, self%at, 0.0_real64, interruptible=slow(self, sim))
-    else
-      call self%near%find_contacts(sim, self%at, self%dt, self%contacts)
-    end if
-    do k = 1, self%contacts%n
-      associate (i => self%contacts%i(k), partner => self%contacts%partner(k))
+    call self%near%update(sim, self%x, self%dt, self%every_pair)
+    do k = 1, self%near%n
+      i = self%near%i(k)
+      associate (partner => self%near%partner(k))
         if (partner > 0) then
-          call meet_disk(self, sim, i, partner)
+          if (gap_between(self%x(:, i), self%x(:, partner), sim%disk(i)%radius + sim%disk(partner)%radius, period)) &
+            call meet_disk(self, sim, i, partner)
         else
-          call meet_wall(self, sim, i, partner)
+          if (obstacle_gap(sim%box, obstacle_number(partner), self%x(:, i), sim%disk(i)%radius) < 0) &
+            call meet_wall(self, sim, i, partner)
         end if
       end associate
     end do
   end subroutine take_step
-
-  !> Where the disks are at t, and which of them are beyond a side (or nowhere: NaN). That is seldom, and tested in
-  !> vector registers.
-  pure subroutine fly(disk, box, t, at, outside, n)
-    type(disk_t), intent(in) :: disk(:)
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: t                   !! since the epoch [time]
-    type(places_t), intent(inout) :: at
-    integer(int32), intent(out) :: outside(*)       !! (disks) the first n count, ascending
-    integer(int32), intent(out) :: n
-    real(real64) :: g(2), s, side(2, 2)
-    integer(int32) :: i, k, hit
-
-    g = box%gravity
-    do i = 1, size(disk, kind=int32)
-      s = t - disk(i)%clock
-      at%x(i, 1) = flight(disk(i)%x(1), disk(i)%v(1), g(1), s)
-      at%x(i, 2) = flight(disk(i)%x(2), disk(i)%v(2), g(2), s)
-    end do
-    call bounds(box, t, side(:, 1), side(:, 2))
-    call mark_outside(size(disk), at%x, at%radius, side, box%periodic, outside, n)
-    if (n == 0) return
-    n = 0
-    do k = 1, size(disk, kind=int32)
-      hit = outside(k)
-      outside(n + 1) = k
-      n = n + hit
-    end do
-  end subroutine fly
-
-  !> Marks with 1 the disks that are not between the sides.
-  pure subroutine mark_outside(n, x, radius, side, periodic, hit, n_hits)
-    integer, intent(in) :: n
-    real(real64), intent(in) :: x(n, 2), radius(n)        !! [length]
-    real(real64), intent(in) :: side(2, 2)                !! where they are: by axis, lower and upper [length]
-    logical, intent(in) :: periodic(2)
-    integer(int32), intent(out) :: hit(n)
-    integer(int32), intent(out) :: n_hits           !! how many
-    real(real64) :: inset(2)
-    integer :: i
-
-    inset = merge(0.0_real64, 1.0_real64, periodic)
-    n_hits = 0
-    !GCC$ VECTOR
-    do i = 1, n
-      hit(i) = 1 - iand(between(x(i, 1), side(1, 1) + inset(1)*radius(i), side(1, 2) - inset(1)*radius(i)), &
-        between(x(i, 2), side(2, 1) + inset(2)*radius(i), side(2, 2) - inset(2)*radius(i)))
-      n_hits = n_hits + hit(i)
-    end do
-  end subroutine mark_outside
-
-  !> 1 if x is between two limits, else (or if it is NaN) 0.
-  elemental function between(x, low, high) result(inside)
-    real(real64), intent(in) :: x, low, high
-    integer(int32) :: inside
-
-    inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
-  end function between
 
   !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
   subroutine meet_sides(self, sim, i)
@@ -255,16 +175,16 @@ contains
       axis = axis_of(side)
       inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
       if (sense_of(side) < 0) then
-        beyond = (low(axis) + inset) - self%at%x(i, axis)
+        beyond = (low(axis) + inset) - self%x(axis, i)
       else
-        beyond = self%at%x(i, axis) - (high(axis) - inset)
+        beyond = self%x(axis, i) - (high(axis) - inset)
       end if
       if (.not. beyond > 0) cycle
       if (passes(sim, side)) then
-        before = self%at%centre(i)
+        before = self%x(:, i)
         call pass_side(sim, i, side, sim%now)
-        self%at%x(i, :) = sim%position(i)
-        call self%near%shift(i, self%at%centre(i) - before)
+        self%x(:, i) = sim%position(i)
+        call self%near%shift(i, self%x(:, i) - before)
       else
         call meet_wall(self, sim, i, side)
       end if
@@ -279,7 +199,7 @@ contains
     integer(int32), intent(in) :: i, code
     real(real64) :: normal(2)
 
-    normal = wall_normal(sim%box, code, self%at%centre(i), sim%velocity(i))
+    normal = wall_normal(sim%box, code, self%x(:, i), sim%velocity(i))
     if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
       call collide(sim, i, code, sim%now, .true., self%log)
   end subroutine meet_wall
@@ -293,7 +213,7 @@ contains
     real(real64) :: dx(2)
 
     images = sim%box%images()
-    dx = self%at%centre(j) - self%at%centre(i)
+    dx = self%x(:, j) - self%x(:, i)
     dx = dx + images%shift(images%nearest_image(dx))
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., self%log)
   end subroutine meet_disk

@@ -3,9 +3,9 @@
 !> in docs/theory.md.
 module domain_borders
   use kinds, only: int16, int32
-  use domain_grid, only: domain_grid_t, forever, track_t
-  use domains, only: copy_of, domain_t, list_copies, news_t
+  use domains, only: copy_of, domain_t, forever, list_copies, news_t
   use partners, only: nothing
+  use tracks, only: track_t
   implicit none
   private
   public :: refresh, verify
@@ -20,29 +20,26 @@ contains
     integer(int32) :: m, found
 
     found = 0
-    select type (grid => domain(k)%engine%search)
-    type is (domain_grid_t)
-      domain(k)%n_news = 0
-      domain(k)%good = domain(k)%done .and. .not. grid%too_far
-      do m = 1, size(domain(k)%neighbour)
-        if (domain(k)%good) call compare(domain(k), grid, domain(domain(k)%neighbour(m)), found)
+    associate (self => domain(k))
+      self%n_news = 0
+      self%good = self%done .and. .not. self%engine%tracks%too_far
+      do m = 1, size(self%neighbour)
+        if (self%good) call compare(self, domain(self%neighbour(m)), found)
       end do
-      if (found < grid%n_copies()) domain(k)%good = .false.    ! a copy that nobody owns
-    end select
+      if (found < self%engine%tracks%n_copies()) self%good = .false.    ! a copy that nobody owns
+    end associate
   end subroutine verify
 
   !> Compares with the histories of a neighbour's own disks.
-  subroutine compare(self, grid, other, found)
+  subroutine compare(self, other, found)
     type(domain_t), intent(inout) :: self
-    type(domain_grid_t), intent(in) :: grid
     type(domain_t), intent(in) :: other
     integer(int32), intent(inout) :: found         !! copies whose owners have been found
     integer(int32) :: r, s, t, cell(2), shift(2)
     logical :: met, near, same
 
     shift = other%patch%first - self%patch%first
-    select type (theirs => other%engine%search)
-    type is (domain_grid_t)
+    associate (mine => self%engine%tracks, theirs => other%engine%tracks)
       do r = 1, theirs%n_tracks
         if (.not. theirs%track(r)%own) cycle
         t = theirs%track(r)%slot
@@ -50,29 +47,28 @@ contains
         cell = modulo(other%sim%tag(t)%cell + shift - 1, self%patch%whole) + 1
         if (s > 0) then
           found = found + 1
-          associate (track => grid%track(grid%track_of(s)))
+          associate (track => mine%track(mine%track_of(s)))
             same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t) &
               .and. self%patch%holds(self%sim%tag(s)%cell)   ! one that left the patch was missing, wherever it is now
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
-            near = came_near(self, grid, theirs%track(r), shift, met)
-            if (.not. met) met = grid%could_have_met(int(track%low, int32), int(track%high, int32))
+            near = came_near(self, theirs%track(r), shift, met)
+            if (.not. met) met = mine%could_have_met(int(track%low, int32), int(track%high, int32))
           end associate
         else
           same = .false.
-          near = came_near(self, grid, theirs%track(r), shift, met)
+          near = came_near(self, theirs%track(r), shift, met)
           if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
         end if
         if (met .and. .not. same) self%good = .false.
         if (.not. self%good) return
         call note_news(self, other, t, cell, s)
       end do
-    end select
+    end associate
   end subroutine compare
 
   !> Whether a disk that a neighbour owns came into the patch, in any image; `met`: to where it could have met an own disk.
-  function came_near(self, grid, track, shift, met) result(near)
+  function came_near(self, track, shift, met) result(near)
     type(domain_t), intent(in) :: self
-    type(domain_grid_t), intent(in) :: grid
     type(track_t), intent(in) :: track
     integer(int32), intent(in) :: shift(2)         !! from the neighbour's columns and rows to the own ones
     logical, intent(out) :: met
@@ -88,7 +84,7 @@ contains
         high = track%high + shift + [ix, iy]*self%patch%whole
         if (any(low > self%patch%n .or. high < 1)) cycle
         near = .true.
-        met = met .or. grid%could_have_met(low, high)
+        met = met .or. self%engine%tracks%could_have_met(low, high)
       end do
     end do
   end function came_near
@@ -139,36 +135,34 @@ contains
 
     allocate (waiting(self%n_news))
     n_waiting = 0
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      call grid%begin_window()
-      do k = grid%n_tracks, 1, -1
-        slot = grid%track(k)%slot
-        call grid%begin_track(self%sim%tag(slot)%cell, slot)
+    associate (tracks => self%engine%tracks)
+      call tracks%begin_window()
+      do k = tracks%n_tracks, 1, -1
+        slot = tracks%track(k)%slot
+        call tracks%begin_track(self%sim%tag(slot)%cell, slot)
       end do
-      do k = 1, self%n_news
-        call take_over(self, grid, self%news(k), n_waiting, waiting)
-      end do
-      do k = 1, n_waiting
-        call grid%predict(self%sim, waiting(k))
-        call self%engine%queue%schedule(self%sim%disk, self%sim%tag, waiting(k))
-      end do
-      call list_copies(self, grid)
-    end select
+    end associate
+    do k = 1, self%n_news
+      call take_over(self, self%news(k), n_waiting, waiting)
+    end do
+    do k = 1, n_waiting
+      call self%engine%search%predict(self%sim, waiting(k))
+      call self%engine%queue%schedule(self%sim%disk, self%sim%tag, waiting(k))
+    end do
+    call list_copies(self)
     self%n_news = 0
   end subroutine refresh
 
   !> Takes over one piece of news.
-  subroutine take_over(self, grid, news, n_waiting, waiting)
+  subroutine take_over(self, news, n_waiting, waiting)
     type(domain_t), intent(inout) :: self
-    type(domain_grid_t), intent(inout) :: grid
     type(news_t), intent(in) :: news
     integer(int32), intent(inout) :: n_waiting, waiting(:)   !! (n_waiting) slots whose events are to be predicted
     integer(int32) :: s, window
 
     s = news%slot
     if (any(news%cell > self%patch%n)) then
-      if (s > 0) call leave(self, grid, s)
+      if (s > 0) call leave(self, s)
       return
     end if
     if (s == 0) then
@@ -177,7 +171,7 @@ contains
       if (s == 0) return
       self%vacant = self%home(s)
     else if (self%patch%holds(self%sim%tag(s)%cell)) then
-      call grid%take_out(self%sim%tag(s), s)
+      call self%engine%search%take_out(self%sim%tag(s), s)
     end if
     window = self%sim%tag(s)%window
     self%sim%tag(s) = news%tag
@@ -189,20 +183,19 @@ contains
     end associate
     self%home(s) = news%home
     self%sim%extra(:, s) = news%extra(:size(self%sim%extra, 1))
-    call grid%insert(self%sim%tag(s), s, int(news%cell, int16))
-    call grid%begin_track(self%sim%tag(s)%cell, s)
+    call self%engine%search%insert(self%sim%tag(s), s, int(news%cell, int16))
+    call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
     n_waiting = n_waiting + 1
     waiting(n_waiting) = s
   end subroutine take_over
 
   !> The copy in slot s leaves the patch.
-  subroutine leave(self, grid, s)
+  subroutine leave(self, s)
     type(domain_t), intent(inout) :: self
-    type(domain_grid_t), intent(inout) :: grid
     integer(int32), intent(in) :: s
 
-    if (self%patch%holds(self%sim%tag(s)%cell)) call grid%take_out(self%sim%tag(s), s)
-    call grid%drop_track(s)
+    if (self%patch%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
+    call self%engine%tracks%drop_track(s)
     self%sim%disk(s)%event_time = forever
     self%sim%disk(s)%partner = nothing
     self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1

@@ -5,7 +5,6 @@ module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
   use disks, only: disk_t, n_columns, n_fixed, tag_t
-  use domain_grid, only: domain_grid_t, forever
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use event_heap, only: event_of, ids_of
@@ -17,9 +16,10 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: copy_of, domain_t, due_t, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
+  public :: copy_of, domain_t, due_t, forever, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
   public :: next_due, news_t
 
+  real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
   integer, parameter :: log_capacity = 1024
   real(real64), parameter :: longest_window = 5.0_real64   !! of one domain, after which it is given up [s]
   integer(int64), parameter :: turns_to_look = 100000      !! between two looks at signals and clock
@@ -95,10 +95,7 @@ contains
     call self%log%clear()
     self%sim%tally = sim%tally
     call self%sim%tally%clear()
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      call start(self, grid, n)
-    end select
+    call start(self, n)
   end subroutine load
 
   !> Makes slots for n disks and some more.
@@ -112,7 +109,7 @@ contains
       self%sim%given_t = sim%given_t
       self%sim%epoch_end = forever
       self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
-      allocate (domain_grid_t :: self%engine%search)
+      allocate (self%engine%search, self%engine%tracks)
       self%engine%is_part = .true.
     end if
     slots = n + n/spare + spare_at_least
@@ -125,47 +122,46 @@ contains
   end subroutine make_room
 
   !> Builds cells and queue for the first n slots.
-  subroutine start(self, grid, n)
+  subroutine start(self, n)
     type(domain_t), intent(inout) :: self
-    type(domain_grid_t), intent(inout) :: grid
     integer(int32), intent(in) :: n
     logical :: cut_low(2), cut_high(2)
     integer(int32) :: k
 
-    grid%is_part = .true.
-    grid%patch = self%patch
-    associate (patch => self%patch)
-      grid%own_low = modulo(self%low - patch%first, patch%whole) + 1
-      grid%own_high = grid%own_low + self%high - self%low
-      cut_low = grid%own_low > 1
-      cut_high = grid%own_high < patch%n
-      grid%deep_low = grid%own_low + merge(self%halo, 0, cut_low)
-      grid%deep_high = grid%own_high - merge(self%halo, 0, cut_high)
-      grid%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
-      grid%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
+    self%engine%search%is_part = .true.
+    self%engine%search%patch = self%patch
+    associate (patch => self%patch, tracks => self%engine%tracks)
+      tracks%patch = self%patch
+      tracks%own_low = modulo(self%low - patch%first, patch%whole) + 1
+      tracks%own_high = tracks%own_low + self%high - self%low
+      cut_low = tracks%own_low > 1
+      cut_high = tracks%own_high < patch%n
+      tracks%deep_low = tracks%own_low + merge(self%halo, 0, cut_low)
+      tracks%deep_high = tracks%own_high - merge(self%halo, 0, cut_high)
+      tracks%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
+      tracks%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
         .or. patch%first + patch%n - 1 < patch%whole))
-      if (allocated(grid%reached)) deallocate (grid%reached)
-      allocate (grid%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+      if (allocated(tracks%reached)) deallocate (tracks%reached)
+      allocate (tracks%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+      if (allocated(tracks%track_of)) deallocate (tracks%track_of)
+      allocate (tracks%track_of(self%sim%n_disks()), source=0)
+      if (.not. allocated(tracks%track)) allocate (tracks%track(1024))
+      call self%engine%start(self%sim)
+      call tracks%begin_window()
+      tracks%n_tracks = 0
+      do k = 1, n
+        call tracks%begin_track(self%sim%tag(k)%cell, k)
+      end do
     end associate
-    if (allocated(grid%track_of)) deallocate (grid%track_of)
-    allocate (grid%track_of(self%sim%n_disks()), source=0)
-    if (.not. allocated(grid%track)) allocate (grid%track(1024))
-    call self%engine%start(self%sim)
-    call grid%begin_window()
-    grid%n_tracks = 0
-    do k = 1, n
-      call grid%begin_track(self%sim%tag(k)%cell, k)
-    end do
-    call list_copies(self, grid)
+    call list_copies(self)
   end subroutine start
 
   !> Lists the copies by their ids.
-  subroutine list_copies(self, grid)
+  subroutine list_copies(self)
     type(domain_t), intent(inout) :: self
-    type(domain_grid_t), intent(in) :: grid
     integer(int32) :: k, place, copies
 
-    copies = grid%n_copies()
+    copies = self%engine%tracks%n_copies()
     if (.not. allocated(self%key) .or. 3*copies > 2*self%last_key) then
       self%last_key = 255
       do while (self%last_key < 2*copies)
@@ -175,8 +171,8 @@ contains
       allocate (self%key(0:self%last_key), self%slot(0:self%last_key))
     end if
     self%key = 0
-    do k = 1, grid%n_tracks
-      associate (track => grid%track(k))
+    do k = 1, self%engine%tracks%n_tracks
+      associate (track => self%engine%tracks%track(k))
         if (track%own) cycle
         place = place_of(self, self%sim%tag(track%slot)%id)
         self%key(place) = self%sim%tag(track%slot)%id
@@ -310,15 +306,12 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: k
 
-    select type (grid => self%engine%search)
-    type is (domain_grid_t)
-      do k = 1, self%sim%n_disks()
-        if (self%sim%tag(k)%id == 0 .or. .not. grid%is_own(k)) cycle
-        sim%disk(self%home(k)) = self%sim%disk(k)
-        sim%tag(self%home(k)) = self%sim%tag(k)
-        sim%extra(:, self%home(k)) = self%sim%extra(:, k)
-      end do
-    end select
+    do k = 1, self%sim%n_disks()
+      if (self%sim%tag(k)%id == 0 .or. .not. self%engine%tracks%is_own(k)) cycle
+      sim%disk(self%home(k)) = self%sim%disk(k)
+      sim%tag(self%home(k)) = self%sim%tag(k)
+      sim%extra(:, self%home(k)) = self%sim%extra(:, k)
+    end do
   end subroutine gather
 
   !> Merges the logs of all domains in the order of time. Of simultaneous collisions in different domains nobody knows

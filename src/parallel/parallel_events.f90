@@ -13,7 +13,6 @@ module parallel_events
   use evolution, only: evolution_t, limits_t
   use partition, only: partition_t
   use simulation_state, only: simulation_t
-  use time_use, only: part_epochs, part_events, part_merging, spend_time_on
   implicit none
   private
   public :: parallel_events_t
@@ -137,7 +136,6 @@ contains
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    call spend_time_on(part_epochs)
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain)) &
       deallocate (self%parts%domain)               ! to leave room for sorting many
     call move_epoch(sim)
@@ -155,7 +153,6 @@ contains
     integer(int64) :: events
     real(real64) :: time
 
-    call spend_time_on(part_events)
     if (allocated(self%parts%domain)) deallocate (self%parts%domain)
     if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
     if (self%holder /= plain_engine) call self%engine%start(sim)
@@ -211,7 +208,6 @@ contains
     t = sim%now
     call self%parts%run_windows(sim, goal, self%patience, t, windows, good)
     self%windows_done = self%windows_done + windows
-    call spend_time_on(part_merging)
     if (good .and. self%log%is_on()) call merge_logs(self%parts%domain, merged, good)
     call self%conclude(sim, good, outcome)
     if (good .and. (goal%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then

@@ -5,7 +5,6 @@ module partition
   use kinds, only: int16, int32, int64, real64
   use cell_faces, only: patch_t
   use cell_grid, only: whole_box
-  use disk_tiles, only: disk_tiles_t
   use domain_borders, only: refresh, verify
   use domain_cuts, only: domain_cuts_t
   use domains, only: domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
@@ -16,8 +15,6 @@ module partition
   use system, only: seconds
   use tally, only: tally_t
   use team, only: barrier_t, close_barrier, is_last_at, join, many, open_barrier, release
-  use time_use, only: part_cuts, part_domains, part_filling, part_gathering, part_verifying, part_waiting, &
-    spend_time_on
   implicit none
   private
   public :: partition_t
@@ -78,13 +75,10 @@ contains
     logical, intent(in) :: log                     !! collisions are to be listed
     logical, intent(out) :: cut
     integer(int16), allocatable :: cell(:, :)
-    integer(int32), allocatable :: disks(:)
-    type(disk_tiles_t) :: tiles
     integer(int32) :: i, k
     logical :: shared
 
-    call spend_time_on(part_cuts)
-    if (self%whole%small <= 0) self%whole = whole_box(sim)
+    if (self%whole%small <= 0) self%whole = whole_box(sim, .false.)
     cut = .false.
     if (self%whole%small < maxval(sim%disk%radius)) return
     allocate (cell(2, sim%n_disks()))
@@ -103,9 +97,7 @@ contains
     end if
     if (.not. allocated(self%domain)) allocate (self%domain(self%cuts%n))
     if (.not. self%pace%events > 0) self%pace%events = 10*sim%n_disks()/(sim%epoch_end - sim%epoch_begin)
-    call spend_time_on(part_filling)
-    call tiles%sort(self%whole%n, cell)
-    !$omp parallel do schedule(static, 1) num_threads(self%threads) private(disks)
+    !$omp parallel do schedule(static, 1) num_threads(self%threads)
     do k = 1, self%cuts%n
       associate (domain => self%domain(k))
         domain%patch = self%cuts%patch_of(k, sim%box%periodic)
@@ -114,8 +106,7 @@ contains
         domain%high = self%cuts%high(:, k)
         domain%neighbour = self%cuts%neighbours_of(k, domain%patch)
         call keep_log(domain, log)
-        call tiles%list(domain%patch, cell, disks)
-        call load(domain, sim, disks)
+        call load(domain, sim, pack([(i, i=1, sim%n_disks())], domain%patch%covers(cell)))
       end associate
     end do
     !$omp end parallel do
@@ -195,27 +186,23 @@ contains
     call join(barrier)
     !$omp barrier
     do while (plan%goes_on)
-      call turn_to(part_domains)
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
         if (plan%begins) call refresh(self%domain(k))
         if (plan%moves) call move_on(self%domain(k), plan%t, plan%turns)
       end do
       !$omp end do nowait
-      call turn_to(part_waiting)
       if (is_last_at(barrier)) then
         call self%follow_window(sim, goal, plan)
         call release(barrier)
       end if
       !$omp flush
       if (plan%moves) cycle
-      call turn_to(part_verifying)
       !$omp do schedule(static, 1)
       do k = 1, self%cuts%n
         call verify(self%domain, k)
       end do
       !$omp end do nowait
-      call turn_to(part_waiting)
       if (is_last_at(barrier)) then
         call self%end_window(sim, goal, plan)
         call release(barrier)
@@ -230,16 +217,6 @@ contains
     t = plan%t
     windows = plan%windows
     good = plan%good
-  contains
-
-    !> The main thread tells what it does now.
-    subroutine turn_to(part)
-      integer, intent(in) :: part
-
-      !$omp master
-      call spend_time_on(part)
-      !$omp end master
-    end subroutine turn_to
   end subroutine run_windows
 
   !> Plans the window that begins now.
@@ -373,7 +350,6 @@ contains
     integer(int32) :: k
     logical :: shared
 
-    call spend_time_on(part_gathering)
     shared = sim%n_disks() >= many
     !$omp parallel do schedule(static, 1) num_threads(self%threads) if (shared)
     do k = 1, self%cuts%n

@@ -33,6 +33,8 @@ module cell_faces
     procedure :: place_of
     procedure :: holds
     procedure :: at_seam
+    procedure :: covers
+    procedure :: step
   end type patch_t
 
   !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
@@ -117,6 +119,16 @@ contains
     yes = all(cell >= 1 .and. cell <= self%n)
   end function holds
 
+  !> Which cells of the whole grid are in the patch.
+  pure function covers(self, cell) result(yes)
+    class(patch_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(:, :)       !! (2,n)
+    logical :: yes(size(cell, 2))
+
+    yes = modulo(cell(1, :) - self%first(1), self%whole(1)) < self%n(1) &
+      .and. modulo(cell(2, :) - self%first(2), self%whole(2)) < self%n(2)
+  end function covers
+
   !> Whether some of the cells around a cell are images beyond a periodic side.
   pure function at_seam(self, cell) result(yes)
     class(patch_t), intent(in) :: self
@@ -125,6 +137,24 @@ contains
 
     yes = any(cell == self%last .or. cell == self%next)
   end function at_seam
+
+  !> The column or row that lies some ahead of another, and how many periods it is away.
+  pure subroutine step(self, axis, cell, ahead, there, periods)
+    class(patch_t), intent(in) :: self
+    integer, intent(in) :: axis
+    integer(int32), intent(in) :: cell, ahead
+    integer(int32), intent(out) :: there, periods
+
+    there = cell + ahead
+    periods = 0
+    associate (last => self%last(axis), n => self%n(axis))
+      if (last == 0) return
+      periods = merge(1, 0, there > last) - merge(1, 0, cell > last)
+      if (last < n) return                         ! the side lies within the patch
+      periods = floor(real(there - 1, real64)/n, int32)
+      there = there - periods*n
+    end associate
+  end subroutine step
 
   !> Finds the faces of the cells of a patch.
   subroutine set(self, box, patch)

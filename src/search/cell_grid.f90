@@ -8,11 +8,11 @@ module cell_grid
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
-  use cell_scans, only: scan_around_edge, scan_cell, scan_chains_around, scan_one
+  use cell_scans, only: scan_around_seam, scan_cell, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use images, only: images_t
-  use neighbour_search, only: earliest_contact, latest_clock, neighbour_search_t, no_gravity, prospect_t
+  use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
   use obstacle_lists, only: obstacle_lists_t
   use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
   use shapes, only: spare
@@ -25,10 +25,12 @@ module cell_grid
   real(real64), parameter :: disks_per_cell = 0.6_real64    !! wanted when dilute
   real(real64), parameter :: spacious = 1.2_real64          !! width of cells, in diameters, from which choosing pays
 
-  type, extends(neighbour_search_t) :: cell_grid_t
+  type :: cell_grid_t
     private
     type(patch_t), public :: patch                 !! the cells; chosen here unless they are only a part of the box
     logical, public :: is_part = .false.
+    logical, public :: undivided = .false.         !! a single cell: all disks are candidates
+    logical, public :: everyone = .false.          !! predict all disks again after each event, not just those involved
     type(cell_faces_t), public :: faces                    !! of the cells, and the sides among them
     logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
@@ -43,7 +45,6 @@ module cell_grid
     procedure :: insert
     procedure :: take_out
     procedure :: predict_with_care                 ! bound, so that it is not inlined into the hot path
-    procedure :: change_cell
     procedure, private :: follow_big
   end type cell_grid_t
 
@@ -56,7 +57,7 @@ contains
     integer(int32) :: i
     integer(int16) :: cell(2), ix, iy
 
-    if (.not. self%is_part) self%patch = whole_box(sim)
+    if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
     associate (patch => self%patch)
       call self%faces%set(sim%box, patch)
       self%roomy = any(self%faces%width > spacious*patch%reach)
@@ -82,14 +83,16 @@ contains
   end subroutine build
 
   !> The cells that suit all disks of a simulation.
-  pure function whole_box(sim) result(patch)
+  pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
+    logical, intent(in) :: undivided
     type(patch_t) :: patch
     real(real64) :: small, reach, width
 
-    small = merge(maxval(sim%disk%radius), largest_small_radius(sim%disk), sim%box%is_sheared())
+    small = merge(maxval(sim%disk%radius), largest_small_radius(sim%disk), undivided .or. sim%box%is_sheared())
     reach = 2*small*(1 + spare)
     width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
+    if (undivided) width = never
     patch = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
     patch%small = small
   end function whole_box
@@ -152,7 +155,7 @@ contains
 
     if (sim%disk(i)%radius > self%big%small) then
       call self%follow_big(sim, self%big%number_of(i))
-    else
+    else if (code /= looks_again) then
       call change_cell(self, sim, i, code)
     end if
     call self%predict(sim, i)
@@ -172,8 +175,10 @@ contains
     axis = axis_of(side)
     cell = sim%tag(i)%cell
     cell(axis) = cell(axis) + int(sense_of(side), int16)
-    if (is_wall(code) .and. self%patch%last(axis) > 0) &
+    if (is_wall(code) .and. self%patch%last(axis) > 0) then
+      if (axis == 2 .and. sim%box%is_sheared()) cell = int(self%patch%cell_at(sim%position(i)), int16)   ! was displaced
       cell(axis) = int(merge(self%patch%next(axis), self%patch%last(axis), sense_of(side) > 0), int16)
+    end if
     inside = .true.
     if (self%is_part) inside = self%patch%holds(cell)
     if (self%roomy .and. inside) call self%faces%choose_cell(sim%disk(i), sim%now, cell)
@@ -338,6 +343,8 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
+    type(images_t) :: images
+    real(real64) :: t
     integer(int32) :: e
 
     near%disk = i
@@ -346,7 +353,11 @@ contains
       near%cell = self%cells%number(cell)
       call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
       if (self%patch%at_seam(cell)) then
-        call scan_around_edge(self%cells, self%patch, sim, near)
+        images = sim%images()
+        t = images%look_again(sim%now, self%patch%width(1))
+        if (t < near%time) near%partner = looks_again
+        near%time = min(t, near%time)
+        call scan_around_seam(self%cells, self%patch, sim, near)
       else
         call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
         call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))

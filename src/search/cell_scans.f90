@@ -9,7 +9,7 @@ module cell_scans
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: scan_around_edge, scan_cell, scan_chains_around, scan_one
+  public :: scan_around_seam, scan_cell, scan_chains_around, scan_one
 
 contains
 
@@ -76,50 +76,66 @@ contains
     end do
   end subroutine scan_chains_around
 
-  !> Contacts where some of the nine cells are images beyond a periodic side; cells of the same image are scanned
-  !> together. In a box of fewer than three columns a cell stands for several of its images.
-  pure subroutine scan_around_edge(cells, patch, sim, near)
+  !> Contacts where some of the nine cells are images beyond a periodic side, cells of one image together. If the images
+  !> above and below slide, they are more columns, all that come near until they have slid by one: disks two columns apart
+  !> never touch.
+  subroutine scan_around_seam(cells, patch, sim, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
     type(simulation_t), intent(in) :: sim
     type(prospect_t), intent(inout) :: near
     type(images_t) :: images
-    type(image_t) :: image
-    integer(int32) :: there(2, -1:1), number(2, -1:1), k, number_x, number_y, dx, dy, c
+    real(real64) :: displacement, periods(-1:1)
+    integer(int32) :: own(2), dy, dx, low(-1:1), row(-1:1), above(-1:1), width, column, beside, c, seen(2)
     integer(int64) :: n
-    logical :: crowded
+    integer :: pass
 
-    there(:, 0) = sim%tag(near%disk)%cell
-    there(:, 1) = merge(patch%next, there(:, 0) + 1, there(:, 0) == patch%last)
-    there(:, -1) = merge(patch%last, there(:, 0) - 1, there(:, 0) == patch%next)
-    do k = -1, 1
-      number(:, k) = k*merge(1, 0, there(:, 0) == merge(patch%last, patch%next, k > 0))
-    end do
     images = sim%images()
-    do number_y = minval(number(2, :)), maxval(number(2, :))
-      do number_x = minval(number(1, :)), maxval(number(1, :))
-        image = images%image(real([number_x, number_y], real64))
-        n = 0
-        crowded = .false.
-        do dy = -1, 1
-          do dx = -1, 1
-            if (number(1, dx) /= number_x .or. number(2, dy) /= number_y) cycle
-            c = there(1, dx) + cells%stride*there(2, dy)
-            call append(cells%cell(c), near%list, n)
-            crowded = crowded .or. cells%chain(c) > 0
-          end do
-        end do
-        near%n = int(n, int32)
-        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
-        if (.not. crowded) cycle
-        do dy = -1, 1
-          do dx = -1, 1
-            if (number(1, dx) /= number_x .or. number(2, dy) /= number_y) cycle
-            call scan_chain(cells, sim, there(1, dx) + cells%stride*there(2, dy), near, image)
-          end do
+    own = sim%tag(near%disk)%cell
+    low = -1
+    periods = 0
+    do dy = -1, 1
+      call patch%step(2, own(2), dy, row(dy), above(dy))
+      if (above(dy) == 0 .or. .not. abs(images%slip) > 0) cycle
+      displacement = images%displacement(real(above(dy), real64), sim%now)
+      periods(above(dy)) = anint(displacement/images%period(1))
+      low(dy) = -nint((displacement - periods(above(dy))*images%period(1))/patch%width(1)) &
+        - merge(3, 2, above(dy)*images%slip > 0)
+    end do
+    n = 0
+    seen = 0
+    do pass = 1, 2                                 ! the box itself first
+      do dy = -1, 1
+        width = merge(5, 2, above(dy) /= 0 .and. abs(images%slip) > 0)
+        do dx = low(dy), low(dy) + width
+          call patch%step(1, own(1), dx, column, beside)
+          if ((beside == 0 .and. above(dy) == 0) .neqv. pass == 1) cycle
+          if (beside /= seen(1) .or. above(dy) /= seen(2)) call scan_listed()
+          seen = [beside, above(dy)]
+          c = column + cells%stride*row(dy)
+          call append(cells%cell(c), near%list, n)
+          if (cells%chain(c) == 0) cycle
+          call scan_listed()
+          call scan_chain(cells, sim, c, near, image())
         end do
       end do
     end do
-  end subroutine scan_around_edge
+    call scan_listed()
+
+  contains
+
+    !> That of the cells listed.
+    type(image_t) function image()
+      image = images%image([seen(1) - periods(seen(2)), real(seen(2), real64)])
+    end function image
+
+    !> Contacts with the disks listed so far.
+    subroutine scan_listed()
+      if (n == 0) return
+      near%n = int(n, int32)
+      n = 0
+      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image())
+    end subroutine scan_listed
+  end subroutine scan_around_seam
 
 end module cell_scans

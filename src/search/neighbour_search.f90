@@ -4,10 +4,9 @@ module neighbour_search
   use kinds, only: int32, never, real64
   use disks, only: disk_t, tag_t
   use free_flight, only: flight, flight_velocity
-  use simulation_state, only: simulation_t
   implicit none
   private
-  public :: neighbour_search_t, prospect_t, earliest_contact, list_capacity, latest_clock, no_gravity
+  public :: prospect_t, earliest_contact, list_capacity, latest_clock, no_gravity
 
   integer(int32), parameter :: list_capacity = 64
   !> What a caller knows beforehand, as a sum, so that the compiler makes a version of the kernel without the rest:
@@ -26,77 +25,7 @@ module neighbour_search
     integer(int32) :: list(list_capacity)     !! (n) candidates, counted from 0
   end type prospect_t
 
-  type, abstract :: neighbour_search_t
-    logical :: everyone = .false.    !! predict all disks again after each event, not just those involved
-  contains
-    procedure(build_search), deferred :: build
-    procedure(predict_event), deferred :: predict
-    procedure(cross_cells), deferred :: cross
-    procedure :: predict_both
-    procedure :: counts
-    procedure :: read_ahead
-  end type neighbour_search_t
-
-  abstract interface
-    !> Sorts the disks into the search's own structures.
-    subroutine build_search(self, sim)
-      import :: neighbour_search_t, simulation_t
-      class(neighbour_search_t), intent(inout) :: self
-      type(simulation_t), intent(inout) :: sim
-    end subroutine build_search
-
-    !> Writes into disk i the earliest event it can have: a disk, a side, an obstacle, or the end of its cell. A
-    !> contact later than the partner's own next event may be omitted, because the partner predicts again then.
-    !> Invariant: once all disks are predicted, every contact that precedes all other events of its pair is held by
-    !> at least one of the two.
-    subroutine predict_event(self, sim, i)
-      import :: int32, neighbour_search_t, simulation_t
-      class(neighbour_search_t), intent(inout) :: self
-      type(simulation_t), intent(inout) :: sim
-      integer(int32), intent(in) :: i
-    end subroutine predict_event
-
-    !> Moves disk i across the cell face or periodic side that its event names, and predicts.
-    subroutine cross_cells(self, sim, i, code)
-      import :: int32, neighbour_search_t, simulation_t
-      class(neighbour_search_t), intent(inout) :: self
-      type(simulation_t), intent(inout) :: sim
-      integer(int32), intent(in) :: i
-      integer(int32), intent(in) :: code      !! of the crossing or the side
-    end subroutine cross_cells
-  end interface
-
 contains
-
-  !> Predicts the disks i and j, which have just collided.
-  subroutine predict_both(self, sim, i, j)
-    class(neighbour_search_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-
-    call self%predict(sim, i)
-    call self%predict(sim, j)
-  end subroutine predict_both
-
-  !> Whether a collision of disk i counts in the part of a simulation that the search knows.
-  pure function counts(self, tag, i, code) result(yes)
-    class(neighbour_search_t), intent(in) :: self
-    type(tag_t), intent(in) :: tag(:)
-    integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code        !! whom or what it meets
-    logical :: yes
-
-    yes = .true.
-  end function counts
-
-  !> Prefetches what the next predictions of some disks will read. Each stage follows the addresses that the
-  !> stage before has brought into the cache.
-  subroutine read_ahead(self, sim, stage, disks)
-    class(neighbour_search_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: stage       !! from 1
-    integer(int32), intent(in) :: disks(:)
-  end subroutine read_ahead
 
   !> The earliest contact of a disk with the candidates, if it precedes the event known so far.
   !>

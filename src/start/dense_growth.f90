@@ -5,7 +5,6 @@
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
-  use cell_grid, only: cell_grid_t
   use disks, only: disks_before, species_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
@@ -52,7 +51,7 @@ contains
     if (size(x, 2) > 0) call begin_at(x, full, stream, sim, error)
     if (allocated(error)) return
     allocate (evolution)
-    allocate (cell_grid_t :: evolution%search)
+    allocate (evolution%search)
     lack_before = 1
     jump = 0
     do

@@ -1,19 +1,15 @@
-!> The search of one domain: the cells of a part of the box, with the domain's own disks and copies of those around. It
-!> notes where they went and what they met, so that one can tell afterwards whether the copies did what the disks that
-!> they stand for did elsewhere; and it knows which collisions are this domain's to count.
-module domain_grid
+!> What the disks of one domain did in the present window of time: where they went and what they met, so that one can tell
+!> afterwards whether the copies did what the disks that they stand for did elsewhere; and which collisions are the domain's
+!> to count.
+module tracks
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int16, int32, int64, real64
-  use cell_grid, only: cell_grid_t
+  use cell_faces, only: patch_t
   use memory_hints, only: prefetch
-  use disks, only: tag_t
-  use partners, only: nothing
-  use simulation_state, only: simulation_t
+  use disks, only: disk_t, tag_t
   implicit none
   private
-  public :: domain_grid_t, forever, track_t
-
-  real(real64), parameter :: forever = 2.0e150_real64    !! later than any event
+  public :: track_t, tracks_t
 
   !> What a disk did in the present window of time. An own disk that nobody else can have a copy of has no track.
   type :: track_t
@@ -24,7 +20,8 @@ module domain_grid
     integer(int16) :: high(2) = 0_int16            !! last
   end type track_t
 
-  type, extends(cell_grid_t) :: domain_grid_t
+  type :: tracks_t
+    type(patch_t) :: patch                         !! the cells of the domain and around
     integer(int32) :: n_tracks = 0
     type(track_t), allocatable :: track(:)         !! (n_tracks, and room for more)
     integer(int32), allocatable :: track_of(:)     !! (slots) number of its track; 0: none
@@ -34,9 +31,8 @@ module domain_grid
     integer(int8), allocatable :: reached(:, :)    !! (0:,0:) 1: an own disk came near this cell from its domain
     logical :: too_far = .false.                   !! an own disk came to the end of the patch
   contains
-    procedure :: predict
-    procedure :: predict_both
-    procedure :: cross
+    procedure :: note_collision
+    procedure :: note
     procedure :: read_ahead
     procedure :: begin_window
     procedure :: begin_track
@@ -47,14 +43,13 @@ module domain_grid
     procedure :: is_own
     procedure :: n_copies
     procedure, private :: add_track
-    procedure, private :: note
-  end type domain_grid_t
+  end type tracks_t
 
 contains
 
   !> A new window begins: no own disk has left the domain yet.
   subroutine begin_window(self)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
 
     self%reached = 0_int8
     self%too_far = .false.
@@ -62,7 +57,7 @@ contains
 
   !> A new track of disk i begins where it is, if it needs one there. Whose disk it is follows from that as well.
   subroutine begin_track(self, cell, i)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
@@ -76,7 +71,7 @@ contains
 
   !> Gives disk i a track that is still to begin.
   subroutine add_track(self, i)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     type(track_t), allocatable :: more(:)
 
@@ -91,7 +86,7 @@ contains
 
   !> Drops the track of disk i, if any; the last one takes its number.
   subroutine drop_track(self, i)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
     integer(int32), intent(in) :: i
     integer(int32) :: k
 
@@ -107,7 +102,7 @@ contains
 
   !> Whether a collision of disk i counts in this domain: of two disks that with the lower id must be an own one.
   pure function counts(self, tag, i, code) result(yes)
-    class(domain_grid_t), intent(in) :: self
+    class(tracks_t), intent(in) :: self
     type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code             !! whom or what it meets
@@ -120,33 +115,18 @@ contains
     end if
   end function counts
 
-  !> Predicts disk i; a vacant slot has no event.
-  subroutine predict(self, sim, i)
-    class(domain_grid_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-
-    if (sim%tag(i)%id == 0) then
-      sim%disk(i)%event_time = forever
-      sim%disk(i)%partner = nothing
-    else
-      call self%cell_grid_t%predict(sim, i)
-    end if
-  end subroutine predict
-
-  !> Predicts the disks i and j, which have just collided, and notes that for whoever has copies of them.
-  subroutine predict_both(self, sim, i, j)
-    class(domain_grid_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
+  !> Notes that the disks i and j have collided, for whoever has copies of them, and where they are.
+  subroutine note_collision(self, disk, tag, i, j)
+    class(tracks_t), intent(inout) :: self
+    type(disk_t), intent(in) :: disk(:)
+    type(tag_t), intent(in) :: tag(:)
     integer(int32), intent(in) :: i, j
 
-    if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, sim%disk(i)%clock)
-    if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, sim%disk(j)%clock)
-    call self%cell_grid_t%predict_both(sim, i, j)
-    if (.not. self%roomy) return
-    call self%note(sim%tag(i)%cell, i)                  ! in cells that they have chosen again
-    call self%note(sim%tag(j)%cell, j)
-  end subroutine predict_both
+    if (self%track_of(i) > 0) call add_moment(self%track(self%track_of(i))%digest, disk(i)%clock)
+    if (self%track_of(j) > 0) call add_moment(self%track(self%track_of(j))%digest, disk(j)%clock)
+    call self%note(tag(i)%cell, i)                 ! they may have chosen other cells
+    call self%note(tag(j)%cell, j)
+  end subroutine note_collision
 
   !> Adds a collision to a digest.
   elemental subroutine add_moment(digest, time)
@@ -156,36 +136,22 @@ contains
     digest = ieor(ishftc(digest, 11), transfer(time, digest))
   end subroutine add_moment
 
-  !> Moves disk i into the next cell, and notes that.
-  subroutine cross(self, sim, i, code)
-    class(domain_grid_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    integer(int32), intent(in) :: code
-
-    call self%cell_grid_t%cross(sim, i, code)
-    call self%note(sim%tag(i)%cell, i)
-  end subroutine cross
-
-  !> Prefetches what predictions of some disks will read, and the numbers of the tracks of them and of their partners.
-  subroutine read_ahead(self, sim, stage, disks)
-    class(domain_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: stage
+  !> Prefetches the numbers of the tracks of some disks and of their partners.
+  subroutine read_ahead(self, disk, disks)
+    class(tracks_t), intent(in) :: self
+    type(disk_t), intent(in) :: disk(:)
     integer(int32), intent(in) :: disks(:)
     integer(int32) :: k
 
-    call self%cell_grid_t%read_ahead(sim, stage, disks)
-    if (stage /= 2) return
     do k = 1, size(disks)
       call prefetch(self%track_of(disks(k)))
-      call prefetch(self%track_of(max(sim%disk(disks(k))%partner, 1)))
+      call prefetch(self%track_of(max(disk(disks(k))%partner, 1)))
     end do
   end subroutine read_ahead
 
   !> Notes where disk i is.
   subroutine note(self, cell, i)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32), intent(in) :: i
 
@@ -203,7 +169,7 @@ contains
 
   !> Notes that an own disk has left the domain: it may meet whoever is in the nine cells around.
   subroutine reach(self, cell)
-    class(domain_grid_t), intent(inout) :: self
+    class(tracks_t), intent(inout) :: self
     integer(int16), intent(in) :: cell(2)
     integer(int32) :: there(2), dx, dy
 
@@ -231,7 +197,7 @@ contains
 
   !> Whether a cell belongs to the domain.
   pure function owns(self, cell) result(yes)
-    class(domain_grid_t), intent(in) :: self
+    class(tracks_t), intent(in) :: self
     integer(int16), intent(in) :: cell(2)
     logical :: yes
 
@@ -240,7 +206,7 @@ contains
 
   !> Whether disk i is an own one.
   pure function is_own(self, i) result(yes)
-    class(domain_grid_t), intent(in) :: self
+    class(tracks_t), intent(in) :: self
     integer(int32), intent(in) :: i
     logical :: yes
 
@@ -250,7 +216,7 @@ contains
 
   !> How many copies there are.
   pure function n_copies(self) result(n)
-    class(domain_grid_t), intent(in) :: self
+    class(tracks_t), intent(in) :: self
     integer(int32) :: n
 
     n = count(.not. self%track(:self%n_tracks)%own, kind=int32)
@@ -258,7 +224,7 @@ contains
 
   !> Whether a disk that was in these columns and rows, and nowhere else, could have met an own one.
   pure function could_have_met(self, low, high) result(yes)
-    class(domain_grid_t), intent(in) :: self
+    class(tracks_t), intent(in) :: self
     integer(int32), intent(in) :: low(2), high(2)
     logical :: yes
     integer(int32) :: from(2), to(2)
@@ -270,4 +236,4 @@ contains
     yes = any(self%reached(from(1):to(1), from(2):to(2)) > 0)
   end function could_have_met
 
-end module domain_grid
+end module tracks
