@@ -1,11 +1,11 @@
 !> One run, from the input file to the finished output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use checkpoint, only: read_checkpoint, write_checkpoint
+  use checkpoint, only: read_checkpoint
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
-  use initial_state, only: describe_system, restless_disk
+  use initial_state, only: describe_system
   use kicks, only: kick
   use kinds, only: int32, int64, never, real64
   use memory, only: check_memory
@@ -14,18 +14,15 @@ module run
   use partners, only: n_sides
   use progress, only: progress_t
   use progress_line, only: progress_line_t
-  use run_files, only: current_checkpoint, is_file, run_file
-  use run_description, only: recall_overrides
   use run_setup, only: choose_evolution, new_simulation, read_input
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
-  use stop_rules, only: stop_rule_t, stop_settings_t
+  use stop_rules, only: stop_rule_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, legible, size_text, written
   use threads, only: start_threads
-  use time_use, only: begin_time_use, part_end, part_events, part_samples, spend_time_on, time_use_report
   implicit none
   private
   public :: perform_run
@@ -57,12 +54,10 @@ contains
     character(len=:), allocatable :: warning
 
     run%started = seconds()
-    call begin_time_use(run%started)
     run%command = command
     call watch_signals()
     call run%line%open(command%quiet)
     call end_at_signals("stopped before the run began; nothing is lost: repeat the command", exit_stopped)
-    if (command%resume) call recall_overrides(command%output, run%command%overrides)
     call read_input(command%input, run%command%overrides, run%input, error)
     if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
@@ -80,23 +75,13 @@ contains
     if (.not. allocated(error)) call run%output%finish(run%sim, cost(run), note(run), error)
     if (allocated(error)) then
       if (error%code == exit_broken) call run%output%break_off(run%sim, cost(run), error%message)
-      call rescue(run, error)
+      if (error%code == exit_files) error%message = error%message//"; --resume goes on from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
       call print_text(summary(run), error)
     end if
     call run%output%release()
-    call tell_times(run%input%settings%run%threads)
   end subroutine perform_run
-
-  !> Tells where the wall clock went, if it was measured.
-  subroutine tell_times(threads)
-    integer, intent(in) :: threads
-    character(len=:), allocatable :: report
-
-    report = time_use_report(threads)
-    if (report /= "") write (error_unit, "(a)") report
-  end subroutine tell_times
 
   !> Creates the state of a new run and opens its output; with --check says only that all is well.
   subroutine begin(run, error)
@@ -139,8 +124,7 @@ contains
       rule = stop_rule_t(run%input%settings%stop, sim)
       if (finished .and. rule%met(sim)) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
-          //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a stop rule that " &
-          //"is not met yet, such as"//later_rules(run%input%settings%stop, sim))
+          //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a later stop rule")
       else if (finished .and. rule%too_cold(sim)) then
         call fail(error, exit_files, command%output//": is a finished run that has "//coldness//": it cannot be continued")
       else if (command%check) then
@@ -151,41 +135,12 @@ contains
     end associate
   end subroutine go_on
 
-  !> Options with which the rules that have ended a run are met later: at twice of all.
-  pure function later_rules(rules, sim) result(options)
-    type(stop_settings_t), intent(in) :: rules
-    type(simulation_t), intent(in) :: sim
-    character(len=:), allocatable :: options
-
-    options = proposal(stop_settings_t(time=rules%time), "time", written(merge(2*sim%time(), 1.0_real64, sim%time() > 0))) &
-      //proposal(stop_settings_t(collisions=rules%collisions), "collisions", written(max(2*sim%tally%collisions, 1_int64))) &
-      //proposal(stop_settings_t(collisions_per_disk=rules%collisions_per_disk), "collisions_per_disk", &
-      written(max(4*sim%tally%collisions/real(sim%n_disks(), real64), 1.0_real64))) &
-      //proposal(stop_settings_t(events=rules%events), "events", written(max(2*sim%tally%events, 1_int64))) &
-      //proposal(stop_settings_t(energy_fraction=rules%energy_fraction), "energy_fraction", written(rules%energy_fraction/2))
-
-  contains
-
-    !> The option that sets a variable to another value, if its rule alone has ended the run.
-    pure function proposal(alone, name, later) result(option)
-      type(stop_settings_t), intent(in) :: alone
-      character(len=*), intent(in) :: name, later
-      character(len=:), allocatable :: option
-      type(stop_rule_t) :: rule
-
-      option = ""
-      rule = stop_rule_t(alone, sim)
-      if (rule%met(sim)) option = " --set stop."//name//"="//later
-    end function proposal
-  end function later_rules
-
   !> Warns of what is legal but rarely meant.
   subroutine warn(run)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
 
     text = run%evolution%warning(run%sim)
-    if (text == "" .and. run%input%settings%run%dynamics == "events") text = restless_disk(run%sim)
     if (text /= "") write (error_unit, "(a)") "warning: "//text
     if (run%input%settings%stop%energy_fraction > 0 .and. .not. run%sim%start_energy > 0) write (error_unit, "(a)") &
       "warning: nothing moves at the start: stop.energy_fraction is met at once"
@@ -200,11 +155,9 @@ contains
 
     collisions = run%sim%tally%collisions
     call cpu_time(cpu(1))
-    call spend_time_on(part_events)
     call run%evolution%start(run%sim)
     call main_loop(run, error)
     call cpu_time(cpu(2))
-    call spend_time_on(part_end)
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
     deallocate (run%evolution)                             ! the end of the output needs room
   end subroutine follow
@@ -257,8 +210,7 @@ contains
       requests = checkpoint_requests()
       if (stopping .or. requests > requests_served .or. now > next_checkpoint) then
         requests_served = requests
-        if (stopping) call run%output%reserve%give_up()
-        call write_checkpoint(run%sim, run%output, error)
+        call run%output%save(run%sim, error)
         if (stop_requested()) stopping = .true.            ! while it was written
         if (stopping .and. .not. allocated(error)) call fail(error, exit_stopped, "stopped at time "// &
           written(run%sim%time())//", after writing a checkpoint: repeat the command with --resume to go on")
@@ -269,24 +221,6 @@ contains
     end do
     call run%line%clear()
   end subroutine main_loop
-
-  !> Writes a checkpoint of a run that cannot write its output any more, and adds to the error how to go on.
-  subroutine rescue(run, error)
-    type(run_t), intent(inout) :: run
-    type(error_t), allocatable, intent(inout) :: error
-    type(error_t), allocatable :: problem
-
-    if (error%code /= exit_files) return
-    call run%output%reserve%give_up()
-    call write_checkpoint(run%sim, run%output, problem)
-    if (.not. allocated(problem)) then
-      error%message = error%message//"; a checkpoint has been written: --resume goes on from here"
-    else if (is_file(run_file(run%output%path, current_checkpoint))) then
-      error%message = error%message//"; --resume goes on from the last checkpoint"
-    else
-      error%message = error%message//"; there is no checkpoint: --force starts over"
-    end if
-  end subroutine rescue
 
   !> Whether the run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever
   !> happen any more and no rule names a time to wait for.

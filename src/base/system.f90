@@ -9,10 +9,10 @@ module system
   implicit none
   private
   public :: seconds, talks_to_terminal, end_program, host_name
-  public :: move_file, link_file, remove_file, make_folders_of, synchronize
-  public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t, reserve_t
-  public :: file_size, read_bytes, write_start
-  public :: fill_standard_streams, print_text, cores_of_process, startable_threads
+  public :: move_file, remove_file, make_folders_of, synchronize
+  public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
+  public :: file_size, read_bytes
+  public :: fill_standard_streams, print_text, cores_of_process
 
   !> What a path can name.
   character(len=20), parameter :: kinds_of_files(*) = [character(len=20) :: "nothing", "a file", "a folder", &
@@ -29,14 +29,6 @@ module system
     procedure :: acquire
     procedure :: release
   end type lock_t
-
-  !> Room on the disk that nobody else can take. The kernel frees it when the process ends, however it ends.
-  type :: reserve_t
-    integer(c_int), private :: descriptor = -1
-  contains
-    procedure :: take
-    procedure :: give_up
-  end type reserve_t
 
   abstract interface
     !> A call on a file, or on a text to be written; 0 for success.
@@ -85,13 +77,6 @@ module system
       integer(c_int) :: n
     end function cores_of_process
 
-    function startable_threads(wanted, bytes) result(n) bind(C, name="system_startable_threads")
-      import :: c_int, c_int64_t
-      integer(c_int), value :: wanted
-      integer(c_int64_t), value :: bytes
-      integer(c_int) :: n
-    end function startable_threads
-
     subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
       import :: c_char, c_size_t
       character(kind=c_char), intent(out) :: text(*)
@@ -112,13 +97,6 @@ module system
       integer(c_int64_t) :: n
     end function c_read_bytes
 
-    function c_write_start(path, bytes, count) bind(C, name="system_write_start") result(status)
-      import :: c_char, c_int, c_int64_t
-      character(kind=c_char), intent(in) :: path(*), bytes(*)
-      integer(c_int64_t), value :: count
-      integer(c_int) :: status
-    end function c_write_start
-
     subroutine c_opening_problem(path, writable, text, size) bind(C, name="system_opening_problem")
       import :: c_bool, c_char, c_size_t
       character(kind=c_char), intent(in) :: path(*)
@@ -132,18 +110,6 @@ module system
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: descriptor
     end subroutine c_unlock
-
-    function c_reserve(path, bytes) bind(C, name="system_reserve") result(descriptor)
-      import :: c_char, c_int, c_int64_t
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int64_t), value :: bytes
-      integer(c_int) :: descriptor
-    end function c_reserve
-
-    subroutine c_release(descriptor) bind(C, name="system_release")
-      import :: c_int
-      integer(c_int), value :: descriptor
-    end subroutine c_release
 
     subroutine c_exit(code) bind(C, name="exit")
       import :: c_int
@@ -161,7 +127,6 @@ module system
   procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! on the disk of a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
-  procedure(naming_call), bind(C, name="link") :: c_link
 
 contains
 
@@ -201,15 +166,6 @@ contains
     moved = c_rename(from//c_null_char, to//c_null_char) == 0
     if (moved) call synchronize(folder_of(to), done)
   end subroutine move_file
-
-  !> Gives a file a second name and takes that name from any other file. Some file systems cannot.
-  subroutine link_file(from, to)
-    character(len=*), intent(in) :: from, to
-    integer(c_int) :: status
-
-    call remove_file(to)
-    status = c_link(from//c_null_char, to//c_null_char)
-  end subroutine link_file
 
   !> Removes a file if it exists.
   subroutine remove_file(path)
@@ -279,14 +235,6 @@ contains
     n = c_read_bytes(path//c_null_char, first - 1, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> Writes over the first bytes of a regular file that has no other name.
-  subroutine write_start(path, bytes, done)
-    character(len=*), intent(in) :: path, bytes
-    logical, intent(out) :: done
-
-    done = c_write_start(path//c_null_char, bytes, len(bytes, int64)) == 0
-  end subroutine write_start
-
   !> Whether a path leads to a folder.
   function is_folder(path) result(yes)
     character(len=*), intent(in) :: path
@@ -351,25 +299,5 @@ contains
     call c_unlock(self%path//c_null_char, self%descriptor)
     self%descriptor = -1
   end subroutine release
-
-  !> Takes room on the disk of a file. Where the file system cannot keep room the run goes on without it.
-  subroutine take(self, path, bytes, taken)
-    class(reserve_t), intent(inout) :: self
-    character(len=*), intent(in) :: path               !! of a file that does not exist, and will not
-    integer(int64), intent(in) :: bytes
-    logical, intent(out) :: taken                      !! false: there is not so much room
-
-    self%descriptor = c_reserve(path//c_null_char, bytes)
-    taken = self%descriptor /= -1
-  end subroutine take
-
-  !> Gives up the room, if any was taken.
-  subroutine give_up(self)
-    class(reserve_t), intent(inout) :: self
-
-    if (self%descriptor < 0) return
-    call c_release(self%descriptor)
-    self%descriptor = -1
-  end subroutine give_up
 
 end module system

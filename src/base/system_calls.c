@@ -1,11 +1,9 @@
 /* System calls whose constants, structures or errno are defined only in C headers: POSIX, flock, and the mask of cores.
    The interfaces of these functions are in system.f90. Those that can fail return -1 and leave the reason in errno. */
 #define _GNU_SOURCE
-#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <pthread.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -15,7 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -104,62 +101,6 @@ int system_cores(void)
     if (sched_getaffinity(0, sizeof mine, &mine) == 0) return CPU_COUNT(&mine);
 #endif
     return (int)sysconf(_SC_NPROCESSORS_ONLN);
-}
-
-/* The stack that OpenMP gives to a thread, in kB unless a letter says otherwise; 0: that of the system. */
-static size_t openmp_stack(void)
-{
-    const char *names[] = {"OMP_STACKSIZE", "GOMP_STACKSIZE"}, *units = "bkmg";
-    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
-        unsigned long size;
-        char unit = 'k', rest;
-        const char *value = getenv(names[k]);
-        const int n = value ? sscanf(value, " %lu %c %c", &size, &unit, &rest) : 0;
-        const char *place = strchr(units, tolower((unsigned char)unit));
-        if ((n == 1 || n == 2) && place) return size << 10*(place - units);
-    }
-    return 0;
-}
-
-static pthread_mutex_t gate = PTHREAD_MUTEX_INITIALIZER;
-
-static void *pass_gate(void *nothing)
-{
-    pthread_mutex_lock(&gate);
-    pthread_mutex_unlock(&gate);
-    return nothing;
-}
-
-/* Links of the folder that has one for each thread; 0 where there is none. */
-static nlink_t thread_links(void)
-{
-    struct stat folder;
-    return stat("/proc/self/task", &folder) == 0 ? folder.st_nlink : 0;
-}
-
-/* How many of the threads that are wanted, this one among them, there can be at once, beside some bytes of memory. OpenMP ends
-   the program if it cannot make a thread: so threads like its own are tried first. When this returns they are gone for
-   the system, too, which lets a thread be joined before it no longer counts. */
-int system_startable_threads(int wanted, int64_t bytes)
-{
-    const nlink_t links = thread_links();
-    const struct timespec moment = {.tv_nsec = 1000000};
-    pthread_t *thread = calloc((size_t)wanted, sizeof *thread);
-    void *memory = mmap(NULL, (size_t)bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    pthread_attr_t attributes;
-    int n = 1;
-    if (thread && memory != MAP_FAILED && pthread_attr_init(&attributes) == 0) {
-        if (openmp_stack() > 0) pthread_attr_setstacksize(&attributes, openmp_stack());
-        pthread_mutex_lock(&gate);
-        while (n < wanted && pthread_create(&thread[n], &attributes, pass_gate, NULL) == 0) n++;
-        pthread_mutex_unlock(&gate);
-        for (int k = 1; k < n; k++) pthread_join(thread[k], NULL);
-        pthread_attr_destroy(&attributes);
-    }
-    if (memory != MAP_FAILED) munmap(memory, (size_t)bytes);
-    free(thread);
-    for (int k = 0; k < 1000 && thread_links() > links; k++) nanosleep(&moment, NULL);
-    return n;
 }
 
 /* --- Standard streams and messages --- */
@@ -272,16 +213,6 @@ int64_t system_read_bytes(const char *path, int64_t position, char *bytes, int64
     return closed(descriptor, 0) + (more < 0 ? -1 : total);
 }
 
-/* Writes over the first bytes of a file. */
-int system_write_start(const char *path, const char *bytes, int64_t count)
-{
-    const char *problem;
-    const int descriptor = open_regular(path, O_WRONLY, &problem);
-    if (descriptor < 0) return -1;
-    if (write(descriptor, bytes, (size_t)count) != count) return closed(descriptor, -1);
-    return close(descriptor);
-}
-
 int system_find_folder(const char *path)
 {
     struct stat found;
@@ -326,21 +257,6 @@ int64_t system_free_bytes(const char *folder)
     if (statvfs(folder, &disk) != 0 || disk.f_blocks == 0) return INT64_MAX;
     return (int64_t)disk.f_frsize*(int64_t)disk.f_bavail;
 }
-
-/* Takes room on a disk, with a file that has lost its name: however the process ends, the room is free again.
-   Returns a descriptor, -1 if there is not so much room, or -2 where room cannot be kept. */
-int system_reserve(const char *path, int64_t bytes)
-{
-    const int no_room = -1, cannot = -2;
-    const int descriptor = open_file(path, O_RDWR | O_CREAT | O_EXCL);
-    if (descriptor < 0) return cannot;
-    unlink(path);
-    errno = posix_fallocate(descriptor, 0, bytes);
-    if (errno == 0) return descriptor;
-    return closed(descriptor, errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? no_room : cannot);
-}
-
-void system_release(int descriptor) { close(descriptor); }
 
 /* Whether a path is the name of an open file. */
 static bool is_name_of(const char *path, const struct stat *file)

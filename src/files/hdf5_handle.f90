@@ -7,7 +7,7 @@ module hdf5_handle
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
     h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
-    h5pset_sieve_buf_size_f, h5pset_userblock_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
+    h5pset_sieve_buf_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
     h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5dget_space_f, h5dget_storage_size_f, &
     h5dget_type_f, h5sclose_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tget_size_f
@@ -120,11 +120,10 @@ contains
   end subroutine prepare
 
   !> Creates a file; it must not exist.
-  subroutine create(self, path, final_path, reserved)
+  subroutine create(self, path, final_path)
     class(hdf5_handle_t), intent(out) :: self
     character(len=*), intent(in) :: path
     character(len=*), intent(in), optional :: final_path    !! default: path
-    integer, intent(in), optional :: reserved     !! bytes left to the caller at its beginning: 512 or more
     integer(hid_t) :: access, creation
     integer :: status, closed
 
@@ -133,7 +132,6 @@ contains
     if (present(final_path)) self%final_path = final_path
     call prepare(self, access, status)
     if (status >= 0) call h5pcreate_f(h5p_file_create_f, creation, status)
-    if (status >= 0 .and. present(reserved)) call h5pset_userblock_f(creation, int(reserved, hsize_t), status)
     if (status >= 0) call h5fcreate_f(path, h5f_acc_excl_f, self%id, status, creation, access)
     call self%check(status, "be created: "//last_problem())
     call h5pclose_f(creation, closed)

@@ -3,7 +3,7 @@
 !> A name is a path, `group/dataset`, or with @ an attribute, `group@name`.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
-  use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, &
+  use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, h5ocopy_f, &
     h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
     h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
     h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_chunked_f, h5d_virtual_f, &
@@ -25,6 +25,7 @@ module hdf5_objects
   type, extends(hdf5_handle_t) :: hdf5_file_t
   contains
     procedure :: make_group
+    procedure :: copy_group
     procedure :: make_dataset
     procedure :: open_dataset
     procedure :: link
@@ -53,6 +54,18 @@ contains
     call self%check(status, "make group "//name)
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
+
+  !> Copies a group with all that is in it from another file.
+  subroutine copy_group(self, name, source)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    class(hdf5_file_t), intent(in) :: source
+    integer :: status
+
+    if (allocated(self%failure)) return
+    call h5ocopy_f(source%id, name, self%id, name, status)
+    call self%check(status, "copy "//name)
+  end subroutine copy_group
 
   !> Makes a dataset and leaves it open.
   subroutine make_dataset(self, name, type, extents, dataset)

@@ -11,20 +11,13 @@ module sample_track
   use texts, only: written
   implicit none
   private
-  public :: samples_t, track_t
+  public :: track_t
 
   integer(int64), parameter :: batch_bytes = 262144     !! samples that are written together
   integer(int64), parameter :: most_in_batch = 512      !! samples
   integer(int64), parameter :: first_bytes = 67108864   !! room made for an unknown number of samples
   integer(int64), parameter :: fewest = 16              !! samples there is room for, however large
   integer(int64), parameter :: growth = 4               !! room is multiplied by this when it is used up
-
-  !> Samples that could not be written: they wait in a checkpoint for the run to go on.
-  type :: samples_t
-    real(real64), allocatable :: values(:, :)           !! (width,count)
-  contains
-    procedure :: count => count_samples
-  end type samples_t
 
   type :: track_t
     type(series_t), allocatable :: series(:)            !! step and time first, if they share them; none: not in use
@@ -46,8 +39,6 @@ module sample_track
     procedure :: write_buffer
     procedure :: verify
     procedure :: room
-    procedure :: most_unwritten
-    procedure :: unwritten
     procedure, private :: batch
     procedure, private :: keep
     procedure, private :: write_samples
@@ -55,15 +46,6 @@ module sample_track
   end type track_t
 
 contains
-
-  !> Number of samples.
-  pure function count_samples(self) result(n)
-    class(samples_t), intent(in) :: self
-    integer(int64) :: n
-
-    n = 0
-    if (allocated(self%values)) n = size(self%values, 2, int64)
-  end function count_samples
 
   !> Bytes of one sample in the file.
   elemental function room(self) result(bytes)
@@ -85,29 +67,6 @@ contains
 
     n = max(1_int64, min(most_in_batch, batch_bytes/self%room()))
   end function batch
-
-  !> Bytes of the samples that may be waiting to be written when a write fails.
-  pure function most_unwritten(self, most, together) result(bytes)
-    class(track_t), intent(in) :: self
-    integer(int64), intent(in) :: most                  !! samples of the run; 0: their number is unknown
-    integer, intent(in) :: together                     !! samples that are appended at once, at most
-    integer(int64) :: bytes, count
-
-    bytes = 0
-    if (.not. allocated(self%series)) return
-    count = self%batch() - 1 + together
-    if (most > 0) count = min(count, most)
-    bytes = count*sum(int(self%series%width(), int64))*(storage_size(self%buffer)/8)
-  end function most_unwritten
-
-  !> The samples up to number `last` that are not in the file.
-  pure function unwritten(self, last) result(samples)
-    class(track_t), intent(in) :: self
-    integer(int64), intent(in) :: last                  !! <= appended
-    type(samples_t) :: samples
-
-    if (last > self%committed) samples%values = self%buffer(:, :last - self%committed)
-  end function unwritten
 
   !> The capacity that `count` more samples need, with room for later ones if it has to grow.
   pure function enlarged(self, count) result(n)
@@ -162,23 +121,15 @@ contains
     end do
   end subroutine link_step_and_time
 
-  !> Opens the track of a file and goes back to those of its first `taken` samples that are in the file, which stays as
-  !> it is.
-  subroutine resume(self, file, taken, unwritten)
+  !> Opens the track of a file and goes back to its first `count` samples; the file stays as it is.
+  subroutine resume(self, file, count)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: taken
-    type(samples_t), intent(in) :: unwritten
-    integer(int64) :: committed(1), count
+    integer(int64), intent(in) :: count
+    integer(int64) :: committed(1)
     integer :: k
 
     if (.not. allocated(self%series)) return
-    count = taken - unwritten%count()
-    if (count < 0) call file%check(-1, "go on: the checkpoint has more samples than were taken")
-    if (unwritten%count() > 0) then
-      if (size(unwritten%values, 1) /= sum(self%series%width())) &
-        call file%check(-1, "go on: the samples in the checkpoint are not of its kind")
-    end if
     committed = 0
     call file%fetch(self%counter, 1, committed)
     if (committed(1) < count) call file%check(-1, "go on: "//self%counter//" is " &
@@ -275,17 +226,10 @@ contains
     class(track_t), intent(inout) :: self
     integer(int64), intent(in) :: waiting               !! samples in the buffer
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
-    real(real64), allocatable :: longer(:, :)
-    integer(int64) :: needed
 
-    needed = waiting + size(samples, 2)
-    if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), max(needed, self%batch())))
-    if (needed > size(self%buffer, 2)) then             ! only when nothing can be written any more
-      allocate (longer(size(samples, 1), needed))
-      longer(:, :waiting) = self%buffer(:, :waiting)
-      call move_alloc(longer, self%buffer)
-    end if
-    self%buffer(:, waiting + 1:needed) = samples
+    if (waiting + size(samples, 2) > self%batch()) return       ! only when nothing can be written any more
+    if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), self%batch()))
+    self%buffer(:, waiting + 1:waiting + size(samples, 2)) = samples
   end subroutine keep
 
   !> Writes the buffer if its oldest sample has waited for some time.

@@ -5,12 +5,11 @@ module input_species
   use disks, only: longest_name
   use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
-  use name_index, only: name_index_t
   use observables, only: own_names
   use parameter_values, only: parameter_group_t
   use parameters, only: largest, most_disks, row_of, smallest
   use settings, only: species_settings_t
-  use texts, only: counted, digits, letters, shown, suggestion, written
+  use texts, only: counted, digits, letters, place_of, shown, suggestion, written
   implicit none
   private
   public :: take_species, check_name
@@ -23,15 +22,13 @@ contains
     type(box_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
-    type(name_index_t) :: names
     integer(int64) :: total
     integer :: k
 
-    names = name_index_t(groups%instance)
     allocate (species(size(groups)))
     if (size(groups) == 0) call problems%add(0, "species", "there is none; give at least one")
     do k = 1, size(groups)
-      call check_name(groups, k, names, problems)
+      call check_name(groups, k, problems)
       if (groups(k)%given("file") .and. .not. groups(k)%given("velocities")) call groups(k)%put_text("velocities", "file")
       call groups(k)%infer_choices()
       if (groups(k)%text_of("velocities") == "file" .and. .not. groups(k)%given("file")) &
@@ -40,7 +37,7 @@ contains
       call take_placement(groups(k), box, species(k), problems)
       call take_velocities(groups(k), species(k), problems)
     end do
-    call resolve_sizes(groups, names, species, problems)
+    call resolve_sizes(groups, species, problems)
     total = sum(int(species%count, int64))
     if (total > most_disks) call problems%add(0, "species.count", counted(total, "disk")//"; allowed: up to "// &
       written(most_disks))
@@ -58,10 +55,9 @@ contains
   end subroutine take_species
 
   !> A name must fit into file paths, override paths and messages, and be unique among its kind.
-  subroutine check_name(groups, k, names, problems)
+  subroutine check_name(groups, k, problems)
     type(parameter_group_t), intent(in) :: groups(:)   !! all obstacles, or all species
     integer, intent(in) :: k
-    type(name_index_t), intent(in) :: names            !! of the groups
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
     integer :: j
@@ -73,7 +69,7 @@ contains
     else if (any(own_names() == name) .or. any(beside_species == name)) then
       call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
     end if
-    j = names%place_of(name)
+    j = place_of(name, groups%instance)
     if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
       written(groups(j)%line), problems)
   end subroutine check_name
@@ -168,9 +164,8 @@ contains
   end subroutine take_count
 
   !> Masses and radii, multiplied along the chain of `relative_to`.
-  subroutine resolve_sizes(groups, names, species, problems)
+  subroutine resolve_sizes(groups, species, problems)
     type(parameter_group_t), intent(in) :: groups(:)
-    type(name_index_t), intent(in) :: names               !! of the groups
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
@@ -178,7 +173,7 @@ contains
     logical :: fits
 
     do k = 1, size(species)
-      call find_base(groups, k, names, base(k), problems)
+      call find_base(groups, k, base(k), problems)
       mass(k) = groups(k)%real_of("mass", 1.0_real64)
       call own_radius(groups(k), species(k), radius(k), problems)
       if (groups(k)%given("relative_to") .and. base(k) == 0) radius(k) = 0
@@ -205,10 +200,9 @@ contains
   end subroutine resolve_sizes
 
   !> Finds the species that `relative_to` names; 0 if there is none.
-  subroutine find_base(groups, k, names, base, problems)
+  subroutine find_base(groups, k, base, problems)
     type(parameter_group_t), intent(in) :: groups(:)
     integer, intent(in) :: k
-    type(name_index_t), intent(in) :: names               !! of the groups
     integer, intent(out) :: base
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: wanted
@@ -216,7 +210,7 @@ contains
     base = 0
     wanted = groups(k)%text_of("relative_to")
     if (wanted == "") return
-    base = names%place_of(wanted)
+    base = place_of(wanted, groups%instance)
     if (base == 0) call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
       suggestion(wanted, groups%instance), problems)
   end subroutine find_base

@@ -6,7 +6,6 @@ module input_surfaces
   use input_problems, only: problem_list_t
   use input_species, only: check_name
   use kinds, only: real64
-  use name_index, only: name_index_t
   use parameter_values, only: parameter_group_t
   use parameters, only: largest, table, words_of
   use partners, only: n_sides, side_name
@@ -24,14 +23,12 @@ contains
     type(parameter_group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
     type(surface_t), allocatable, intent(out) :: obstacles(:)
     type(problem_list_t), intent(inout) :: problems
-    type(name_index_t) :: names
     logical :: complete
     integer :: k, v
 
-    names = name_index_t(groups%instance)
     complete = .true.
     do k = 1, size(groups)
-      call check_name(groups, k, names, problems)
+      call check_name(groups, k, problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
           if (table(value%row)%status /= "example") cycle       ! has a default, or may be left out

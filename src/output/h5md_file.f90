@@ -6,7 +6,7 @@ module h5md_file
   use kinds, only: int64, real64
   use errors, only: error_t
   use hdf5_objects, only: hdf5_file_t
-  use sample_track, only: samples_t, track_t
+  use sample_track, only: track_t
   use system, only: remove_file
   implicit none
   private
@@ -58,14 +58,13 @@ contains
   end subroutine make_tracks
 
   !> Opens the tracks of the open file and goes back to their first samples.
-  subroutine resume_tracks(self, counts, unwritten)
+  subroutine resume_tracks(self, counts)
     class(h5md_file_t), intent(inout) :: self
     integer(int64), intent(in) :: counts(n_tracks)        !! of samples that have been taken
-    type(samples_t), intent(in) :: unwritten(n_tracks)    !! the last of them, which are not in the file
     integer :: k
 
     do k = 1, n_tracks
-      call self%track(k)%resume(self%file, counts(k), unwritten(k))
+      call self%track(k)%resume(self%file, counts(k))
     end do
   end subroutine resume_tracks
 

@@ -3,25 +3,23 @@
 module output
   use kinds, only: int64, real64
   use errors, only: error_t, exit_files, fail
-  use checkpoint_contents, only: put_final_state
-  use disk_room, only: check_room, keep_room, last_room, planned_room
+  use checkpoint, only: make_checkpoints, put_checkpoint
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use h5md_file, only: event_track, frame_track, h5md_file_t, n_tracks, observable_track
-  use h5md_layout, only: event_counter, frame_counter, sample_counter
+  use h5md_layout, only: checkpoint_group, event_counter, frame_counter, sample_counter
   use hdf5_objects, only: hdf5_file_t
   use observables, only: observed
   use progress, only: progress_t
   use run_description, only: describe_end, describe_run, describes
-  use run_files, only: check_places, check_replaced, check_start, identify, is_file, lock, remove_checkpoints, &
-    remove_temporaries, run_file, take_final_name, unfinished, unfinished_new
+  use run_files, only: check_places, check_start, is_file, lock, remove_temporaries, take_final_name, unfinished, unfinished_new
   use settings, only: run_input_t
   use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
   use signals, only: record_signals
-  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, remove_file, reserve_t, &
-    seconds, synchronize
+  use system, only: free_bytes, is_folder, last_problem, lock_t, make_folders_of, remove_file, seconds, synchronize
+  use texts, only: written
   implicit none
   private
   public :: output_t, planned_bytes
@@ -35,7 +33,7 @@ module output
     type(run_input_t) :: input                    !! described in the file
     type(h5md_file_t), private :: h5md
     type(lock_t), private :: lock
-    type(reserve_t) :: reserve                    !! room for a last checkpoint: give it up before that
+    logical, private :: replaces = .false.        !! a finished file that was there when the run began or went on
   contains
     procedure :: open => open_output
     procedure :: resume
@@ -59,41 +57,35 @@ contains
     type(simulation_t), intent(inout) :: sim
     logical, intent(in) :: force                  !! replace, at the end, a finished file
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: problem
-    integer(int64) :: capacities(n_tracks), kept
+    integer(int64) :: capacities(n_tracks), planned
 
     call self%claim(path, error)
     if (allocated(error)) return
     self%progress = progress_t(input%settings)
-    if (force) then
-      call identify(path, self%progress%replaced, problem)
-      if (problem /= "") call fail(error, exit_files, path//": "//problem)
-    else
-      call check_start(path, error)
-    end if
+    if (.not. force) call check_start(path, error)
     if (.not. allocated(error)) then
       call self%plan(input, sim, capacities)
-      kept = last_room(self%h5md%track, capacities, sim%n_disks())
-      call check_room(planned_bytes(input, sim), kept, path, error)
+      planned = planned_bytes(input, sim)
+      if (planned > free_bytes(path)) call fail(error, exit_files, path//": the output will have "//written(planned) &
+        //" bytes, "//written(free_bytes(path))//" are free; choose fewer frames or make room")
     end if
-    if (.not. allocated(error)) call keep_room(self%reserve, kept, path, error)
     if (.not. allocated(error)) then
-      call remove_checkpoints(path)
-      call remove_file(run_file(path, unfinished))
+      call remove_file(path//unfinished)
       call self%create_file(self%h5md%file, sim)
       call self%h5md%make_tracks(capacities)
       call self%write_frame(sim)
       call self%write_observables(sim)
       call self%h5md%write_buffers()
+      call make_checkpoints(self%h5md%file, input%groups, sim, self%progress)
       call self%h5md%file%rename()
       call self%h5md%file%report(error)
-      call remove_file(run_file(path, unfinished_new))     ! still there only after a failure, and useless
+      call remove_file(path//unfinished_new)     ! still there only after a failure, and useless
     end if
     if (allocated(error)) call self%release()
   end subroutine open_output
 
-  !> Opens the output of a run that goes on, goes back to where its checkpoint stands, and writes what waits there. That
-  !> of a finished run stays as it is until the longer one has finished. The file must describe the input of now.
+  !> Opens the output of a run that goes on, and goes back to where its checkpoint stands. That of a finished run stays as
+  !> it is until the longer one has finished. The file must describe the input of now.
   subroutine resume(self, path, input, sim, progress, finished, error)
     class(output_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -104,33 +96,21 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: source
     integer(int64) :: capacities(n_tracks)
-    integer :: k
 
-    source = run_file(path, unfinished)
+    source = path//unfinished
     if (finished) source = path
-    if (.not. is_file(source)) call fail(error, exit_files, source//": is missing: without the samples written so " &
-      //"far the checkpoint is of no use; --force instead of --resume starts over")
-    if (.not. allocated(error)) call self%claim(path, error)
+    call self%claim(path, error)
     if (allocated(error)) return
     self%progress = progress
     call self%plan(input, sim, capacities)
-    call check_replaced(path, progress%replaced, error)
-    if (.not. allocated(error)) &
-      call keep_room(self%reserve, last_room(self%h5md%track, capacities, sim%n_disks()), path, error)
-    if (.not. allocated(error)) then
-      if (finished) call remove_checkpoints(path)
-      call self%h5md%file%open(source, writable=.not. finished)
-      call self%h5md%resume_tracks(progress%counts(), progress%unwritten)
-      if (.not. describes(self%h5md%file, input) .or. finished) then
-        call self%rebuild(max(self%h5md%capacities(capacities), progress%counts()), sim)
-      else
-        call self%h5md%commit()
-      end if
-      do k = 1, n_tracks
-        if (progress%unwritten(k)%count() > 0) call self%append(k, progress%unwritten(k)%values, sim)
-      end do
-      call self%h5md%file%report(error)
+    call self%h5md%file%open(source, writable=.not. finished)
+    call self%h5md%resume_tracks(progress%counts())
+    if (.not. describes(self%h5md%file, input) .or. finished) then
+      call self%rebuild(max(self%h5md%capacities(capacities), progress%counts()), sim)
+    else
+      call self%h5md%commit()
     end if
+    call self%h5md%file%report(error)
     if (allocated(error)) call self%release()
   end subroutine resume
 
@@ -144,6 +124,7 @@ contains
 
     call record_signals()                         ! from here on there is something to lose
     self%path = path
+    self%replaces = is_file(path)
     self%opened = seconds()
     call make_folders_of(path, made)
     if (.not. made) then
@@ -151,7 +132,7 @@ contains
     else if (is_folder(path)) then
       call fail(error, exit_files, path//": is a folder; the output must be a file")
     else
-      call self%lock%acquire(run_file(path, lock), problem)
+      call self%lock%acquire(path//lock, problem)
       if (problem /= "") call fail(error, exit_files, path//": "//problem)
     end if
     if (allocated(error)) return
@@ -186,22 +167,23 @@ contains
     type(run_input_t), intent(in) :: input
     type(simulation_t), intent(in) :: sim
     integer(int64) :: bytes, capacities(n_tracks)
+    real(real64), parameter :: constants = 200.0_real64   !! per disk: id, species, mass, radius, two checkpoints [bytes]
     type(output_t) :: output
 
     output%progress = progress_t(input%settings)
     call output%plan(input, sim, capacities)
-    bytes = planned_room(output%h5md%track, capacities, sim%n_disks())
+    bytes = int(min(9.0e18_real64, constants*sim%n_disks() &
+      + sum(real(max(capacities, 2_int64), real64)*real(output%h5md%track%room(), real64))), int64)
   end function planned_bytes
 
-  !> Creates a file under a temporary name, with everything but the tracks.
+  !> Creates a file under a temporary name, with everything but the tracks and the checkpoints.
   subroutine create_file(self, file, sim)
     class(output_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
 
-    call file%create(run_file(self%path, unfinished_new), final_path=run_file(self%path, unfinished))
+    call file%create(self%path//unfinished_new, final_path=self%path//unfinished)
     call describe_run(file, self%input, sim)
-    call put_final_state(file, self%input%groups, sim, self%progress, finished=.false.)
   end subroutine create_file
 
   !> Lowers the limits so that the simulation pauses at the next sample.
@@ -289,32 +271,25 @@ contains
     end if
     if (allocated(self%h5md%file%failure)) return
     call self%create_file(new%file, sim)
+    call new%file%copy_group(checkpoint_group, self%h5md%file)
     call self%h5md%replace_by(new, capacities)
   end subroutine rebuild
 
-  !> Returns how far the output is when all that was written has reached the disk: a checkpoint relies on it.
-  !> After a failure, which has been reported before, what could not be written belongs to it.
-  subroutine save(self, progress, error)
+  !> Makes a checkpoint of this moment.
+  subroutine save(self, sim, error)
     class(output_t), intent(inout) :: self
-    type(progress_t), intent(out) :: progress
+    type(simulation_t), intent(inout) :: sim      !! stays as it is
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: counts(n_tracks)
+    type(progress_t) :: progress
     logical :: done
-    integer :: k
 
     progress = self%progress
-    progress%spent = self%progress%spent + seconds() - self%opened
-    if (.not. allocated(self%h5md%file%failure)) then
-      call self%h5md%write_buffers()
-      call self%h5md%file%report(error)
-      if (allocated(error)) return
-    end if
-    call synchronize(run_file(self%path, unfinished), done)
-    if (.not. done) call fail(error, exit_files, run_file(self%path, unfinished)//": cannot be written: "//last_problem())
-    counts = progress%counts()
-    do k = 1, n_tracks
-      progress%unwritten(k) = self%h5md%track(k)%unwritten(counts(k))
-    end do
+    progress%spent = progress%spent + seconds() - self%opened
+    call self%h5md%write_buffers()
+    call synchronize(self%h5md%file%path, done)
+    if (.not. done) call self%h5md%file%check(-1, "be written: "//last_problem())
+    call put_checkpoint(self%h5md%file, sim, progress)
+    call self%h5md%file%report(error)
   end subroutine save
 
   !> Ends the output of a finished run: a check of the file, its final name. If that fails, a checkpoint written
@@ -335,13 +310,9 @@ contains
       call self%h5md%file%report(error)
     end if
     if (.not. allocated(error)) call self%h5md%verify(error)
-    if (.not. allocated(error)) call take_final_name(self%path, self%progress%replaced, error)
-    if (allocated(error)) then
-      self%progress = before
-    else
-      call remove_checkpoints(self%path)
-      call self%release()
-    end if
+    if (.not. allocated(error)) call take_final_name(self%path, self%replaces, error)
+    if (allocated(error)) self%progress = before
+    if (.not. allocated(error)) call self%release()
   end subroutine finish
 
   !> Writes the last samples, gives up unused room, and says how the run ended. A finished run gets a checkpoint that goes
@@ -356,15 +327,16 @@ contains
     type(progress_t) :: before
 
     before = self%progress
-    before%spent = before%spent + cost(1)
     if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
     if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
     call self%h5md%write_buffers()
     if (allocated(self%h5md%file%failure)) return
-    call self%reserve%give_up()            ! for the copy; if that fails its room is free for a checkpoint
     if (any(self%h5md%track%appended /= self%h5md%track%capacity)) call self%rebuild(self%h5md%track%appended, sim)
-    call put_final_state(self%h5md%file, self%input%groups, sim, before, finished)
-    call describe_end(self%h5md%file, self%input%settings%run%threads, before%spent, cost(2), note)
+    call describe_end(self%h5md%file, self%input%settings%run%threads, before%spent + cost(1), cost(2), note)
+    if (.not. finished) return
+    before%spent = 0                       ! the state depends on the input alone
+    call put_checkpoint(self%h5md%file, sim, before)
+    call make_checkpoints(self%h5md%file, self%input%groups, sim, before)
   end subroutine write_end
 
   !> Leaves the output of a run that broke off under the name of an unfinished one, with its last state.
@@ -385,7 +357,6 @@ contains
 
     call self%h5md%write_buffers()
     call self%h5md%close()
-    call self%reserve%give_up()
     call self%lock%release()
   end subroutine release
 

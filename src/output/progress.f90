@@ -3,8 +3,6 @@ module progress
   use kinds, only: int64, real64
   use cadence, only: cadence_t
   use h5md_file, only: n_tracks
-  use run_files, only: no_file
-  use sample_track, only: samples_t
   use settings, only: settings_t
   implicit none
   private
@@ -15,8 +13,6 @@ module progress
     type(cadence_t) :: frames, observables
     integer(int64) :: events = 0                  !! collisions written to the event log
     real(real64) :: spent = 0.0_real64            !! wall time of earlier parts of the run [s]
-    type(samples_t) :: unwritten(n_tracks)        !! counted above, but not in the file
-    integer(int64) :: replaced(2) = no_file       !! identity of the finished file that may be replaced at the end
   contains
     procedure :: counts
   end type progress_t

@@ -5,7 +5,6 @@ module run_description
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
-  use checkpoint_contents, only: is_free
   use disks, only: names_of
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
     parameters_group, provenance, species_counts, species_names
@@ -13,15 +12,14 @@ module run_description
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: parameter_group_t, parameter_value_t, range_of
   use parameters, only: is_repeated, obstacle_groups, table
-  use run_files, only: is_file, run_file, unfinished
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: host_name
-  use texts, only: growing_text_t, lower_case, text_t
+  use texts, only: growing_text_t
   use version, only: program_version
   implicit none
   private
-  public :: describe_end, describe_run, describes, recall_overrides
+  public :: describe_end, describe_run, describes
 
   integer, parameter :: longest_attribute = 1000      !! values; HDF5 has no room for more than 64 kB
   integer, parameter :: longest_note = 500            !! letters kept for why the run ended
@@ -164,51 +162,6 @@ contains
     call file%fetch_text(parameters_group//"overrides", overrides)
     yes = text == input%text .and. overrides == overrides_text(input)
   end function describes
-
-  !> Puts what the command line of a run had changed for good in front of what that of now changes, which counts. What
-  !> may change when a run goes on is as the input and the command line of now say. A file that cannot be read adds
-  !> nothing: whoever goes on from it says why.
-  subroutine recall_overrides(path, overrides)
-    character(len=*), intent(in) :: path                         !! of the output
-    type(text_t), allocatable, intent(inout) :: overrides(:)     !! GROUP.VARIABLE=VALUE of now; then those of both
-    type(hdf5_file_t) :: file
-    type(text_t), allocatable :: both(:)
-    character(len=:), allocatable :: source, text
-    character(len=1), parameter :: eol = new_line("a")
-    integer :: first, k, last, n
-
-    source = run_file(path, unfinished)
-    if (.not. is_file(source)) source = path
-    if (.not. is_file(source)) return
-    call file%open(source, writable=.false.)
-    call file%fetch_text(parameters_group//"overrides", text)
-    call file%close()
-    allocate (both(count([(text(k:k) == eol, k=1, len(text))]) + 1 + size(overrides)))
-    n = 0
-    first = 1
-    do while (first <= len(text))
-      last = first + index(text(first:)//eol, eol) - 2
-      if (.not. (is_free(name_in(text(first:last))) .or. &
-        any([(name_in(overrides(k)%text) == name_in(text(first:last)), k=1, size(overrides))]))) then
-        n = n + 1
-        both(n)%text = text(first:last)
-      end if
-      first = last + 2
-    end do
-    do k = 1, size(overrides)
-      n = n + 1
-      both(n)%text = overrides(k)%text
-    end do
-    overrides = both(:n)
-  end subroutine recall_overrides
-
-  !> The variable of an override.
-  pure function name_in(override) result(name)
-    character(len=*), intent(in) :: override
-    character(len=:), allocatable :: name
-
-    name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
-  end function name_in
 
   !> One variable; nothing if it has no value.
   subroutine describe_value(file, group, value)

@@ -16,7 +16,7 @@ module initial_state
   use starting_velocities, only: add_stream, draw_velocities, remove_drift, scale_to_temperature
   implicit none
   private
-  public :: create_simulation, describe_system, restless_disk
+  public :: create_simulation, describe_system
 
   real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
   integer, parameter :: purpose = 2, purpose_of_spins = 6   !! of this module's random streams
@@ -161,31 +161,5 @@ contains
       end associate
     end do
   end subroutine draw_spins
-
-  !> Warns of a disk that starts so low above the floor that it would hardly do anything but bounce; empty if there is none.
-  pure function restless_disk(sim) result(text)
-    type(simulation_t), intent(in) :: sim
-    character(len=:), allocatable :: text
-    real(real64), parameter :: lowest = 1.0e-7_real64         ! height over radius
-    real(real64) :: height, speed
-    integer(int32) :: i
-    integer :: axis
-
-    text = ""
-    do axis = 1, 2
-      associate (g => sim%box%gravity(axis))
-        if (sim%box%side(2*axis - merge(0, 1, g > 0))%motion%is_on()) cycle     ! the height says little
-        do i = 1, merge(sim%n_disks(), 0, abs(g) > 0)
-          height = sim%disk(i)%x(axis) - sim%box%lower(axis) - sim%disk(i)%radius
-          if (g > 0) height = sim%box%upper(axis) - sim%disk(i)%x(axis) - sim%disk(i)%radius
-          speed = sqrt(sim%disk(i)%v(axis)**2 + 2*abs(g)*max(height, 0.0_real64))
-          if (.not. speed > 0 .or. speed**2 > 2*abs(g)*lowest*sim%disk(i)%radius) cycle
-          text = "disk "//written(sim%tag(i)%id)//" starts "//written(height)//" above what it falls on: it bounces " &
-            //written(abs(g)/(2*speed))//" times per unit of time; start it higher, or on the wall with dynamics = 'steps'"
-          return
-        end do
-      end associate
-    end do
-  end function restless_disk
 
 end module initial_state

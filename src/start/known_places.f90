@@ -11,7 +11,6 @@ module known_places
   public :: add_known, misfit_t, misfit_text
 
   integer, parameter :: most_reports = 5                    !! of a kind, for one species
-  integer(int32), parameter :: ahead = 8                    !! disks, whose surroundings are being loaded
   real(real64), parameter, public :: rounding = 1.0e-12_real64      !! relative, of disks that touch
 
   !> A disk that does not fit.
@@ -42,8 +41,6 @@ contains
     call packing%open_species(int(s, int32), maxval(radius), size(radius), &
       min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
     do k = 1, species(s)%count
-      if (k + 2*ahead <= species(s)%count) call packing%load_cells(int(s, int32), x(:, k + 2*ahead))
-      if (k + ahead <= species(s)%count) call packing%load_disks(int(s, int32), x(:, k + ahead))
       slack = rounding*(radius(k) + largest)
       call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
       blocker = 0

@@ -3,7 +3,6 @@
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
-  use memory_hints, only: prefetch
   use box_geometry, only: box_t
   implicit none
   private
@@ -35,8 +34,6 @@ module packing
     procedure :: open_species
     procedure :: add
     procedure :: find_blocker
-    procedure :: load_cells
-    procedure :: load_disks
     procedure :: list_neighbours
     procedure :: covers
     procedure :: separation
@@ -171,38 +168,6 @@ contains
       end associate
     end do
   end function blocker_in
-
-  !> Starts to load the cells of species s that are searched when one more of its disks is tried at p.
-  subroutine load_cells(self, s, p)
-    class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: s
-    real(real64), intent(in) :: p(2)                !! [length]
-    integer :: c(2), j
-
-    associate (layer => self%layer(s))
-      c = cell(layer, p)
-      do j = max(c(2) - 1, 1), min(c(2) + 1, size(layer%head, 2))
-        call prefetch(layer%head(c(1), j))
-      end do
-    end associate
-  end subroutine load_cells
-
-  !> Starts to load the first disk of each of these cells.
-  subroutine load_disks(self, s, p)
-    class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: s
-    real(real64), intent(in) :: p(2)                !! [length]
-    integer :: c(2), i, j
-
-    associate (layer => self%layer(s))
-      c = cell(layer, p)
-      do j = max(c(2) - 1, 1), min(c(2) + 1, size(layer%head, 2))
-        do i = max(c(1) - 1, 1), min(c(1) + 1, size(layer%head, 1))
-          if (layer%head(i, j) > 0) call prefetch(self%disk(layer%head(i, j))%next)
-        end do
-      end do
-    end associate
-  end subroutine load_disks
 
   !> All disks whose rim comes within `reach` of a point, and some others from the same cells.
   pure subroutine list_neighbours(self, p, reach, list, n)

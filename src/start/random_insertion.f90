@@ -13,7 +13,6 @@ module random_insertion
   public :: insert_at_random
 
   integer(int32), parameter :: disks_per_look = 1024    !! at the clock
-  integer, parameter :: n_ahead = 8                     !! attempts to read ahead for
 
   !> Where a centre may still fit.
   type :: voxels_t
@@ -35,7 +34,6 @@ contains
     integer(int32), intent(out) :: placed           !! how many
     type(voxels_t) :: voxels
     integer(int32) :: k, blocker, failures, count
-    integer :: attempts
     real(real64) :: p(2), radius, lower(2), upper(2)
 
     radius = packing%layer(s)%radius
@@ -45,10 +43,7 @@ contains
     call tile(voxels, lower, upper, shape(packing%layer(s)%head))
     placed = 0
     failures = 0
-    attempts = 0
     do while (placed < count .and. voxels%n > 0)
-      if (modulo(attempts, n_ahead) == 0) call read_ahead(packing, s, voxels, stream)
-      attempts = modulo(attempts, n_ahead) + 1
       call draw_point(stream, voxels, k, p)
       p = min(max(p, lower), upper)
       call packing%find_blocker(p, [0.0_real64, 0.0_real64], radius, blocker)
@@ -100,25 +95,6 @@ contains
     call stream%draw_uniform(p(2))
     p = voxels%origin + (voxels%column_row(:, k) + p)*voxels%side
   end subroutine draw_point
-
-  !> Starts to load what the next attempts read, from places all over memory: together they wait no longer than one.
-  subroutine read_ahead(packing, s, voxels, stream)
-    type(packing_t), intent(in) :: packing
-    integer(int32), intent(in) :: s
-    type(voxels_t), intent(in) :: voxels
-    type(random_stream_t), value :: stream          ! a copy: the attempts draw the same numbers
-    real(real64) :: p(2, n_ahead)
-    integer(int32) :: k
-    integer :: attempt
-
-    do attempt = 1, n_ahead
-      call draw_point(stream, voxels, k, p(:, attempt))
-      call packing%load_cells(s, p(:, attempt))
-    end do
-    do attempt = 1, n_ahead
-      call packing%load_disks(s, p(:, attempt))
-    end do
-  end subroutine read_ahead
 
   !> The centre of voxel k.
   pure function middle(voxels, k) result(p)
