@@ -77,7 +77,7 @@ class Runs:
         """Stops a run at random moments and resumes it."""
         code, message = STOPPED, ""
         for part in range(MOST_PARTS):
-            resume = ["--resume"] if (self.folder / "parts.chk.h5").exists() else []
+            resume = ["--resume"] if (self.folder / "parts.h5.part").exists() else []
             process = self.begin("parts", SECONDS, *way(rng), *resume)
             if part < MOST_PARTS - 1:
                 time.sleep(rng.uniform(0, 1.2) * plain_seconds)
