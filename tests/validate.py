@@ -70,7 +70,8 @@ def main() -> int:
 def line(verdict) -> str:
     """A verdict for the terminal."""
     mark = "pass" if verdict.passed else "FAIL"
-    values = f"{report.number(verdict.reference, 8):>14} {report.measured(verdict):>22}"
+    measured = report.measured(verdict.measured, verdict.error)
+    values = f"{report.number(verdict.reference, 8):>14} {measured:>22}"
     tail = verdict.problem or verdict.case.what
     return f"{mark} {verdict.case.id:10} {values} {verdict.used:6.2f}  {tail}"
 

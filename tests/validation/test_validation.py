@@ -1,6 +1,7 @@
 """The quick part of the validation with every `make test`, and that its verdicts can be trusted."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relat
 from validation.running import validate
 from validation.tables import CASES
 
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-03", "P9-09", "P9-1", "P10-01", "P10-07")
 QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07", "W1-")
 
@@ -75,6 +77,16 @@ def test_failures_are_reported_and_do_not_stop_the_others(program, tmp_path):
     assert data["cases"][3]["error"] == 1 and data["cases"][0]["measured"] is None
     text = (tmp_path / "deep" / "report.md").read_text()
     assert text.count("**FAIL**") == 3 and "4 cases in 1.0 minutes" in text
+
+
+def test_the_page_has_every_case_of_the_report_and_the_worst_value_of_each():
+    data = json.loads((DOCS / "validation.json").read_text())
+    page = (DOCS / "validation.md").read_text()
+    assert page == report.markdown(data)
+    for name in {case["case"] for case in data["cases"]}:
+        worst = max(case["used"] for case in data["cases"] if case["case"] == name)
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| {name} |")]
+        assert row.endswith(f"| {report.number(worst, 2)} |")
 
 
 def test_other_seeds_give_other_runs(program, tmp_path):
