@@ -105,7 +105,11 @@ $(BUILD)/%_c.o: %.c $(BUILD)/flags
 keep = cat > $@.$$$$; if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 $(BUILD)/flags: FORCE
-	@echo '$(FC) $(flags) $(hints) $(PFUNIT_DIR)' | { $(keep); }
+	@echo '$(FC) $(flags) $(hints)' | { $(keep); }
+
+# Another pFUnit compiles the tests of its folder again, and another runner links its own: of the program nothing.
+$(BUILD)/runner $(T)/runner: FORCE
+	@echo '$(PFUNIT_DIR)' | { $(keep); }
 
 $(BUILD)/build_info.f90: FORCE
 	@src/build_info.sh $(flags) | { $(keep); }
@@ -119,14 +123,14 @@ $(BUILD)/hints.mk: src/base/memory_hints.c
 	  if $(c_compiler) -DMEMORY_HINTS -include $< $@.c $(wrapped) -o $@.out 2>/dev/null; \
 	  then echo 'HINTS ?= 1'; else echo 'HINTS ?='; fi > $@; rm -f $@.c $@.out
 
-$(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects)
+$(BUILD)/unit_tests: $(driver) $(T)/tests.inc $(test_objects) $(shared_objects) $(objects) $(BUILD)/runner
 	$(call link,$(test_flags),$< $(filter %.o,$^) $(PFUNIT_LIBRARIES))
 
 # The engine of docs/how-it-works.md.
 $(BUILD)/four_disks: docs/four_disks.f90 $(objects)
 	$(call link,-I$(BUILD),$^)
 
-$(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(BUILD)/flags
+$(T)/test_%.F90: $(suites)/test_%.pf $(translator) $(T)/runner
 	$(Q)log=$$($(PYTHON) $(translator) $< $@ 2>&1) || { echo "$$log"; false; }
 
 $(test_objects): $(T)/%.o: $(T)/%.F90 $(BUILD)/flags

@@ -1,10 +1,8 @@
 !> Simulations for tests: states built in a line, followed by any method, and compared; and random cases.
 module test_systems
   use kinds, only: dp => real64, int32, int64, never
-  use all_pairs, only: all_pairs_t
   use box_geometry, only: box_t, obstacle_gap, surface_t
   use box_sides, only: bounds
-  use cell_grid, only: cell_grid_t
   use circles, only: new_circle
   use disks, only: disk_t, tag_t
   use errors, only: error_t
@@ -243,12 +241,9 @@ contains
     type(event_driven_t), intent(out) :: dynamics
     character(len=*), intent(in) :: method
     type(simulation_t), intent(inout) :: sim
-    if (index(method, "cells") > 0) then
-      allocate (cell_grid_t :: dynamics%search)
-    else
-      allocate (all_pairs_t :: dynamics%search)
-      dynamics%search%everyone = index(method, "rescan") > 0
-    end if
+    allocate (dynamics%search)
+    dynamics%search%undivided = index(method, "cells") == 0
+    dynamics%search%everyone = index(method, "rescan") > 0
     dynamics%windowed = index(method, "heap") == 0
     call dynamics%start(sim)
   end subroutine prepare
