@@ -14,6 +14,7 @@ sys.path.insert(0, str(SUPPORT))
 
 from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
+from weigh import main as weigh  # noqa: E402
 
 from whole_runs import PATIENCE  # noqa: E402
 
@@ -209,7 +210,7 @@ def test_a_module_in_order_has_no_style_problem(tmp_path):
         ("2*x*value", "2*x", 3, "value is imported, not used"),
         ("  private\n", "  private\n  public :: twice\n", 7, "nobody uses twice"),
         ("contains\n", "#include 'x'\ncontains\n", 7, "preprocessor"),
-        ("contains\n", "contains\n" + "! a line\n" * 387, 401, "more than 400 lines"),
+        ("contains\n", "contains\n" + "! a line\n" * 437, 451, "more than 450 lines"),
         ("It says:", "It says: '/ho" "me/me'", 1, "path of one machine"),
     ],
 )
@@ -228,3 +229,15 @@ def test_a_use_without_an_arrow_in_the_picture_is_reported(tmp_path):
 def test_picture_and_folders_belong_together(tmp_path):
     problems = style_problems(tmp_path, MODULE, PICTURE + "high --> lost\n")
     assert problems == ["src/README.md:1: there is no folder src/lost"]
+
+
+def test_a_folder_or_pages_that_grow_are_told_until_it_is_recorded(tmp_path, capsys):
+    style_problems(tmp_path, MODULE)
+    (tmp_path / "tests" / "support").mkdir(parents=True)
+    grown = {"README.md": "words of pages: 16, not 15", "more.f90": "src/low: 4, not 3"}
+    for name, told in grown.items():
+        assert weigh(tmp_path, record=True) == weigh(tmp_path, record=False) == 0
+        with (tmp_path / "src" / "low" / name).open("a") as file:
+            file.write("more\n")
+        assert weigh(tmp_path, record=False) == 1
+        assert told in capsys.readouterr().out
