@@ -9,14 +9,16 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "post" / "ricochet"))
 from variables import explained
 
+LAW = "the law of a wall"
 GROUPS = {
     "run": "What is run, and by which method.",
     "box": "The box and the gravity in it.",
-    "side": "The law of a side of the box that is a wall; the group is repeated for each.",
-    "obstacle": "A circular wall; the group is repeated for each.",
-    "wall": "A straight wall, solid on both sides; disks bounce off its ends as off points. The "
-    "group is repeated for each.",
-    "species": "Disks of one kind; the group is repeated for each.",
+    "side": "A side of the box that is a wall, with its motion; repeated for each.",
+    "obstacle": "A circular wall; repeated for each.",
+    "wall": "A straight wall, solid on both sides; disks bounce off its ends as off points. "
+    "Repeated for each.",
+    LAW: "What each `&side`, `&obstacle` and `&wall` may have of its own.",
+    "species": "Disks of one kind; repeated for each.",
     "contact": "What happens at a contact.",
     "drive": "Kicks: random changes of velocity at fixed intervals.",
     "stop": "When the run ends: at the first of these that is met. At least one is needed.",
@@ -29,21 +31,19 @@ HEAD = """\
 # Input: every variable
 
 A file consists of groups `&name ... /` with lines `variable = value`; only what differs from the
-default is needed. The rules, and the ways to describe disks, are in
-[input/README](../input/README.md); [input/reference.nml](../input/reference.nml) is a file with
-all variables. `docs/input_page.py` generates this page from `ricochet --explain`.
+default is needed. [input/README](../input/README.md) has the rules, and the ways to describe disks;
+[input/reference.nml](../input/reference.nml) is a file with all variables. `docs/input_page.py`
+writes this page from what the program says of itself.
 
-On the command line a variable is set with `--set GROUP.VARIABLE=VALUE`; a species, an obstacle or a
-wall is addressed by its name: `--set species.projectile.mass=50`. The file chooses the
-units of length, time and mass.
+On the command line: `--set GROUP.VARIABLE=VALUE`; a species, an obstacle or a wall is addressed by
+its name, as in `--set species.projectile.mass=50`. The file chooses the units of length, time and
+mass. What has no default has an example instead: *e.g.*
 """
 
 
 def row(entry: dict) -> str:
     """A line of the table."""
-    value = (
-        f"`{entry['value']}`" if entry["kind"] == "default" else f"none; e.g. `{entry['value']}`"
-    )
+    value = f"`{entry['value']}`" if entry["kind"] == "default" else f"e.g. `{entry['value']}`"
     unit = entry["unit"] or ""
     name = entry["name"].split(".")[-1]
     cells = (f"`{name}`", entry["help"], entry["allowed"], value, unit)
@@ -51,12 +51,17 @@ def row(entry: dict) -> str:
 
 
 def page(program: Path) -> str:
-    """The whole page."""
+    """The whole page. What all kinds of walls share stands there once."""
+    rows = {group: list(map(row, explained(program, group))) for group in GROUPS if group != LAW}
+    walls = "side", "obstacle", "wall"
+    rows[LAW] = [entry for entry in rows["side"] if all(entry in rows[group] for group in walls)]
+    for group in walls:
+        rows[group] = [entry for entry in rows[group] if entry not in rows[LAW]]
     lines = [HEAD]
     for group, words in GROUPS.items():
-        lines += [f"## &{group}", "", words, ""]
+        lines += [f"## {group.capitalize() if group == LAW else '&' + group}", "", words, ""]
         lines += ["| variable | meaning | allowed | default | unit |", "|---|---|---|---|---|"]
-        lines += [row(entry) for entry in explained(program, group)] + [""]
+        lines += [*rows[group], ""]
     return "\n".join(lines)
 
 

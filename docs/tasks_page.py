@@ -1,7 +1,7 @@
-"""Write the results into docs/tasks.md, from the tables that the studies leave in runs/figures.
+"""Write the results of the textbook tasks into docs/getting-started.md, from the studies' tables.
 
     make figures                     or runs/mixture.sh, cooling.sh, crater.sh, gravity.sh alone
-    python docs/tasks_page.py        reads the tables into docs/tasks.json, and writes the page
+    python docs/tasks_page.py        reads runs/figures into docs/tasks.json, and writes the page
 
 docs/tasks.json keeps each number of the page with its error; the text stands between comments with
 its name in the page.
@@ -26,26 +26,22 @@ TEXTS = {
   1.25); ⟨v⟩ = {v_light} and {v_heavy} (theory {v_light_theory} and {v_heavy_theory}). Eight
   seeds.
 - After 20 collisions per disk the ratio of the temperatures, heavy over light, is {ratio_1} for ξ
-  = 1, {ratio_0.9} for 0.9 and {ratio_0.8} for 0.8 (eight seeds), and stays near these values: no
-  equipartition.
+  = 1, {ratio_0.9} for 0.9 and {ratio_0.8} for 0.8 (eight seeds): no equipartition.
 - Of the 2000 disks of a bed {hit} are hit and {displaced} move by more than their radius, from a
   region {width} wide and {depth} deep (eight beds). The number hit grows with the mass of the
   projectile to the power {hit_mass}, and with its speed to the power {hit_speed}, that is not at
-  all. Nothing in the task sets a scale of time but `contact_time`; so the study changes it with
-  1/speed. The crater decreases slowly with the projectile's radius, and grows to the whole bed as
-  ξ goes to 1. Open points are not fitted: there walls take part, or a time limit ends the run
-  before 10 % of the energy is left.
+  all (`contact_time` is changed with 1/speed). The crater decreases slowly with the projectile's
+  radius, and grows to the whole bed as ξ goes to 1. Open points are not fitted: there walls take
+  part, or a time limit ends the run.
 """,
     "gravity": """\
-- All methods conserve the total energy to {energy_change}, even with dt = 0.004: flights between
-  steps are exact, and a collision changes no position and loses no kinetic energy. Large steps
-  cost collisions instead: disks pass through each other unnoticed. Of the collisions
-  {missed_0.001} % are missed at dt = 0.001, {missed_0.002} % at 0.002 and {missed_0.004} % at
-  0.004 (expected {expected_0.001}, {expected_0.002} and {expected_0.004} %; 32 pairs of runs,
-  seeds 1 to 32, of 520 time units each).
-- ⟨K⟩ of the two species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: disks
-  fall from a mean height of 4, which gives them 470 times the energy of v₀ = 0.5, and 29 times
-  that of v₀ = 2. Single runs fluctuate too much to show this; it is the mean of 100 seeds.
+- All methods conserve the total energy to {energy_change}. Large steps cost collisions instead:
+  disks pass through each other unnoticed. {missed_0.001} % are missed at dt = 0.001,
+  {missed_0.002} % at 0.002 and {missed_0.004} % at 0.004 (expected {expected_0.001},
+  {expected_0.002} and {expected_0.004} %; 32 pairs of runs of 520 time units).
+- ⟨K⟩ of the two species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: the
+  fall from a mean height of 4 gives far more energy than v₀. This is the mean of 100 seeds;
+  single runs fluctuate too much.
 - The slopes of the logarithm of both histograms agree with kT = ⟨K⟩. Relative to the exponential
   laws, seed 1 (500 time units) gives {speed_A} and {speed_B} for v² of the light and the heavy
   disks, and {height_A} and {height_B} for heights. The law for 60 disks of finite size, dashed in
@@ -139,7 +135,7 @@ def main() -> None:
     found = mixture() | cooling() | crater() | gravity()
     numbers = {name: found[name] for name in BLANK.findall("".join(TEXTS.values()))}
     (DOCS / "tasks.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
-    page = DOCS / "tasks.md"
+    page = DOCS / "getting-started.md"
     page.write_text(filled(page.read_text(encoding="utf-8"), numbers), encoding="utf-8")
 
 

@@ -20,9 +20,14 @@ from whole_runs import differences
 
 PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
-PROMISES = ROOT / "docs" / "reliability.md"
-INVARIANTS = ROOT / "docs" / "architecture.md"
 ELSEWHERE = ("http://", "https://", "mailto:", "#")
+
+
+def section(page, heading):
+    """What stands in docs/ under a heading, and the headings below it."""
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    level = len(heading) - len(heading.lstrip("#"))
+    return re.search(rf"^{heading}$(.*?)(?=^#{{1,{level}}} |\Z)", text, re.M | re.S)[1]
 
 
 def script_in_docs(name):
@@ -69,15 +74,17 @@ def test_the_readme_leads_to_every_page():
     assert [p.name for p in ROOT.glob("docs/*.md") if f"(docs/{p.name})" not in readme] == []
 
 
-@pytest.mark.parametrize("page", [PROMISES, INVARIANTS], ids=lambda page: page.name)
-def test_promises_are_held_by_tests_that_exist(page):
+@pytest.mark.parametrize(
+    ("page", "heading"), [("limits", "## Promises"), ("architecture", "## Invariants")]
+)
+def test_promises_are_held_by_tests_that_exist(page, heading):
     """In the tables the second column names files and tests."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
     )
     known = {name for pair in known for name in pair}
-    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", page.read_text(), re.M)
+    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", section(page, heading), re.M)
     named = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
     assert len(named) > 20
     assert [word for word in named if word not in known] == []
@@ -169,8 +176,8 @@ def test_every_folder_says_which_tests_protect_it(folder):
 
 
 def test_modules_that_keep_a_promise_exist():
-    """In the tables of docs/reliability.md the third column names modules of src/ and scripts."""
-    cells = re.findall(r"^\|(?: [^|]+ \|){2} ([^|]+) \|", PROMISES.read_text(), re.M)
+    """In the table of promises the third column names modules of src/ and scripts."""
+    cells = re.findall(r"^\|(?: [^|]+ \|){2} ([^|]+) \|", section("limits", "## Promises"), re.M)
     named = [word for cell in cells for word in re.findall(r"`(\w[\w/.]*\w)`", cell)]
     assert len(named) > 40
     places = [ROOT / word if "." in word else ROOT / "src" / f"{word}.f90" for word in named]
@@ -198,7 +205,7 @@ def test_options_that_are_named_exist(program):
 
 def test_the_numbers_of_the_tasks_are_those_of_their_tables():
     pages = script_in_docs("tasks_page")
-    page = (ROOT / "docs" / "tasks.md").read_text()
+    page = (ROOT / "docs" / "getting-started.md").read_text()
     numbers = json.loads((ROOT / "docs" / "tasks.json").read_text())
     assert pages.filled(page, numbers) == page, "make it anew: python docs/tasks_page.py"
     other = {name: (mean + 1, error) for name, (mean, error) in numbers.items()}
@@ -265,9 +272,8 @@ def test_the_script_that_the_page_on_extending_shows_works(tmp_path):
 
 
 def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
-    page = (ROOT / "docs" / "output.md").read_text()
-    section = re.search(r"^## Reading it$(.*?)^## ", page, re.DOTALL | re.MULTILINE)[1]
-    code = "\n".join(line[4:] for line in section.splitlines() if line.startswith("    "))
+    lines = section("output", "## Reading it").splitlines()
+    code = "\n".join(line[4:] for line in lines if line.startswith("    "))
     assert "from ricochet import read_run" in code and "import h5py" in code
     (tmp_path / "runs").mkdir()
     x = np.random.default_rng(1).uniform(size=(2, 30, 2))
@@ -280,9 +286,8 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
 
 
 def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
-    page = (ROOT / "docs" / "output.md").read_text()
-    section = re.search(r"^## Running it from Python$(.*?)^## ", page, re.DOTALL | re.MULTILINE)[1]
-    code = textwrap.dedent("\n".join(re.findall(r"^    .*", section, re.M)))
+    page = section("output", "## Running it from Python")
+    code = textwrap.dedent("\n".join(re.findall(r"^    .*", page, re.M)))
     paths = {**os.environ, "PYTHONPATH": str(ROOT / "post"), "RICOCHET": str(program)}
     command = [sys.executable, "-c", code]
     said = subprocess.run(command, cwd=tmp_path, env=paths, capture_output=True, text=True)
