@@ -4,6 +4,7 @@ program main
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
   use run, only: perform_run
+  use run_setup, only: print_input
   use system, only: end_program, fill_standard_streams
   implicit none
   call serve()
@@ -23,6 +24,8 @@ contains
     if (.not. allocated(error)) then
       if (command%question /= "") then
         call answer(command, error)
+      else if (command%print_input) then
+        call print_input(command%input, command%overrides, error)
       else
         call perform_run(command, error)
       end if

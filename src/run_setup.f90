@@ -7,21 +7,23 @@ module run_setup
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
   use input_fit, only: check_fit
+  use input_json, only: groups_text
   use input_problems, only: problem_list_t
   use input_text, only: read_text
   use memory, only: room_for_domains
-  use namelist_input, only: read_settings
+  use namelist_input, only: read_groups, read_settings
   use parallel_events, only: parallel_events_t
   use parameter_values, only: parameter_group_t
   use renumbering, only: renumber
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
+  use system, only: print_text
   use texts, only: text_t
   use time_stepped, only: time_stepped_t
   implicit none
   private
-  public :: read_input, settings_from_text, new_simulation, choose_evolution
+  public :: print_input, read_input, settings_from_text, new_simulation, choose_evolution
 
 contains
 
@@ -37,6 +39,23 @@ contains
     if (.not. allocated(error)) &
       call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
   end subroutine read_input
+
+  !> Prints what the file and the overrides give, as far as it could be understood; an error holds all problems.
+  subroutine print_input(path, overrides, error)
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(run_input_t) :: input
+    type(problem_list_t) :: problems
+    logical :: complete
+
+    call read_text(path, input%text, error)
+    if (allocated(error)) return
+    call read_groups(input%text, overrides, input%groups, problems, complete)
+    call print_text(groups_text(input%groups), error)
+    if (.not. allocated(error)) &
+      call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
+  end subroutine print_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
   subroutine settings_from_text(text, path, overrides, settings, groups, error)

@@ -4,6 +4,7 @@ module command_line
   use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
   use hdf5_handle, only: hdf5_version
+  use input_json, only: variables_text
   use run_files, only: output_of
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t
@@ -14,20 +15,21 @@ module command_line
   public :: command_t, read_command_line, parse_arguments, answer, help_text
 
   type :: command_t
-    character(len=:), allocatable :: question      !! "" to run; else help, version, print-defaults or explain
+    character(len=:), allocatable :: question      !! "" to run; else help, version, print-defaults, print-variables or explain
     character(len=:), allocatable :: topic         !! the variable of --explain
     character(len=:), allocatable :: input         !! path of the input file
     character(len=:), allocatable :: output        !! path of the output file
     type(text_t), allocatable :: overrides(:)      !! GROUP.VARIABLE=VALUE of each --set
     logical :: resume = .false.
     logical :: check = .false.                     !! validate only
+    logical :: print_input = .false.               !! as JSON, only
     logical :: quiet = .false.
     logical :: force = .false.                     !! replace a finished output, delete an unfinished one
   end type command_t
 
-  character(len=16), parameter :: switches(*) = [character(len=16) :: "--resume", "--check", "--quiet", "--force", &
-    "--help", "--version", "--print-defaults"]
-  character(len=16), parameter :: options(*) = [character(len=16) :: "--output", "--set", "--explain", switches]
+  character(len=17), parameter :: switches(*) = [character(len=17) :: "--resume", "--check", "--quiet", "--force", &
+    "--help", "--version", "--print-defaults", "--print-variables", "--print-input"]
+  character(len=17), parameter :: options(*) = [character(len=17) :: "--output", "--set", "--explain", switches]
   character(len=1), parameter :: eol = new_line("a")
 
 contains
@@ -118,12 +120,14 @@ contains
       call take_value(arguments, k, name, command%topic, error)
     case ("-h", "--help")
       command%question = "help"
-    case ("--version", "--print-defaults")
+    case ("--version", "--print-defaults", "--print-variables")
       command%question = name(3:)
     case ("--resume")
       command%resume = .true.
     case ("--check")
       command%check = .true.
+    case ("--print-input")
+      command%print_input = .true.
     case ("--quiet")
       command%quiet = .true.
     case ("--force")
@@ -193,6 +197,8 @@ contains
     case ("print-defaults")
       text = defaults_text()
       text = text(:len(text) - 1)
+    case ("print-variables")
+      text = variables_text()
     case default
       call explain(command%topic, text, error)
       if (allocated(error)) return
@@ -221,13 +227,13 @@ contains
       "                      run.seed=7, box.upper=2,2, species.projectile.mass=50;"//eol// &
       "                      the last one for a variable counts, an empty VALUE"//eol// &
       "                      restores the default"//eol// &
-      "  --resume            continue a stopped run; with a stop rule that is not met"//eol// &
-      "                      yet, also one that has finished"//eol// &
+      "  --resume            continue a stopped run, or a finished one to a later end"//eol// &
       "  --check             read and check everything, run nothing"//eol// &
-      "  --force             start over: delete FILE.part and the checkpoints of a run"//eol// &
-      "                      that did not finish; at the end, replace a finished FILE"//eol// &
+      "  --force             start over: replace FILE.part; at the end, a finished FILE"//eol// &
       "  --quiet             no progress, notes or warnings on stderr"//eol// &
       "  --print-defaults    an input file with every variable and its default"//eol// &
+      "  --print-variables   all about every variable, as JSON for other programs"//eol// &
+      "  --print-input       what the input and --set give, as JSON; run nothing"//eol// &
       "  --explain VARIABLE  meaning, range and default of a variable or a group"//eol// &
       "  --version           version, commit, compiler, flags and HDF5 version"//eol// &
       "  --                  the next argument is a file name, even with a leading -"//eol//eol// &

@@ -12,7 +12,7 @@ module namelist_input
   use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
   implicit none
   private
-  public :: read_settings
+  public :: read_groups, read_settings
 
   integer, parameter :: most_instances = 5000           !! of each of the repeated groups
   character(len=*), parameter :: eol = new_line("a")
@@ -36,6 +36,19 @@ contains
     type(settings_t), intent(out) :: settings
     type(parameter_group_t), allocatable, intent(out) :: groups(:)  !! every value as used
     type(problem_list_t), intent(out) :: problems
+    logical :: complete
+
+    call read_groups(text, overrides, groups, problems, complete)
+    if (complete) call resolve_settings(groups, settings, problems)
+  end subroutine read_settings
+
+  !> Reads the text and applies the overrides: every value as given, or its default.
+  subroutine read_groups(text, overrides, groups, problems, complete)
+    character(len=*), intent(in) :: text
+    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
+    type(parameter_group_t), allocatable, intent(out) :: groups(:)
+    type(problem_list_t), intent(out) :: problems
+    logical, intent(out) :: complete                                !! .false.: parts of the text were skipped
     type(reading_t) :: reading
     integer :: k
 
@@ -49,8 +62,8 @@ contains
     end do
     call put_in_order(reading, groups)
     problems = reading%problems
-    if (reading%complete) call resolve_settings(groups, settings, problems)
-  end subroutine read_settings
+    complete = reading%complete
+  end subroutine read_groups
 
   !> Adds the groups that exist once, and makes room for the others.
   subroutine open_reading(reading, most)
@@ -152,6 +165,7 @@ contains
     group = 0
     do while (.not. reading%problems%is_full())
       call scanner%next_statement(statement, reading%problems)
+      if (group > 0 .and. statement%kind /= setting) reading%groups(group)%last = scanner%closed
       select case (statement%kind)
       case (group_start)
         call enter_group(reading, statement, group)
@@ -186,6 +200,7 @@ contains
         call add_group(reading, name, line)
         group = reading%count
       end if
+      if (group > 0) reading%groups(group)%first = statement%first
     end associate
   end subroutine enter_group
 

@@ -31,6 +31,7 @@ module namelist_scanner
     integer :: line = 0                          !! > 0: of the file; else no part of it, see `parameter_value_t`
     character(len=:), allocatable :: name        !! of the group or variable, in lower case
     character(len=:), allocatable :: where       !! group.variable, for messages
+    integer :: first = 0                         !! its place in the text
     integer :: element = 0                       !! the 2 of name(2) = value; 0: none
     type(token_t), allocatable :: tokens(:)      !! values of a setting
     logical :: sound = .true.                    !! .false.: problems in it have been reported
@@ -41,6 +42,7 @@ module namelist_scanner
     integer :: at = 1                            !! the next character
     integer :: line = 1
     integer :: group_line = 0                    !! where the open group began
+    integer :: closed = 0                        !! where the last group ended, that had an end: its /
     logical :: in_group = .false.
     logical :: quote_open = .false.              !! in this group: its / may be part of a text
     logical :: lost = .false.                    !! text was skipped that could not be understood
@@ -65,6 +67,7 @@ contains
     do while (statement%kind == nothing)
       call self%skip_space()
       statement%line = self%line
+      statement%first = self%at
       if (self%at > len(self%text)) then
         if (self%in_group) call self%report_open_group(problems)
         statement%kind = end_of_text
@@ -120,6 +123,7 @@ contains
     select case (self%character_here())
     case ("/")
       self%in_group = .false.
+      self%closed = self%at
       self%at = self%at + 1
     case ("&")
       self%in_group = .false.

@@ -37,6 +37,7 @@ module parameter_values
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; else blank
     integer :: number = 0                      !! among the groups of its name, from 1
     integer :: line = 0                        !! of its first line in the file; 0: not in the file
+    integer :: first = 0, last = 0             !! its place in the text, from & to /
     type(parameter_value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of

@@ -8,7 +8,8 @@ module parameters
   use texts, only: joined, written
   implicit none
   private
-  public :: parameter_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of, full_names
+  public :: parameter_t, table, free_to_change, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
+  public :: full_names
   public :: track_of, words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37
@@ -255,7 +256,21 @@ module parameters
   type(parameter_t), parameter :: table(*) = [run_rows, box_rows, side_rows, obstacle_rows, wall_rows, &
     wall_law_rows, species_rows, contact_rows, drive_rows, stop_rows, output_rows]
 
+  !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
+  !> is written. They have no effect on the trajectory.
+  character(len=25), parameter :: free(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
+    "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
+
 contains
+
+  !> Whether a variable, or a line `variable = value` about one, may be another when a run goes on.
+  pure function free_to_change(line) result(yes)
+    character(len=*), intent(in) :: line
+    logical :: yes
+    integer :: k
+
+    yes = any([(index(line, trim(free(k))) == 1, k=1, size(free))])
+  end function free_to_change
 
   !> Whether a group may occur several times in a file, told apart by `name`.
   elemental function is_repeated(group)

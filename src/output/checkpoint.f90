@@ -16,6 +16,7 @@ module checkpoint
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
   use parameter_values, only: most_written, parameter_group_t
+  use parameters, only: free_to_change
   use progress, only: progress_t
   use run_files, only: is_file, unfinished
   use settings, only: run_input_t, settings_t
@@ -28,11 +29,6 @@ module checkpoint
   public :: make_checkpoints, put_checkpoint, read_checkpoint
 
   character(len=*), parameter :: eol = new_line("a"), current = checkpoint_group//"current"
-
-  !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
-  !> is written. They have no effect on the trajectory.
-  character(len=*), parameter :: free_to_change(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
-    "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
 
 contains
 
@@ -56,7 +52,7 @@ contains
       do k = 1, size(groups(g)%values)
         if (.not. groups(g)%values(k)%is_set()) cycle
         line = groups(g)%value_line(k)
-        if (.not. is_free(line)) call growing%add(line//eol)
+        if (.not. free_to_change(line)) call growing%add(line//eol)
       end do
     end do
     do g = 1, size(groups)
@@ -69,18 +65,6 @@ contains
     end do
     text = growing%text()
   end function fixed_input
-
-  !> Whether a line `variable = value` is of a variable that may change.
-  pure function is_free(line) result(yes)
-    character(len=*), intent(in) :: line
-    logical :: yes
-    integer :: k
-
-    yes = .false.
-    do k = 1, size(free_to_change)
-      yes = yes .or. index(line, trim(free_to_change(k))) == 1
-    end do
-  end function is_free
 
   !> Gives a new file its checkpoints: both are of the present state.
   subroutine make_checkpoints(file, groups, sim, progress)

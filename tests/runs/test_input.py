@@ -1,5 +1,6 @@
 """What the program makes of input files, good, bad and absurd, and of its command line."""
 
+import json
 import os
 import re
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import fuzz_input
 import pytest
+from ricochet.program import namelist
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
@@ -53,6 +55,105 @@ def test_the_reference_file_is_what_print_defaults_prints(ricochet):
     run = ricochet("--print-defaults")
     assert run.returncode == 0
     assert run.stdout == (ROOT / "input" / "reference.nml").read_text()
+
+
+def groups_of(ricochet, *words) -> list[dict]:
+    """What --print-input says."""
+    run = ricochet("--print-input", *words)
+    assert (run.returncode, run.stderr) == (0, "")
+    return json.loads(run.stdout)
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.name)
+def test_an_input_that_is_printed_written_and_read_again_is_the_same(ricochet, tmp_path, path):
+    groups = groups_of(ricochet, path)
+    data = path.read_bytes()
+    for group in groups:
+        own = data[group["from"] : group["to"]].decode()
+        assert own.startswith(f"&{group['group']}") and own.endswith("/")
+        (tmp_path / "one.nml").write_text(own)
+        (again,) = json.loads(ricochet("--print-input", "one.nml").stdout)
+        assert again["values"] == group["values"]
+    (tmp_path / "all.nml").write_text("".join(namelist({g["group"]: g["values"]}) for g in groups))
+    kept = ["group", "name", "values"]
+    assert [{key: group[key] for key in kept} for group in groups_of(ricochet, "all.nml")] == [
+        {key: group[key] for key in kept} for group in groups
+    ]
+
+
+def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path):
+    text = """\ufeff&RUN Title = 'an "odd" \\ one / it''s\t\u00f6' ! & no = 1\r
+    seed=9223372036854775807/ ! &box gravity = 1, 1 /\r
+    &box gravity(2) = -1.5d0, upper = 2*2 /
+    &species count = 5, radius = .05 speed = 1 /
+    &stop collisions = 9 / &output event_log = T /"""
+    (tmp_path / "odd.nml").write_text(text, newline="")
+    groups = groups_of(ricochet, "odd.nml", "--set", "run.threads=2", "--set", "contact.inertia=1")
+    assert [(group["group"], group["name"], group["values"]) for group in groups] == [
+        (
+            "run",
+            None,
+            {"title": 'an "odd" \\ one / it\'s\t\u00f6', "seed": 2**63 - 1, "threads": 2},
+        ),
+        ("box", None, {"upper": [2, 2], "gravity": [0, -1.5]}),
+        ("species", "species1", {"count": 5, "radius": 0.05, "speed": 1}),
+        ("stop", None, {"collisions": 9}),
+        ("output", None, {"event_log": True}),
+        ("contact", None, {"inertia": 1}),
+    ]
+    data = text.removeprefix("\ufeff").replace("\r\n", "\n").encode()
+    places = [(group["from"], group["to"]) for group in groups]
+    assert places[-1] == (None, None)
+    assert all(data[a : a + 1] + data[b - 1 : b] == b"&/" for a, b in places[:-1])
+
+
+def test_of_a_wrong_input_what_is_understood_is_printed(ricochet, tmp_path):
+    (tmp_path / "bad.nml").write_text(GOOD.replace("radius", "radios") + "&box upper = 0, 1 /\n")
+    run = ricochet("--print-input", "bad.nml")
+    assert run.returncode == USAGE
+    assert run.stderr == ricochet("bad.nml", "--check").stderr
+    assert json.loads(run.stdout)[0]["values"] == {"name": "gas", "count": 20, "speed": 1}
+
+
+def test_the_limits_that_are_printed_are_those_that_hold(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD + OBSTACLES + "&side name = 'top' /")
+    table = json.loads(ricochet("--print-variables").stdout)
+    tried = set()
+    for group, variables in table.items():
+        place = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
+        for name, row in variables.items():
+            for limit, value in row.items():
+                if limit not in ("above", "from", "below", "to") or value is None:
+                    continue
+                step = 1 if row["type"] == "integer" else 1e-6
+                for shift in (-step, 0, step):
+                    inside = shift > 0 if limit in ("above", "from") else shift < 0
+                    number = value + shift
+                    if row["type"] == "integer":
+                        number = round(number)
+                    words = ",".join([repr(number)] * (row["size"] or 1))
+                    variable = f"{group}{place.get(group, '')}.{name}={words}"
+                    said = ricochet("--print-input", "gas.nml", "--set", variable).stderr
+                    taken = "out of range" not in said
+                    assert taken == (inside or (shift == 0 and limit in ("from", "to"))), variable
+                    tried.add(limit)
+    assert tried == {"above", "from", "below", "to"}
+
+
+def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):
+    table = json.loads(ricochet("--print-variables").stdout)
+    files = {name: {} for name in table}
+    for group, variables in table.items():
+        for name, row in variables.items():
+            assert (row["default"] is None) != (row["example"] is None)
+            assert isinstance(row["default"], list) == (
+                row["default"] is not None and row["size"] != 1
+            )
+            if row["needed"] or (row["default"] is not None and not row["goes_with"]):
+                files[group][name] = row["example"] if row["default"] is None else row["default"]
+    (tmp_path / "all.nml").write_text(namelist(files))
+    for group in groups_of(ricochet, "all.nml"):
+        assert group["values"] == files[group["group"]]
 
 
 def test_the_readme_of_the_inputs_lists_every_file():

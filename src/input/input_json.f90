@@ -1,0 +1,182 @@
+!> JSON for other programs: the table of variables, and an input as the program has understood it.
+module input_json
+  use parameter_values, only: parameter_group_t, parameter_value_t
+  use parameters, only: allowed, free_to_change, group_names, is_repeated, largest, parameter_t, smallest, table, words_of
+  use texts, only: growing_text_t, written, written_exactly
+  implicit none
+  private
+  public :: groups_text, variables_text
+
+  character(len=1), parameter :: eol = new_line("a")
+
+contains
+
+  !> The table: an object for each group, and in it one for each variable.
+  pure function variables_text() result(text)
+    character(len=:), allocatable :: text, between
+    integer :: g, k
+
+    text = "{"
+    between = eol
+    do g = 1, size(group_names)
+      text = text//between//quoted(group_names(g))//": {"
+      between = eol
+      do k = 1, size(table)
+        if (table(k)%group /= group_names(g)) cycle
+        text = text//between//"  "//quoted(table(k)%name)//": {"//row_text(table(k))//"}"
+        between = ","//eol
+      end do
+      text = text//"}"
+    end do
+    text = text//eol//"}"
+  end function variables_text
+
+  !> A row of the table. Of a number `above` and `below` are excluded, `from` and `to` allowed.
+  pure function row_text(row) result(text)
+    type(parameter_t), intent(in) :: row
+    character(len=:), allocatable :: text, value
+    character(len=len(row%goes_with)) :: words(size(words_of(row%goes_with)))
+    logical :: has_default, positive
+    integer :: i
+
+    value = trim(row%value)
+    do i = 1, len(value)
+      if (value(i:i) == "'") value(i:i) = """"
+    end do
+    if (row%kind == "logical") value = value(2:len(value) - 1)
+    if (row%size /= 1) value = "["//value//"]"
+    has_default = row%status == "default" .or. row%status == "fallback"
+    words = words_of(row%goes_with)
+    associate (low => row%range%lower, high => row%range%upper)
+      positive = low > 0 .and. low <= smallest
+      text = """type"": "//quoted(row%kind)//member("size", .true., written(row%size))// &
+        member("default", has_default, value)//member("example", .not. has_default, value)// &
+        member("needed", .true., truth(row%status == "example"))// &
+        member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
+        member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
+    end associate
+    text = text//member("choices", row%choices /= "", list(words_of(row%choices)))// &
+      member("unit", row%unit /= "", quoted(row%unit))//member("help", .true., quoted(row%help))// &
+      member("allowed", .true., quoted(allowed(row)))//", ""goes_with"": {"
+    if (size(words) > 0) text = text//quoted(words(1))//": "//list(words(2:))
+    text = text//"}"//member("repeated", .true., truth(is_repeated(row%group)))// &
+      member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
+  end function row_text
+
+  !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
+  !> bytes of the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
+  pure function groups_text(groups) result(text)
+    type(parameter_group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
+    logical :: waiting(size(groups))
+    integer :: g, n
+
+    waiting = [(groups(g)%line > 0 .or. any(groups(g)%values%given), g=1, size(groups))]
+    do n = 1, count(waiting)
+      g = minloc(merge(groups%first, huge(g), groups%line > 0), dim=1, mask=waiting)
+      waiting(g) = .false.
+      call growing%add(trim(merge(",", " ", n > 1))//eol)
+      associate (group => groups(g), is_there => groups(g)%line > 0)
+        call growing%add("{""group"": "//quoted(group%name)//member("name", group%instance /= "", quoted(group%instance)) &
+          //member("from", is_there, written(group%first - 1))//member("to", is_there, written(group%last)) &
+          //", ""values"": "//values_text(group%values)//"}")
+      end associate
+    end do
+    text = "["//growing%text()//eol//"]"
+  end function groups_text
+
+  !> What is given in a group.
+  pure function values_text(values) result(text)
+    type(parameter_value_t), intent(in) :: values(:)
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(values)
+      if (values(k)%given .and. values(k)%is_set()) text = text//member(values(k)%name, .true., value_text(values(k)))
+    end do
+    text = "{"//text(min(3, len(text) + 1):)//"}"
+  end function values_text
+
+  !> A value, or a list of them.
+  pure function value_text(value) result(text)
+    type(parameter_value_t), intent(in) :: value
+    character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
+    integer :: k, n
+
+    n = 0
+    if (allocated(value%reals)) n = size(value%reals)
+    if (allocated(value%texts)) n = size(value%texts)
+    do k = 1, n
+      if (k > 1) call growing%add(", ")
+      select case (value%kind)
+      case ("real")
+        call growing%add(written_exactly(value%reals(k)))
+      case ("integer")
+        call growing%add(trim(value%texts(k)))
+      case ("logical")
+        call growing%add(truth(value%texts(k) == ".true."))
+      case default
+        call growing%add(quoted(value%texts(k)))
+      end select
+    end do
+    text = growing%text()
+    if (table(value%row)%size /= 1) text = "["//text//"]"
+  end function value_text
+
+  !> `, "name": value`, with null instead of a value that is not there.
+  pure function member(name, is_there, value) result(text)
+    character(len=*), intent(in) :: name, value
+    logical, intent(in) :: is_there
+    character(len=:), allocatable :: text
+
+    text = ", "//quoted(name)//": null"
+    if (is_there) text = text(:len(text) - 4)//value
+  end function member
+
+  !> A list of words.
+  pure function list(words) result(text)
+    character(len=*), intent(in) :: words(:)
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = "["
+    do k = 1, size(words)
+      if (k > 1) text = text//", "
+      text = text//quoted(words(k))
+    end do
+    text = text//"]"
+  end function list
+
+  !> A logical.
+  pure function truth(yes) result(word)
+    logical, intent(in) :: yes
+    character(len=:), allocatable :: word
+
+    word = trim(merge("true ", "false", yes))
+  end function truth
+
+  !> A text without trailing blanks, in quotes.
+  pure function quoted(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+    character(len=2) :: code
+    integer :: i
+
+    quoted = """"
+    do i = 1, len_trim(text)
+      write (code, "(z2.2)") iachar(text(i:i))
+      if (iachar(text(i:i)) < 32) then
+        quoted = quoted//"\u00"//code
+      else if (scan(text(i:i), """\") > 0) then
+        quoted = quoted//"\"//text(i:i)
+      else
+        quoted = quoted//text(i:i)
+      end if
+    end do
+    quoted = quoted//""""
+  end function quoted
+
+end module input_json
