@@ -202,25 +202,32 @@ ensemble() {
 
 # --- The gate ------------------------------------------------------------------------------------------
 
-# instructions DISKS PACKING: per collision, of the event loop alone: what starts and writes a run depends on the clock.
+# instructions PACKING [OPTION...]: per collision of 1000 disks, of the event loop alone: what starts and writes a run depends
+# on the clock.
 instructions() {
-  local collisions=100000
-  gas "$1" "$2"
+  local packing=$1 collisions=100000
+  shift
+  gas 1000 "$packing"
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=__event_driven_MOD_advance)
-  run "gas_$1_$2" "$collisions" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
+  run "gas_1000_$packing" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk -v collisions="$collisions" '/Collected/ { printf "%.0f\n", $4/collisions }' "$work/count"
 }
 
 check() {
-  local packing limit count verdict=0
-  while read -r packing limit; do
-    count=$(instructions 1000 "$packing")
-    printf 'packing %s: %s instructions per collision, at most %s\n' "$packing" "$count" "$limit"
+  local packing limit options count verdict=0
+  while read -r packing limit options; do
+    # shellcheck disable=SC2086 # several options, or none
+    count=$(instructions "$packing" $options)
+    printf 'packing %s%s: %s instructions per collision, at most %s\n' "$packing" "${options:+, ${options#--set }}" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
   done <<'LIMITS'
 0.5 2087
 0.7 2114
 0.1 3173
+0.5 2432 --set box.boundary=periodic,periodic
+0.1 3607 --set box.boundary=periodic,periodic
+0.5 2509 --set box.gravity=0,-1
+0.1 3717 --set box.gravity=0,-1
 LIMITS
   return $verdict
 }
