@@ -13,7 +13,7 @@ module run_setup
   use memory, only: room_for_domains
   use namelist_input, only: read_groups, read_settings
   use parallel_events, only: parallel_events_t
-  use parameter_values, only: parameter_group_t
+  use input_groups, only: group_t
   use renumbering, only: renumber
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
@@ -63,7 +63,7 @@ contains
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)
     type(settings_t), intent(out) :: settings
-    type(parameter_group_t), allocatable, intent(out) :: groups(:)
+    type(group_t), allocatable, intent(out) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
 

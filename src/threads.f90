@@ -3,7 +3,7 @@ module threads
   use kinds, only: int64
   use memory, only: room_for_domains
   use parallel_events, only: parallel_events_t
-  use parameters, only: most_threads
+  use variables, only: most_threads
   use settings, only: settings_t
   use system, only: cores_of_process
   use team, only: make_team

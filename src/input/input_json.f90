@@ -1,7 +1,7 @@
 !> JSON for other programs: the table of variables, and an input as the program has understood it.
 module input_json
-  use parameter_values, only: parameter_group_t, parameter_value_t
-  use parameters, only: allowed, free_to_change, group_names, is_repeated, largest, parameter_t, smallest, table, words_of
+  use input_groups, only: group_t, value_t
+  use variables, only: allowed, free_to_change, group_names, is_repeated, largest, variable_t, smallest, table, words_of
   use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
@@ -33,7 +33,7 @@ contains
 
   !> A row of the table. Of a number `above` and `below` are excluded, `from` and `to` allowed.
   pure function row_text(row) result(text)
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text, value
     character(len=len(row%goes_with)) :: words(size(words_of(row%goes_with)))
     logical :: has_default, positive
@@ -66,7 +66,7 @@ contains
   !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
   !> bytes of the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
   pure function groups_text(groups) result(text)
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
     logical :: waiting(size(groups))
@@ -88,7 +88,7 @@ contains
 
   !> What is given in a group.
   pure function values_text(values) result(text)
-    type(parameter_value_t), intent(in) :: values(:)
+    type(value_t), intent(in) :: values(:)
     character(len=:), allocatable :: text
     integer :: k
 
@@ -101,7 +101,7 @@ contains
 
   !> A value, or a list of them.
   pure function value_text(value) result(text)
-    type(parameter_value_t), intent(in) :: value
+    type(value_t), intent(in) :: value
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
     integer :: k, n

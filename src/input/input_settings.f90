@@ -8,8 +8,8 @@ module input_settings
   use input_surfaces, only: refuse_grip, take_grip, take_obstacles, take_wall_laws
   use input_problems, only: problem_list_t
   use input_species, only: take_species
-  use parameter_values, only: parameter_group_t, range_of
-  use parameters, only: obstacle_groups, row_of, track_of, variables_of, words_of
+  use input_groups, only: group_t, range_of
+  use variables, only: obstacle_groups, row_of, track_of, variables_of, words_of
   use settings, only: output_settings_t, run_settings_t, settings_t, species_settings_t
   use stop_rules, only: stop_settings_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
@@ -24,7 +24,7 @@ contains
   !> Fills the settings. Values that follow from others are also put back into the groups, so that
   !> these hold every value as it is used.
   subroutine resolve_settings(groups, settings, problems)
-    type(parameter_group_t), intent(inout) :: groups(:)   !! those of one name side by side
+    type(group_t), intent(inout) :: groups(:)   !! those of one name side by side
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
     type(wall_law_t) :: wall_law                          ! of `&contact`
@@ -52,7 +52,7 @@ contains
 
   !> Title, seed and method.
   subroutine take_run(group, run, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(run_settings_t), intent(out) :: run
     type(problem_list_t), intent(inout) :: problems
 
@@ -69,7 +69,7 @@ contains
 
   !> The box without its obstacles.
   subroutine take_box(group, box, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(box_t), intent(out) :: box
     type(problem_list_t), intent(inout) :: problems
     integer :: axis
@@ -89,7 +89,7 @@ contains
 
   !> What a sheared box cannot have beside its shear.
   subroutine check_shear(group, obstacles, settings, problems)
-    type(parameter_group_t), intent(in) :: group          !! &box
+    type(group_t), intent(in) :: group          !! &box
     character(len=*), intent(in) :: obstacles(:)          !! names of the groups that describe obstacles
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
@@ -116,7 +116,7 @@ contains
 
   !> Restitution by pair of species, and the rule for walls.
   subroutine take_contact(group, n, law, wall_law, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     integer, intent(in) :: n                              !! species
     type(contact_law_t), intent(out) :: law
     type(wall_law_t), intent(out) :: wall_law
@@ -164,7 +164,7 @@ contains
 
   !> What ends the run; at least one rule is needed.
   subroutine take_stop(group, stop_rules, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(stop_settings_t), intent(out) :: stop_rules
     type(problem_list_t), intent(inout) :: problems
 
@@ -180,7 +180,7 @@ contains
 
   !> What is written, and when.
   subroutine take_output(group, output)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(output_settings_t), intent(out) :: output
 
     output%frames_every_time = group%real_of("frames_every_time", never)
@@ -199,7 +199,7 @@ contains
 
   !> Frames and observables have one cadence each.
   subroutine check_cadences(group, problems)
-    type(parameter_group_t), intent(in) :: group          !! &output
+    type(group_t), intent(in) :: group          !! &output
     type(problem_list_t), intent(inout) :: problems
     integer :: j, k
 
@@ -215,7 +215,7 @@ contains
 
   !> A cadence in time, or a time step, must be coarse enough for the clock and for a sane number of samples.
   subroutine check_samples(group, settings, problems)
-    type(parameter_group_t), intent(in) :: group          !! &output
+    type(group_t), intent(in) :: group          !! &output
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
     character(len=*), parameter :: names(2) = [character(len=22) :: "frames_every_time", "observables_every_time"]
@@ -237,7 +237,7 @@ contains
 
   !> Kind and size of the kicks, and whom they reach.
   subroutine take_drive(group, species, drive, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     type(species_settings_t), intent(in) :: species(:)
     type(drive_t), intent(out) :: drive
     type(problem_list_t), intent(inout) :: problems
@@ -262,7 +262,7 @@ contains
   !> What cannot go together with kicks. Nothing tells when an energy that they change has fallen for good, and a number of
   !> kicks must be countable.
   subroutine check_drive(group, settings, problems)
-    type(parameter_group_t), intent(in) :: group          !! &drive
+    type(group_t), intent(in) :: group          !! &drive
     type(settings_t), intent(in) :: settings
     type(problem_list_t), intent(inout) :: problems
     real(real64), parameter :: most = 1.0e15_real64

@@ -6,8 +6,8 @@ module input_species
   use h5md_layout, only: beside_species
   use input_problems, only: problem_list_t
   use observables, only: own_names
-  use parameter_values, only: parameter_group_t
-  use parameters, only: largest, most_disks, row_of, smallest
+  use input_groups, only: group_t
+  use variables, only: largest, most_disks, row_of, smallest
   use settings, only: species_settings_t
   use texts, only: counted, digits, letters, place_of, shown, suggestion, written
   implicit none
@@ -18,7 +18,7 @@ contains
 
   !> Fills the settings of all species; derived values go back into the groups.
   subroutine take_species(groups, box, species, problems)
-    type(parameter_group_t), intent(inout) :: groups(:)   !! the species
+    type(group_t), intent(inout) :: groups(:)   !! the species
     type(box_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
@@ -56,7 +56,7 @@ contains
 
   !> A name must fit into file paths, override paths and messages, and be unique among its kind.
   subroutine check_name(groups, k, problems)
-    type(parameter_group_t), intent(in) :: groups(:)   !! all obstacles, or all species
+    type(group_t), intent(in) :: groups(:)   !! all obstacles, or all species
     integer, intent(in) :: k
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
@@ -76,7 +76,7 @@ contains
 
   !> Where the disks start, and how many there are.
   subroutine take_placement(group, box, s, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(box_t), intent(in) :: box
     type(species_settings_t), intent(inout) :: s
     type(problem_list_t), intent(inout) :: problems
@@ -102,7 +102,7 @@ contains
 
   !> How the disks move at the start.
   subroutine take_velocities(group, s, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
     type(problem_list_t), intent(inout) :: problems
 
@@ -124,7 +124,7 @@ contains
 
   !> x1, y1, x2, y2, ... as (2,n).
   subroutine take_pairs(group, name, pairs, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name
     real(real64), allocatable, intent(out) :: pairs(:, :)
     type(problem_list_t), intent(inout) :: problems
@@ -138,7 +138,7 @@ contains
 
   !> The number of disks, given or following from the grid or the list of positions. That in a file is counted later.
   subroutine take_count(group, s, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(inout) :: s
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: source
@@ -165,7 +165,7 @@ contains
 
   !> Masses and radii, multiplied along the chain of `relative_to`.
   subroutine resolve_sizes(groups, species, problems)
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
@@ -201,7 +201,7 @@ contains
 
   !> Finds the species that `relative_to` names; 0 if there is none.
   subroutine find_base(groups, k, base, problems)
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     integer, intent(in) :: k
     integer, intent(out) :: base
     type(problem_list_t), intent(inout) :: problems
@@ -217,7 +217,7 @@ contains
 
   !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
   subroutine own_radius(group, s, radius, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     real(real64), intent(out) :: radius
     type(problem_list_t), intent(inout) :: problems

@@ -6,8 +6,8 @@ module input_surfaces
   use input_problems, only: problem_list_t
   use input_species, only: check_name
   use kinds, only: real64
-  use parameter_values, only: parameter_group_t
-  use parameters, only: largest, table, words_of
+  use input_groups, only: group_t
+  use variables, only: largest, table, words_of
   use partners, only: n_sides, side_name
   use segments, only: new_segment
   use side_motion, only: motions, side_motion_t
@@ -20,7 +20,7 @@ contains
 
   !> Fills the list of obstacles; it is empty if one of them is incomplete.
   subroutine take_obstacles(groups, obstacles, problems)
-    type(parameter_group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
+    type(group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
     type(surface_t), allocatable, intent(out) :: obstacles(:)
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
@@ -46,7 +46,7 @@ contains
 
   !> The shape that a group describes.
   subroutine take_shape(group, obstacle)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(surface_t), intent(inout) :: obstacle
 
     select case (group%name)
@@ -60,8 +60,8 @@ contains
 
   !> The laws of all walls: their own where their groups give one, else that of `&contact`.
   subroutine take_wall_laws(sides, obstacles, law, box, problems)
-    type(parameter_group_t), intent(inout) :: sides(:)
-    type(parameter_group_t), intent(inout) :: obstacles(:)
+    type(group_t), intent(inout) :: sides(:)
+    type(group_t), intent(inout) :: obstacles(:)
     type(wall_law_t), intent(in) :: law                   !! of walls without one of their own
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
@@ -94,7 +94,7 @@ contains
 
   !> The law of one wall. Values that follow from `&contact` are put into its group.
   subroutine take_law(group, otherwise, law, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     type(wall_law_t), intent(in) :: otherwise
     type(wall_law_t), intent(out) :: law
     type(problem_list_t), intent(inout) :: problems
@@ -124,7 +124,7 @@ contains
 
   !> How a side moves.
   subroutine take_motion(group, motion, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     type(side_motion_t), intent(out) :: motion
     type(problem_list_t), intent(inout) :: problems
 
@@ -143,7 +143,7 @@ contains
 
   !> Sides must not meet, whenever each is how far inwards.
   subroutine check_room(group, box, axis, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(box_t), intent(in) :: box
     integer, intent(in) :: axis
     type(problem_list_t), intent(inout) :: problems
@@ -156,7 +156,7 @@ contains
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.
   subroutine take_grip(group, prefix, otherwise, grip, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix
     type(grip_t), intent(in) :: otherwise
     type(grip_t), intent(out) :: grip
@@ -170,7 +170,7 @@ contains
 
   !> A wall with the rule 'velocity' leaves rotation alone.
   subroutine refuse_grip(group, prefix, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     character(len=*), intent(in) :: prefix                !! as above
     type(problem_list_t), intent(inout) :: problems
     character(len=27) :: names(2)

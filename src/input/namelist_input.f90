@@ -4,10 +4,10 @@ module namelist_input
   use input_problems, only: problem_list_t
   use input_settings, only: resolve_settings
   use input_text, only: unix_lines
-  use input_values, only: store_values
+  use input_words, only: store_values
   use namelist_scanner, only: group_start, plain, scanner_t, setting, statement_t, token_t
-  use parameter_values, only: parameter_group_t, parameter_value_t
-  use parameters, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
+  use input_groups, only: group_t, value_t
+  use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   use settings, only: settings_t
   use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
   implicit none
@@ -22,7 +22,7 @@ module namelist_input
     integer :: count = 0
     integer :: instances(size(group_names)) = 0  !! of each group
     logical :: complete = .true.                 !! .false.: parts of the text were skipped
-    type(parameter_group_t), allocatable :: groups(:)
+    type(group_t), allocatable :: groups(:)
     type(problem_list_t) :: problems
   end type reading_t
 
@@ -34,7 +34,7 @@ contains
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
     type(settings_t), intent(out) :: settings
-    type(parameter_group_t), allocatable, intent(out) :: groups(:)  !! every value as used
+    type(group_t), allocatable, intent(out) :: groups(:)  !! every value as used
     type(problem_list_t), intent(out) :: problems
     logical :: complete
 
@@ -46,7 +46,7 @@ contains
   subroutine read_groups(text, overrides, groups, problems, complete)
     character(len=*), intent(in) :: text
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(parameter_group_t), allocatable, intent(out) :: groups(:)
+    type(group_t), allocatable, intent(out) :: groups(:)
     type(problem_list_t), intent(out) :: problems
     logical, intent(out) :: complete                                !! .false.: parts of the text were skipped
     type(reading_t) :: reading
@@ -80,7 +80,7 @@ contains
   !> The groups in the order of the table, those of one name side by side.
   pure subroutine put_in_order(reading, groups)
     type(reading_t), intent(in) :: reading
-    type(parameter_group_t), allocatable, intent(out) :: groups(:)
+    type(group_t), allocatable, intent(out) :: groups(:)
     integer :: j, k, n
 
     allocate (groups(reading%count))
@@ -119,11 +119,11 @@ contains
 
   !> Leaves a variable as if it were not in the file.
   subroutine reset(slot, problems)
-    type(parameter_value_t), intent(inout) :: slot
+    type(value_t), intent(inout) :: slot
     type(problem_list_t), intent(inout) :: problems
 
     associate (row => table(slot%row))
-      slot = parameter_value_t(row=slot%row, name=row%name, kind=row%kind)
+      slot = value_t(row=slot%row, name=row%name, kind=row%kind)
       if (row%status == "default" .or. row%status == "fallback") call assign_text(slot, trim(row%value), 0, problems)
       slot%given = .false.
     end associate
@@ -131,7 +131,7 @@ contains
 
   !> Stores a value that is not from the file: a default, or that of an override, where text needs no quotes.
   subroutine assign_text(slot, text, line, problems)
-    type(parameter_value_t), intent(inout) :: slot
+    type(value_t), intent(inout) :: slot
     character(len=*), intent(in) :: text
     integer, intent(in) :: line                           !! -k: override k; 0: a default
     type(problem_list_t), intent(inout) :: problems
@@ -206,7 +206,7 @@ contains
 
   !> Stores the values of one assignment.
   subroutine take_assignment(group, scanner, statement, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     type(scanner_t), intent(in) :: scanner
     type(statement_t), intent(in) :: statement
     type(problem_list_t), intent(inout) :: problems
@@ -243,7 +243,7 @@ contains
 
   !> Gives a name to an obstacle or species that has none.
   subroutine name_instance(group)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
 
     if (.not. is_repeated(group%name)) return
     if (group%text_of("name") == "") call group%put_text("name", trim(group%name)//written(group%number))
@@ -285,7 +285,7 @@ contains
 
   !> A cadence set by an override takes the place of that which the file has for the same samples.
   subroutine replace_cadence(group, name, problems)
-    type(parameter_group_t), intent(inout) :: group
+    type(group_t), intent(inout) :: group
     character(len=*), intent(in) :: name                  !! of the variable that is set
     type(problem_list_t), intent(inout) :: problems
     integer :: k

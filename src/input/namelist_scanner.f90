@@ -28,7 +28,7 @@ module namelist_scanner
 
   type :: statement_t
     integer :: kind = nothing                    !! group_start, setting or end_of_text
-    integer :: line = 0                          !! > 0: of the file; else no part of it, see `parameter_value_t`
+    integer :: line = 0                          !! > 0: of the file; else no part of it, see `value_t`
     character(len=:), allocatable :: name        !! of the group or variable, in lower case
     character(len=:), allocatable :: where       !! group.variable, for messages
     integer :: first = 0                         !! its place in the text

@@ -1,12 +1,12 @@
 !> The input as typed data: the file, its defaults and the overrides, with every value resolved.
-!> Meaning, range and unit of each variable are in `parameters`.
+!> Meaning, range and unit of each variable are in `variables`.
 module settings
   use kinds, only: int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
   use disks, only: species_t
   use drive, only: drive_t
-  use parameter_values, only: parameter_group_t
+  use input_groups, only: group_t
   use stop_rules, only: stop_settings_t
   use texts, only: text_t
   implicit none
@@ -81,7 +81,7 @@ module settings
   type :: run_input_t
     character(len=:), allocatable :: text                !! the input file as it is
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
-    type(parameter_group_t), allocatable :: groups(:)    !! every value as used
+    type(group_t), allocatable :: groups(:)    !! every value as used
     type(settings_t) :: settings                         !! the same as typed data
   end type run_input_t
 

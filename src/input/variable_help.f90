@@ -1,7 +1,7 @@
 !> What the program says of its variables: the reference file, and the answers to `--explain`.
 module variable_help
   use errors, only: error_t, exit_usage, fail
-  use parameters, only: allowed, group_names, name_length, parameter_t, table, wall_groups
+  use variables, only: allowed, group_names, name_length, variable_t, table, wall_groups
   use texts, only: lower_case, shown, suggestion
   implicit none
   private
@@ -40,7 +40,7 @@ contains
 
   !> A variable in the reference file; a choice has a second line that lists its words.
   pure function reference_line(row) result(line)
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
     character(len=:), allocatable :: indent
 
@@ -87,7 +87,7 @@ contains
 
   !> Name and unit of a variable, its meaning, what is allowed, and its default or an example.
   pure function explanation(row) result(text)
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
     character(len=*), parameter :: indent = new_line("a")//"    "
 

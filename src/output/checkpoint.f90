@@ -15,8 +15,8 @@ module checkpoint
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, provenance
   use hdf5_objects, only: hdf5_file_t, scalar
-  use parameter_values, only: most_written, parameter_group_t
-  use parameters, only: free_to_change
+  use input_groups, only: most_written, group_t
+  use variables, only: free_to_change
   use progress, only: progress_t
   use run_files, only: is_file, unfinished
   use settings, only: run_input_t, settings_t
@@ -43,7 +43,7 @@ contains
 
   !> The input as it was used, without what is free to change: one variable to a line.
   pure function fixed_input(groups) result(text)
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text, line
     type(growing_text_t) :: growing
     integer :: k, g
@@ -69,7 +69,7 @@ contains
   !> Gives a new file its checkpoints: both are of the present state.
   subroutine make_checkpoints(file, groups, sim, progress)
     type(hdf5_file_t), intent(inout) :: file
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     type(simulation_t), intent(inout) :: sim      !! stays as it is
     type(progress_t), intent(in) :: progress
     integer :: slot
@@ -188,7 +188,7 @@ contains
   !> Refuses the checkpoint of another program or another input.
   subroutine check_origin(file, groups, error)
     type(component_file_t), intent(inout) :: file
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: there, here
     integer :: k

@@ -10,8 +10,8 @@ module run_description
     parameters_group, provenance, species_counts, species_names
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
-  use parameter_values, only: parameter_group_t, parameter_value_t, range_of
-  use parameters, only: is_repeated, obstacle_groups, table
+  use input_groups, only: group_t, value_t, range_of
+  use variables, only: is_repeated, obstacle_groups, table
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: host_name
@@ -167,7 +167,7 @@ contains
   subroutine describe_value(file, group, value)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
-    type(parameter_value_t), intent(in) :: value
+    type(value_t), intent(in) :: value
     integer, allocatable :: extents(:)
     character(len=:), allocatable :: name
 
@@ -216,7 +216,7 @@ contains
   !> flag with the name of the second.
   subroutine describe_table(file, groups)
     type(hdf5_file_t), intent(inout) :: file
-    type(parameter_group_t), intent(in) :: groups(:)
+    type(group_t), intent(in) :: groups(:)
     character(len=64) :: texts(size(groups))
     character(len=:), allocatable :: path, second
     real(real64), allocatable :: values(:)

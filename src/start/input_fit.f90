@@ -8,8 +8,8 @@ module input_fit
   use input_problems, only: problem_list_t
   use known_places, only: add_known, misfit_t, misfit_text, rounding
   use packing, only: packing_t
-  use parameters, only: obstacle_groups
-  use parameter_values, only: parameter_group_t, range_of
+  use variables, only: obstacle_groups
+  use input_groups, only: group_t, range_of
   use position_file, only: angle_row, column_names, radius_row, spin_row
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
@@ -27,7 +27,7 @@ contains
   !> Checks every species that is known well enough; the others have been reported already.
   subroutine check_fit(settings, groups, problems)
     type(settings_t), intent(inout) :: settings               !! empty if the text could not be understood
-    type(parameter_group_t), intent(inout) :: groups(:)
+    type(group_t), intent(inout) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     type(species_settings_t), allocatable :: species(:)
     logical :: sound, alone
@@ -61,7 +61,7 @@ contains
   !> Takes from their files whether disks turn, how many disks species have, and how large they are, where the input leaves
   !> that to the file.
   subroutine survey_files(groups, species, box, problems)
-    type(parameter_group_t), intent(inout) :: groups(:)       !! the species
+    type(group_t), intent(inout) :: groups(:)       !! the species
     type(species_settings_t), intent(inout) :: species(:)
     type(box_t), intent(in) :: box
     type(problem_list_t), intent(inout) :: problems
@@ -103,7 +103,7 @@ contains
 
   !> What an obstacle itself finds wrong with its place in the box.
   subroutine check_obstacle(group, obstacle, box, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(surface_t), intent(in) :: obstacle
     type(box_t), intent(in) :: box
     type(problem_list_t), intent(inout) :: problems
@@ -119,7 +119,7 @@ contains
 
   !> A species must have room: in its region, in a period, and in every container.
   subroutine check_species(group, s, box, alone, problems, sound)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
     logical, intent(in) :: alone                              !! there is one disk in all
@@ -145,7 +145,7 @@ contains
   !> Along each axis the region must lie in the box and hold a disk; a period must be longer than two, so that no disk
   !> touches two images of another at once.
   subroutine check_axis(group, s, box, axis, alone, problems, sound)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
     integer, intent(in) :: axis
@@ -189,7 +189,7 @@ contains
 
   !> No placement of equal disks can exceed its densest packing.
   subroutine check_fraction(group, s, problems)
-    type(parameter_group_t), intent(in) :: group
+    type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(problem_list_t), intent(inout) :: problems
     real(real64) :: packing
@@ -209,7 +209,7 @@ contains
 
   !> Explicit disks must be in their regions, clear of obstacles and of each other.
   subroutine check_positions(groups, species, box, problems)
-    type(parameter_group_t), intent(in) :: groups(:)          !! the species
+    type(group_t), intent(in) :: groups(:)          !! the species
     type(species_settings_t), intent(in) :: species(:)        !! those without count are left out
     type(box_t), intent(in) :: box
     type(problem_list_t), intent(inout) :: problems

@@ -7,7 +7,7 @@ module last_frame
     position, species_names, value_of, velocity
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
-  use parameters, only: largest, most_disks, smallest
+  use variables, only: largest, most_disks, smallest
   use position_file, only: mass_row, radius_row, spin_row
   use texts, only: counted, joined, written
   implicit none

@@ -4,7 +4,7 @@ module position_file
   use kinds, only: int64, real64
   use errors, only: error_t, exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
-  use input_values, only: read_real
+  use input_words, only: read_real
   use system, only: opening_problem
   use texts, only: counted, joined, lower_case, place_of, shown, suggestion, written
   implicit none

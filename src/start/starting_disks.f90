@@ -7,7 +7,7 @@ module starting_disks
   use disks, only: names_of
   use errors, only: error_t, exit_usage, fail
   use last_frame, only: datasets, is_run, read_last_frame
-  use parameters, only: largest, smallest
+  use variables, only: largest, smallest
   use position_file, only: column_names, mass_row, radius_row, read_positions, spin_row
   use settings, only: species_settings_t
   use texts, only: counted, written

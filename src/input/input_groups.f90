@@ -1,20 +1,20 @@
 !> The values of the input variables as a run uses them, by group and name.
 !> The output file lists them all from here; `settings` has them as typed data.
-module parameter_values
+module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use parameters, only: allowed, either, name_length, row_of, table, words_of
+  use variables, only: allowed, either, name_length, row_of, table, words_of
   use texts, only: written, written_exactly
   implicit none
   private
-  public :: parameter_value_t, parameter_group_t, text_length, range_of
+  public :: value_t, group_t, text_length, range_of
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! values of a variable in an assignment: longer lists are cut
 
   !> One variable. Numbers with a fraction are reals; everything else is kept as texts: integers as
   !> digits, so that 64 bits fit, logicals as `.true.` or `.false.`. Neither is allocated without a value.
-  type :: parameter_value_t
+  type :: value_t
     integer :: row = 0                         !! of the table
     character(len=name_length) :: name = ""
     character(len=8) :: kind = ""              !! "integer", "real", "logical" or "text"
@@ -28,17 +28,17 @@ module parameter_values
     procedure :: is_set
     procedure :: integers
     procedure :: clear
-  end type parameter_value_t
+  end type value_t
 
   !> One group of the input; of a repeated group, one instance. The functions give the value of a
   !> variable, or `otherwise` if it has none.
-  type :: parameter_group_t
+  type :: group_t
     character(len=8) :: name = ""
     character(len=text_length) :: instance = ""  !! `name` of an obstacle or species; else blank
     integer :: number = 0                      !! among the groups of its name, from 1
     integer :: line = 0                        !! of its first line in the file; 0: not in the file
     integer :: first = 0, last = 0             !! its place in the text, from & to /
-    type(parameter_value_t), allocatable :: values(:)
+    type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
     procedure :: given, faulty, line_of
@@ -46,13 +46,13 @@ module parameter_values
     procedure :: complain, demand, refuse
     procedure :: infer_choices, check_choices
     procedure :: value_line
-  end type parameter_group_t
+  end type group_t
 
 contains
 
   !> Whether the variable has a value.
   pure function is_set(self)
-    class(parameter_value_t), intent(in) :: self
+    class(value_t), intent(in) :: self
     logical :: is_set
 
     is_set = allocated(self%reals) .or. allocated(self%texts)
@@ -60,7 +60,7 @@ contains
 
   !> The values of a variable of kind "integer".
   pure function integers(self) result(numbers)
-    class(parameter_value_t), intent(in) :: self
+    class(value_t), intent(in) :: self
     integer(int64), allocatable :: numbers(:)
 
     if (.not. allocated(self%texts)) then
@@ -73,7 +73,7 @@ contains
 
   !> Takes the value away.
   pure subroutine clear(self)
-    class(parameter_value_t), intent(inout) :: self
+    class(value_t), intent(inout) :: self
 
     if (allocated(self%reals)) deallocate (self%reals)
     if (allocated(self%texts)) deallocate (self%texts)
@@ -81,7 +81,7 @@ contains
 
   !> The first value of a variable of kind "integer".
   pure function integer_of(self, name, otherwise) result(number)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     integer(int64), intent(in) :: otherwise
     integer(int64) :: number
@@ -94,7 +94,7 @@ contains
 
   !> All values of a variable of kind "real"; none if it has no value.
   pure function reals_of(self, name) result(numbers)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     real(real64), allocatable :: numbers(:)
 
@@ -109,7 +109,7 @@ contains
 
   !> The first value of a variable of kind "real".
   pure function real_of(self, name, otherwise) result(number)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: otherwise
     real(real64) :: number
@@ -122,7 +122,7 @@ contains
 
   !> The first value of a variable of any kind but "real"; empty if it has none.
   pure function text_of(self, name) result(text)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: text
 
@@ -134,7 +134,7 @@ contains
 
   !> Whether the user has set a variable.
   pure function given(self, name)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     logical :: given
 
@@ -143,7 +143,7 @@ contains
 
   !> Whether a variable is set to something that has been reported as wrong.
   pure function faulty(self, name)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     logical :: faulty
 
@@ -152,7 +152,7 @@ contains
 
   !> Where a variable is set; if it is not, where its group begins.
   pure function line_of(self, name) result(line)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     integer :: line
 
@@ -162,7 +162,7 @@ contains
 
   !> Gives a variable a single value that follows from others.
   pure subroutine put_text(self, name, text)
-    class(parameter_group_t), intent(inout) :: self
+    class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: text
 
@@ -175,7 +175,7 @@ contains
 
   !> Gives a variable values that follow from others.
   pure subroutine put_reals(self, name, numbers)
-    class(parameter_group_t), intent(inout) :: self
+    class(group_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     real(real64), intent(in) :: numbers(:)
 
@@ -184,7 +184,7 @@ contains
 
   !> Reports what is wrong with a variable, where it is set.
   pure subroutine complain(self, name, what, problems)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: what       !! what is wrong, what is allowed
     type(problem_list_t), intent(inout) :: problems
@@ -194,7 +194,7 @@ contains
 
   !> Reports a variable that has to be given and is not.
   pure subroutine demand(self, name, problems)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     type(problem_list_t), intent(inout) :: problems
 
@@ -205,7 +205,7 @@ contains
 
   !> Reports those of some variables that the user has set.
   pure subroutine refuse(self, names, why, problems)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     character(len=*), intent(in) :: names(:)
     character(len=*), intent(in) :: why
     type(problem_list_t), intent(inout) :: problems
@@ -218,7 +218,7 @@ contains
 
   !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
   pure subroutine infer_choices(self)
-    class(parameter_group_t), intent(inout) :: self
+    class(group_t), intent(inout) :: self
     character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
     integer :: k
 
@@ -232,7 +232,7 @@ contains
   !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given,
   !> that is a mistake: nothing is ignored silently.
   pure subroutine check_choices(self, problems)
-    class(parameter_group_t), intent(inout) :: self
+    class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
     character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
     character(len=len(table%goes_with)) :: word
@@ -257,7 +257,7 @@ contains
 
   !> First and last of the groups of some names; if there are none, the last comes before the first.
   pure function range_of(groups, names) result(range)
-    type(parameter_group_t), intent(in) :: groups(:)   !! in the order of the table
+    type(group_t), intent(in) :: groups(:)   !! in the order of the table
     character(len=*), intent(in) :: names(:)           !! neighbours in the table
     integer :: range(2), k
     logical :: named(size(groups))
@@ -269,7 +269,7 @@ contains
 
   !> What gives a variable its value: `species.bed.radius = 0.005`.
   pure function value_line(self, k) result(text)
-    class(parameter_group_t), intent(in) :: self
+    class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! its place in the group
     character(len=:), allocatable :: text
 
@@ -280,7 +280,7 @@ contains
 
   !> The values of a variable as they would be written in a file.
   pure function value_text(value) result(text)
-    type(parameter_value_t), intent(in) :: value
+    type(value_t), intent(in) :: value
     character(len=:), allocatable :: text
     integer :: k, n
 
@@ -315,4 +315,4 @@ contains
     quoted = quoted//"'"
   end function quoted
 
-end module parameter_values
+end module input_groups

@@ -1,6 +1,6 @@
 !> The one table of input variables. It drives reading, checking, `--print-defaults`, `--explain`,
 !> `/parameters` in the output file and the reference page.
-module parameters
+module variables
   use kinds, only: real64
   use collisions, only: wall_rules
   use drive, only: drive_kinds
@@ -8,7 +8,7 @@ module parameters
   use texts, only: joined, written
   implicit none
   private
-  public :: parameter_t, table, free_to_change, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
+  public :: variable_t, table, free_to_change, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
   public :: full_names
   public :: track_of, words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
@@ -39,7 +39,7 @@ module parameters
   type(range_t), parameter :: moment = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")
 
-  type :: parameter_t
+  type :: variable_t
     character(len=8) :: group
     character(len=name_length) :: name
     character(len=8) :: kind                 !! "integer", "real", "logical" or "text"
@@ -51,7 +51,7 @@ module parameters
     character(len=16) :: unit = ""
     character(len=100) :: choices = ""        !! of texts, separated by blanks; none: free text
     character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
-  end type parameter_t
+  end type variable_t
 
   ! status     value                           line in the reference file
   ! default    the default                     as it is
@@ -62,198 +62,198 @@ module parameters
   character(len=8), parameter :: group_names(10) = [character(len=8) :: &
     "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
 
-  type(parameter_t), parameter :: run_rows(*) = [ &
-    parameter_t("run", "title", "text", 1, "default", "''", "one line that describes the run"), &
-    parameter_t("run", "seed", "integer", 1, "default", "1", &
+  type(variable_t), parameter :: run_rows(*) = [ &
+    variable_t("run", "title", "text", 1, "default", "''", "one line that describes the run"), &
+    variable_t("run", "seed", "integer", 1, "default", "1", &
       "seed of the random numbers: the same seed gives the same run", not_negative), &
-    parameter_t("run", "dynamics", "text", 1, "default", "'events'", &
+    variable_t("run", "dynamics", "text", 1, "default", "'events'", &
       "exact flight from collision to collision, or fixed time steps", choices="events steps"), &
-    parameter_t("run", "dt", "real", 1, "optional", "0.001", &
+    variable_t("run", "dt", "real", 1, "optional", "0.001", &
       "time step; needed with dynamics = 'steps'", positive, "time"), &
-    parameter_t("run", "search", "text", 1, "default", "'cells'", &
+    variable_t("run", "search", "text", 1, "default", "'cells'", &
       "cost per collision O(1), O(N) or O(N**2); same trajectory", choices="cells pairs rescan"), &
-    parameter_t("run", "queue", "text", 1, "default", "'calendar'", "event queue; same trajectory", &
+    variable_t("run", "queue", "text", 1, "default", "'calendar'", "event queue; same trajectory", &
       choices="calendar heap"), &
-    parameter_t("run", "threads", "integer", 1, "default", "0", &
+    variable_t("run", "threads", "integer", 1, "default", "0", &
       "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", number_of_threads)]
 
-  type(parameter_t), parameter :: box_rows(*) = [ &
-    parameter_t("box", "lower", "real", 2, "default", "0, 0", "lower left corner", unit="length"), &
-    parameter_t("box", "upper", "real", 2, "default", "1, 1", "upper right corner", unit="length"), &
-    parameter_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
+  type(variable_t), parameter :: box_rows(*) = [ &
+    variable_t("box", "lower", "real", 2, "default", "0, 0", "lower left corner", unit="length"), &
+    variable_t("box", "upper", "real", 2, "default", "1, 1", "upper right corner", unit="length"), &
+    variable_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
       "the two sides along x, the two sides along y", choices="wall periodic"), &
-    parameter_t("box", "gravity", "real", 2, "default", "0, 0", "uniform acceleration of all disks", &
+    variable_t("box", "gravity", "real", 2, "default", "0, 0", "uniform acceleration of all disks", &
       unit="length/time**2"), &
-    parameter_t("box", "shear_rate", "real", 1, "default", "0", &
+    variable_t("box", "shear_rate", "real", 1, "default", "0", &
       "gradient along y of the velocity along x; both axes periodic (Lees and Edwards)", unit="1/time")]
 
-  type(parameter_t), parameter :: side_rows(*) = [ &
-    parameter_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
+  type(variable_t), parameter :: side_rows(*) = [ &
+    variable_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
       choices="left right bottom top"), &
-    parameter_t("side", "motion", "text", 1, "default", "'still'", &
+    variable_t("side", "motion", "text", 1, "default", "'still'", &
       "how it moves about its place in time; sawtooth: it stays and strikes", choices=motions), &
-    parameter_t("side", "amplitude", "real", 1, "optional", "0.05", "how far it moves from its place", positive, &
+    variable_t("side", "amplitude", "real", 1, "optional", "0.05", "how far it moves from its place", positive, &
       "length", goes_with="motion sine parabolic"), &
-    parameter_t("side", "period", "real", 1, "optional", "1", "of the motion", positive, "time", &
+    variable_t("side", "period", "real", 1, "optional", "1", "of the motion", positive, "time", &
       goes_with="motion sine parabolic"), &
-    parameter_t("side", "phase", "real", 1, "fallback", "0", &
+    variable_t("side", "phase", "real", 1, "fallback", "0", &
       "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
-    parameter_t("side", "velocity", "real", 1, "optional", "1", "with which it strikes, inwards", positive, &
+    variable_t("side", "velocity", "real", 1, "optional", "1", "with which it strikes, inwards", positive, &
       "length/time", goes_with="motion sawtooth")]
 
-  type(parameter_t), parameter :: obstacle_rows(*) = [ &
-    parameter_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &
-    parameter_t("obstacle", "centre", "real", 2, "example", "0.5, 0.5", "centre of the circular wall", unit="length"), &
-    parameter_t("obstacle", "radius", "real", 1, "example", "0.2", "radius of the circular wall", positive, "length"), &
-    parameter_t("obstacle", "side", "text", 1, "default", "'outside'", &
+  type(variable_t), parameter :: obstacle_rows(*) = [ &
+    variable_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &
+    variable_t("obstacle", "centre", "real", 2, "example", "0.5, 0.5", "centre of the circular wall", unit="length"), &
+    variable_t("obstacle", "radius", "real", 1, "example", "0.2", "radius of the circular wall", positive, "length"), &
+    variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
       "disks bounce off the outside, or are kept inside", choices="outside inside")]
 
-  type(parameter_t), parameter :: wall_rows(*) = [ &
-    parameter_t("wall", "name", "text", 1, "optional", "'ramp'", "name; default wall1, wall2, ..."), &
-    parameter_t("wall", "from", "real", 2, "example", "0.2, 0.3", "one end of the straight wall", unit="length"), &
-    parameter_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length")]
+  type(variable_t), parameter :: wall_rows(*) = [ &
+    variable_t("wall", "name", "text", 1, "optional", "'ramp'", "name; default wall1, wall2, ..."), &
+    variable_t("wall", "from", "real", 2, "example", "0.2, 0.3", "one end of the straight wall", unit="length"), &
+    variable_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length")]
 
   !> The law of a wall, in the group of each.
-  type(parameter_t), parameter :: law_rows(*) = [ &
-    parameter_t("", "restitution", "real", 1, "optional", "0.9", &
+  type(variable_t), parameter :: law_rows(*) = [ &
+    variable_t("", "restitution", "real", 1, "optional", "0.9", &
       "of a disk and this wall; default contact.wall_restitution", unit_interval), &
-    parameter_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules), &
-    parameter_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
+    variable_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules), &
+    variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
       "of a rough wall; default contact.wall_tangential_restitution", tangential), &
-    parameter_t("", "friction", "real", 1, "optional", "0.3", "Coulomb's coefficient; default contact.wall_friction", &
+    variable_t("", "friction", "real", 1, "optional", "0.3", "Coulomb's coefficient; default contact.wall_friction", &
       not_negative), &
-    parameter_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
+    variable_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
       positive, "energy"), &
-    parameter_t("", "speed", "real", 1, "fallback", "0", &
+    variable_t("", "speed", "real", 1, "fallback", "0", &
       "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time")]
   integer, private :: g, r
-  type(parameter_t), parameter :: wall_law_rows(*) = [((parameter_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
+  type(variable_t), parameter :: wall_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
     law_rows(r)%size, law_rows(r)%status, law_rows(r)%value, law_rows(r)%help, law_rows(r)%range, law_rows(r)%unit, &
     law_rows(r)%choices, law_rows(r)%goes_with), r=1, size(law_rows)), g=1, size(wall_groups))]
 
-  type(parameter_t), parameter :: species_rows(*) = [ &
-    parameter_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
-    parameter_t("species", "count", "integer", 1, "example", "100", &
+  type(variable_t), parameter :: species_rows(*) = [ &
+    variable_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
+    variable_t("species", "count", "integer", 1, "example", "100", &
       "number of disks; may be left out with grid, position or file", count_of_disks), &
-    parameter_t("species", "mass", "real", 1, "default", "1", "mass of a disk; may be left to file", positive, "mass"), &
-    parameter_t("species", "radius", "real", 1, "example", "0.01", &
+    variable_t("species", "mass", "real", 1, "default", "1", "mass of a disk; may be left to file", positive, "mass"), &
+    variable_t("species", "radius", "real", 1, "example", "0.01", &
       "radius of a disk; give it or packing_fraction, or leave it to file", positive, "length"), &
-    parameter_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
+    variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
       "area of the disks divided by the area of their region; fixes the radius", fraction), &
-    parameter_t("species", "relative_to", "text", 1, "optional", "'bed'", &
+    variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "another species; mass and radius are then multiples of its own (radius: 1)"), &
-    parameter_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
+    variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
       "xlo, xhi, ylo, yhi of the part of the box it starts in; default the box", unit="length"), &
-    parameter_t("species", "placement", "text", 1, "default", "'random'", &
+    variable_t("species", "placement", "text", 1, "default", "'random'", &
       "where disks start; follows from grid, position or file if one is given", &
       choices="random grid lattice dense explicit file grown"), &
-    parameter_t("species", "grid", "integer", 2, "optional", "10, 10", &
+    variable_t("species", "grid", "integer", 2, "optional", "10, 10", &
       "columns and rows of placement = 'grid'", count_of_disks, goes_with="placement grid"), &
-    parameter_t("species", "file", "text", 1, "optional", "'runs/gas.h5'", &
+    variable_t("species", "file", "text", 1, "optional", "'runs/gas.h5'", &
       "text with lines x y [vx vy] or named columns, or a run whose last frame is used", goes_with="placement file grown"), &
-    parameter_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
+    variable_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
       "stretch the positions in the file of a run from its box to this one", goes_with="placement file grown"), &
-    parameter_t("species", "position", "real", 0, "optional", "0.2, 0.5, 0.8, 0.5", &
+    variable_t("species", "position", "real", 0, "optional", "0.2, 0.5, 0.8, 0.5", &
       "x1, y1, x2, y2, ... of placement = 'explicit'", unit="length", goes_with="placement explicit"), &
-    parameter_t("species", "velocities", "text", 1, "default", "'rest'", &
+    variable_t("species", "velocities", "text", 1, "default", "'rest'", &
       "how disks start; follows from velocity, speed, temperature or file", &
       choices="rest equal_speed uniform maxwell explicit file"), &
-    parameter_t("species", "speed", "real", 1, "fallback", "1", &
+    variable_t("species", "speed", "real", 1, "fallback", "1", &
       "of 'equal_speed'; for 'uniform' the largest |vx| and |vy|", not_negative, "length/time", &
       goes_with="velocities equal_speed uniform"), &
-    parameter_t("species", "temperature", "real", 1, "fallback", "1", "kT of 'maxwell'", not_negative, "energy", &
+    variable_t("species", "temperature", "real", 1, "fallback", "1", "kT of 'maxwell'", not_negative, "energy", &
       goes_with="velocities maxwell"), &
-    parameter_t("species", "exact_temperature", "real", 1, "optional", "1", &
+    variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
       "scale the velocities so that kT of the species is exactly this", not_negative, "energy"), &
-    parameter_t("species", "velocity", "real", 0, "optional", "1, 0", &
+    variable_t("species", "velocity", "real", 0, "optional", "1, 0", &
       "vx1, vy1, vx2, vy2, ... of 'explicit'; one pair is used for all disks", unit="length/time", &
       goes_with="velocities explicit"), &
-    parameter_t("species", "angular_velocity", "real", 1, "optional", "2", "of all disks at the start", unit="1/time"), &
-    parameter_t("species", "rotational_temperature", "real", 1, "optional", "1", &
+    variable_t("species", "angular_velocity", "real", 1, "optional", "2", "of all disks at the start", unit="1/time"), &
+    variable_t("species", "rotational_temperature", "real", 1, "optional", "1", &
       "mean of I omega**2 at the start, instead of angular_velocity", not_negative, "energy")]
 
-  type(parameter_t), parameter :: contact_rows(*) = [ &
-    parameter_t("contact", "restitution", "real", 1, "default", "1", &
+  type(variable_t), parameter :: contact_rows(*) = [ &
+    variable_t("contact", "restitution", "real", 1, "default", "1", &
       "of two disks: 1 elastic, 0 no rebound", unit_interval), &
-    parameter_t("contact", "wall_restitution", "real", 1, "optional", "1", &
+    variable_t("contact", "wall_restitution", "real", 1, "optional", "1", &
       "of a disk and a wall; default as restitution", unit_interval), &
-    parameter_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
+    variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
       "walls reduce the whole velocity, or its normal part only", choices=wall_rules), &
-    parameter_t("contact", "contact_time", "real", 1, "default", "0", &
+    variable_t("contact", "contact_time", "real", 1, "default", "0", &
       "TC model: elastic if a partner collided less than this ago; 0 off", not_negative, "time"), &
-    parameter_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
+    variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
       "of rough disks: -1 smooth, 0 the slip ends, 1 it is reversed", tangential), &
-    parameter_t("contact", "friction", "real", 1, "optional", "0.3", &
+    variable_t("contact", "friction", "real", 1, "optional", "0.3", &
       "Coulomb's coefficient; default: the tangential force has no limit", not_negative), &
-    parameter_t("contact", "inertia", "real", 1, "default", "0.5", &
+    variable_t("contact", "inertia", "real", 1, "default", "0.5", &
       "moment of inertia of a disk over mass times radius squared", moment), &
-    parameter_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
+    variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
       "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential), &
-    parameter_t("contact", "wall_friction", "real", 1, "optional", "0.3", "of the same; default as friction", &
+    variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", "of the same; default as friction", &
       not_negative), &
-    parameter_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
+    variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
       "for species 1-1, 1-2, ..., 2-1, 2-2, ...; instead of restitution", unit_interval)]
 
-  type(parameter_t), parameter :: drive_rows(*) = [ &
-    parameter_t("drive", "kind", "text", 1, "default", "'none'", &
+  type(variable_t), parameter :: drive_rows(*) = [ &
+    variable_t("drive", "kind", "text", 1, "default", "'none'", &
       "kicks: random changes of velocity, a heat bath, Brownian or active disks", choices=drive_kinds), &
-    parameter_t("drive", "interval", "real", 1, "optional", "0.01", "time from kick to kick", positive, "time", &
+    variable_t("drive", "interval", "real", 1, "optional", "0.01", "time from kick to kick", positive, "time", &
       goes_with="kind noise andersen brownian active"), &
-    parameter_t("drive", "strength", "real", 1, "optional", "0.1", &
+    variable_t("drive", "strength", "real", 1, "optional", "0.1", &
       "growth of the variance of each component of all velocities", positive, "velocity**2/time", goes_with="kind noise"), &
-    parameter_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
+    variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
       "subtract the mean velocity that each kick gives", goes_with="kind noise"), &
-    parameter_t("drive", "fraction", "real", 1, "optional", "0.1", &
+    variable_t("drive", "fraction", "real", 1, "optional", "0.1", &
       "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen"), &
-    parameter_t("drive", "temperature", "real", 1, "optional", "1", "kT of the new velocities", positive, "energy", &
+    variable_t("drive", "temperature", "real", 1, "optional", "1", "kT of the new velocities", positive, "energy", &
       goes_with="kind andersen brownian active"), &
-    parameter_t("drive", "speed", "real", 1, "optional", "1", "added along the orientation of a disk", &
+    variable_t("drive", "speed", "real", 1, "optional", "1", "added along the orientation of a disk", &
       not_negative, "length/time", goes_with="kind active"), &
-    parameter_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
+    variable_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
       "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active"), &
-    parameter_t("drive", "species", "text", 1, "fallback", "''", "the only species that is kicked; '' all", &
+    variable_t("drive", "species", "text", 1, "fallback", "''", "the only species that is kicked; '' all", &
       goes_with="kind noise andersen brownian active")]
 
-  type(parameter_t), parameter :: stop_rows(*) = [ &
-    parameter_t("stop", "time", "real", 1, "example", "1", &
+  type(variable_t), parameter :: stop_rows(*) = [ &
+    variable_t("stop", "time", "real", 1, "example", "1", &
       "end at this time; the first rule to be met ends the run", not_negative, "time"), &
-    parameter_t("stop", "collisions", "integer", 1, "optional", "100000", &
+    variable_t("stop", "collisions", "integer", 1, "optional", "100000", &
       "end after this many collisions between disks", not_negative), &
-    parameter_t("stop", "collisions_per_disk", "real", 1, "optional", "20", &
+    variable_t("stop", "collisions_per_disk", "real", 1, "optional", "20", &
       "end when 2 collisions/N reaches this", not_negative), &
-    parameter_t("stop", "events", "integer", 1, "optional", "100000", &
+    variable_t("stop", "events", "integer", 1, "optional", "100000", &
       "end after this many collisions of any kind: pair, side, obstacle, wall", not_negative), &
-    parameter_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
+    variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
       "end when collisions have left this fraction of the kinetic energy", energy_left), &
-    parameter_t("stop", "wall_clock", "real", 1, "optional", "3600", &
+    variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
       "stop with a checkpoint after this much computing time", positive, "s")]
 
-  type(parameter_t), parameter :: output_rows(*) = [ &
-    parameter_t("output", "frames_every_time", "real", 1, "optional", "0.1", &
+  type(variable_t), parameter :: output_rows(*) = [ &
+    variable_t("output", "frames_every_time", "real", 1, "optional", "0.1", &
       "positions and velocities; default the first and the last", positive, "time"), &
-    parameter_t("output", "frames_every_collisions", "integer", 1, "optional", "1000", &
+    variable_t("output", "frames_every_collisions", "integer", 1, "optional", "1000", &
       "a frame after so many collisions between disks", positive), &
-    parameter_t("output", "frames_every_events", "integer", 1, "optional", "1000", &
+    variable_t("output", "frames_every_events", "integer", 1, "optional", "1000", &
       "a frame after so many collisions of any kind", positive), &
-    parameter_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
+    variable_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
       "a frame whenever 2 collisions/N has grown by this", positive), &
-    parameter_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
+    variable_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "energies, pressure, ...; default the first and the last", positive, "time"), &
-    parameter_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
+    variable_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
       "a sample after so many collisions between disks", positive), &
-    parameter_t("output", "observables_every_events", "integer", 1, "optional", "100", &
+    variable_t("output", "observables_every_events", "integer", 1, "optional", "100", &
       "a sample after so many collisions of any kind", positive), &
-    parameter_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
+    variable_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
       "a sample whenever 2 collisions/N has grown by this", positive), &
-    parameter_t("output", "precision", "text", 1, "default", "'double'", &
+    variable_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
-    parameter_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
-    parameter_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
+    variable_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
+    variable_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
       "gather it for smooth disks, too, at some cost"), &
-    parameter_t("output", "checkpoint_every", "real", 1, "optional", "600", &
+    variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "computing time between checkpoints", positive, "s")]
 
-  type(parameter_t), parameter :: table(*) = [run_rows, box_rows, side_rows, obstacle_rows, wall_rows, &
+  type(variable_t), parameter :: table(*) = [run_rows, box_rows, side_rows, obstacle_rows, wall_rows, &
     wall_law_rows, species_rows, contact_rows, drive_rows, stop_rows, output_rows]
 
   !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
@@ -337,7 +337,7 @@ contains
 
   !> What may be written: `a number > 0`, `'wall' or 'periodic'`.
   pure function allowed(row) result(words)
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     character(len=:), allocatable :: words
 
     select case (row%kind)
@@ -366,4 +366,4 @@ contains
     text = text//trim(words(size(words)))//"'"
   end function either
 
-end module parameters
+end module variables

@@ -1,10 +1,10 @@
 !> From the words of the input to checked values: strict numbers, choices, counts and ranges.
-module input_values
+module input_words
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
   use namelist_scanner, only: scanner_t, statement_t, token_t
-  use parameter_values, only: parameter_value_t, text_length
-  use parameters, only: allowed, largest, parameter_t, smallest, table, words_of
+  use input_groups, only: value_t, text_length
+  use variables, only: allowed, largest, variable_t, smallest, table, words_of
   use texts, only: counted, digits, lower_case, nearest_word, shown, written
   implicit none
   private
@@ -17,11 +17,11 @@ contains
   !> Stores the values of an assignment in `slot`. A value that is wrong is reported; the slot is then
   !> faulty and keeps the value that it had.
   subroutine store_values(slot, scanner, statement, problems)
-    type(parameter_value_t), intent(inout) :: slot
+    type(value_t), intent(inout) :: slot
     type(scanner_t), intent(in) :: scanner
     type(statement_t), intent(in) :: statement
     type(problem_list_t), intent(inout) :: problems
-    type(parameter_value_t) :: new
+    type(value_t) :: new
     character(len=:), allocatable :: problem
     integer :: k, n, line
 
@@ -54,8 +54,8 @@ contains
 
   !> The number of values must be what the variable takes.
   pure subroutine check_shape(slot, row, scanner, statement, problem)
-    type(parameter_value_t), intent(in) :: slot
-    type(parameter_t), intent(in) :: row
+    type(value_t), intent(in) :: slot
+    type(variable_t), intent(in) :: row
     type(scanner_t), intent(in) :: scanner
     type(statement_t), intent(in) :: statement
     character(len=:), allocatable, intent(out) :: problem
@@ -79,7 +79,7 @@ contains
 
   !> What to say when `0,9` stands where one real number is expected.
   pure function decimal_hint(row, scanner, tokens) result(hint)
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     type(scanner_t), intent(in) :: scanner
     type(token_t), intent(in) :: tokens(:)
     character(len=:), allocatable :: hint
@@ -97,7 +97,7 @@ contains
 
   !> Allocates n values of the variable's kind.
   pure subroutine make_room(slot, n)
-    type(parameter_value_t), intent(inout) :: slot
+    type(value_t), intent(inout) :: slot
     integer, intent(in) :: n
 
     call slot%clear()
@@ -110,9 +110,9 @@ contains
 
   !> Checks one word and stores it after the first n values.
   pure subroutine store_token(slot, n, row, token, word, bare, problem)
-    type(parameter_value_t), intent(inout) :: slot
+    type(value_t), intent(inout) :: slot
     integer, intent(in) :: n
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     type(token_t), intent(in) :: token
     character(len=*), intent(in) :: word
     logical, intent(in) :: bare                    !! text needs no quotes
@@ -151,7 +151,7 @@ contains
   !> Text must be in quotes, not too long, and one of the choices if there are any.
   pure subroutine check_text(word, row, quoted, problem)
     character(len=*), intent(in) :: word
-    type(parameter_t), intent(in) :: row
+    type(variable_t), intent(in) :: row
     logical, intent(in) :: quoted
     character(len=:), allocatable, intent(out) :: problem
     character(len=:), allocatable :: meant
@@ -258,4 +258,4 @@ contains
     end select
   end subroutine read_logical
 
-end module input_values
+end module input_words
