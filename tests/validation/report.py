@@ -40,8 +40,8 @@ NOTES = """
 
 - **P11-10**: the share of collisions that time steps miss is P(q) with q = g Δt / s, not g Δt / 2s:
   two disks overlap on a chord, but collide only while they approach, on its first half.
-- **P11-01**: the published table lets centres start in [R, 8]; here a disk lies wholly in its region.
-  Cases take the region up to 8 + R; one takes it up to 8.
+- **P11-01**: the published table lets centres start in [R, 8]; here a disk lies wholly in its
+  region. Cases take the region up to 8 + R; one takes it up to 8.
 - **P6-03**: a published 1.39(1) after 2 collisions per disk is too low: the program finds 1.468(6),
   with time steps 1.485(11), when dilute 1.449(8); the Boltzmann equation gives 1.455.
 - **P9-07**: the fractions hold to .01 up to packing .1. Beyond, the same disks meet again: .850 at
@@ -55,7 +55,8 @@ NOTES = """
   .386(1), .818(1).
 - **P15-13**: the threshold of Maxwell's demon, .73 here, is that of many dilute grains. The 120 of
   the case turn even near .65; five times as many of a fifth of the diameter still part there.
-- **P8-03** is no case: up to packing .70 the program agrees with Li et al. (2022) within .2 %.
+- **P8-03** is no case: up to packing .70 the program agrees with Li et al. (2022) within .03
+  to .2 %, its errors.
 """
 
 
