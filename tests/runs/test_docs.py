@@ -75,7 +75,7 @@ def test_the_readme_leads_to_every_page():
 
 
 @pytest.mark.parametrize(
-    ("page", "heading"), [("limits", "## Promises"), ("architecture", "## Invariants")]
+    ("page", "heading"), [("limits", "## Promises"), ("inside", "## Invariants")]
 )
 def test_promises_are_held_by_tests_that_exist(page, heading):
     """In the tables the second column names files and tests."""
