@@ -1,0 +1,138 @@
+"""Seeds faults, one at a time, and says which test catches each: before and after tests are cut.
+
+    python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD] [--table tests/mutants.toml]
+    python tests/mutants.py --check
+
+It works in build/mutants, on a copy of the last commit, and goes on where it was stopped:
+`results` there has a line for each mutant of each commit. The copy is tested without a fault first.
+Then for each mutant of the table: the unit tests, and if they pass the others, up to the first that
+fails. Some minutes each on two quiet cores, as long as `make test` for one that survives. Run it
+with `nice` beside other work. `--check` only looks whether each text is found once in the sources.
+
+In the table `before` says what caught the fault when it was drawn. A fault is a sentence; `file`,
+`old` and `new` express it in the sources as they are now. Whoever rebuilds the code expresses the
+same sentence anew; git has the former texts, and this tests them as they were:
+
+    git show COMMIT:tests/mutants.toml > old.toml
+    python tests/mutants.py --commit 67f9503 --table old.toml
+
+The 24 were drawn from commit 67f9503 by `random.Random(20261124)`: two from each folder of src/,
+one from run.f90, three from post/. A draw takes a kind of fault (a sign; a comparison, which may
+be `.and.`, `.not.` or `min` as well; a dropped line that changes the state; a number or index off
+by one), a line of the folder that such a fault fits, and a place in it. Of twenty draws for each
+folder the first ones count, if they are of different subjects. Passed over were
+
+- those that change nothing that can be seen: events of equal times sorted the other way into a
+  bucket, as they are ordered afterwards; one byte more for each sample in estimates; a text in an
+  output file left open after it was read; pairs looked for in a wider circle, if filtered later;
+- those that change only how long it takes: disks renumbered in place with several threads, no
+  prefetch of cells;
+- those that every run of the program shows: no event executed, contacts at wrong times, spans of
+  the calendar opened twice, the columns of a sample all from the first series;
+- those whose effect no compiler promises: beyond an array (six in search/, one in dynamics/);
+- those in what was to go: the index of names, texts in forged files, sealed files, checkpoints in
+  files of their own, cells of a sheared box.
+"""
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRATCH = ROOT / "build" / "mutants"
+UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
+UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
+OTHERS = (
+    "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all",
+    ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly tests",
+)
+FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR )(\S+)", re.MULTILINE)
+
+
+def git(*arguments: str, folder: Path = ROOT) -> str:
+    return subprocess.check_output(["git", *arguments], cwd=folder, text=True).strip()
+
+
+def check_out(commit: str) -> Path:
+    """A copy of the project at a commit, as it is there, but with what was built before."""
+    tree = SCRATCH / "tree"
+    if not tree.exists():
+        git("clone", "--quiet", "--shared", "--no-checkout", str(ROOT), str(tree))
+    git("checkout", "--quiet", "--force", "--detach", commit, folder=tree)
+    git("clean", "--quiet", "--force", "-d", folder=tree)
+    if (ROOT / ".venv").exists() and not (tree / ".venv").exists():
+        shutil.copytree(ROOT / ".venv", tree / ".venv", symlinks=True)
+    subprocess.run([".ci/set-up", "demo", "test"], cwd=tree, check=True)
+    return tree
+
+
+def applies(mutant: dict[str, str], tree: Path) -> bool:
+    """Whether the text that a mutant replaces is there, once."""
+    path = tree / mutant["file"]
+    return path.exists() and path.read_text().count(mutant["old"]) == 1
+
+
+def outcome(tree: Path, mutant: dict[str, str] | None, jobs: int, log: Path) -> str:
+    """What the tests say of a tree with a fault, or without any."""
+    steps = [*UNIT_TESTS, *OTHERS]
+    if mutant:
+        if not applies(mutant, tree):
+            return "does not apply"
+        path = tree / mutant["file"]
+        path.write_text(path.read_text().replace(mutant["old"], mutant["new"]))
+        if path.is_relative_to(tree / "post"):
+            steps = list(OTHERS)
+    for step in steps:
+        command = step.format(jobs=jobs, unit_build=f"{UNIT_BUILD} build/tests")
+        with log.open("w") as output:
+            failed = subprocess.call(command, shell=True, cwd=tree, stdout=output, stderr=output)
+        if failed:
+            if step.startswith("make -j"):
+                return "does not compile"
+            said = log.read_text(errors="replace")
+            return "caught: " + (", ".join(FAILURE.findall(said)[:3]) or said.split("\n")[-2])
+    return "survived"
+
+
+def main() -> int:
+    """Prints what becomes of each mutant; 1 if one survives that was caught before."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help="of the mutants [all]")
+    parser.add_argument("--jobs", type=int, default=2, help="at a time [%(default)s]")
+    parser.add_argument("--commit", default="HEAD", help="what is tested [%(default)s]")
+    parser.add_argument("--table", type=Path, default=ROOT / "tests" / "mutants.toml")
+    parser.add_argument("--check", action="store_true", help="only whether all texts are found")
+    args = parser.parse_args()
+    table = tomllib.loads(args.table.read_text())
+    if unknown := set(args.names) - set(table):
+        parser.error(f"not in the table: {', '.join(unknown)}")
+    if args.check:
+        lost = [name for name, mutant in table.items() if not applies(mutant, ROOT)]
+        print(*(f"{name}: its text is not found once" for name in lost), sep="\n", end="")
+        return 1 if lost else 0
+    SCRATCH.mkdir(parents=True, exist_ok=True)
+    commit = git("rev-parse", "--short=12", args.commit)
+    results = SCRATCH / "results"
+    results.touch()
+    known = dict(line.split("\t") for line in results.read_text().splitlines())
+    worse = 0
+    for name in ["nothing", *(args.names or table)]:
+        key, mutant = f"{commit} {name}", table.get(name)
+        if key not in known:
+            known[key] = outcome(check_out(commit), mutant, args.jobs, SCRATCH / f"{name}.log")
+            with results.open("a") as file:
+                file.write(f"{key}\t{known[key]}\n")
+        print(f"{name}: {known[key]}", flush=True)
+        if not mutant and known[key] != "survived":
+            print("The tests fail without a fault: first make them pass.", file=sys.stderr)
+            return 1
+        worse += known[key] == "survived" and "caught" in (mutant or {}).get("before", "")
+    return 1 if worse else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
