@@ -5,7 +5,6 @@
 !> partner's stamp reveals them when they come up, and the disk only predicts again.
 module event_driven
   use kinds, only: int32, int64, real64
-  use box_geometry, only: wall_law
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
@@ -279,9 +278,7 @@ contains
     if (code > 0) then
       restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
     else
-      associate (law => wall_law(sim%box, code))
-        restitution = law%restitution
-      end associate
+      restitution = sim%box%surface(1 - code)%law%restitution
     end if
     text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
       //" contact.contact_time (TC model), well below the mean time between collisions"

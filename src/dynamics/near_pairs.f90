@@ -3,7 +3,7 @@
 module near_pairs
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
-  use partners, only: obstacle_code
+  use partners, only: n_sides
   use shapes, only: spare
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
@@ -56,7 +56,7 @@ contains
     real(real64), intent(in) :: x(:, :)        !! (2,disks) where they are [length]
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
-    integer(int32) :: bins(2), i, m
+    integer(int32) :: bins(2), i, k
 
     if (self%known) then
       if (farthest2(x, self%from, size(x, 2)) < (0.5_real64*self%skin*(1 - spare))**2) return
@@ -66,9 +66,9 @@ contains
     self%skin = merge(0.0_real64, wanted_skin(sim, step), all_pairs)
     self%n = 0
     if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100))
-    do m = 1, sim%box%n_obstacles()
+    do k = n_sides + 1, size(sim%box%surface)
       do i = 1, sim%n_disks()
-        if (obstacle_gap(sim%box, m, x(:, i), sim%disk(i)%radius) <= self%skin) call append(self, i, obstacle_code(m))
+        if (obstacle_gap(sim%box, k, x(:, i), sim%disk(i)%radius) <= self%skin) call append(self, i, 1 - k)
       end do
     end do
     bins = 1

@@ -50,7 +50,7 @@ contains
     rule%limits%events = settings%events
     rule%wall_clock = settings%wall_clock
     if (settings%energy_fraction > 0) rule%limits%most(energy_lost) = (1 - settings%energy_fraction)*sim%start_energy
-    if (all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. sim%law%loses_energy() &
+    if (all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. sim%law%loses_energy() &
       .and. .not. sim%is_driven()) rule%limits%epochs = .true.
   end function new_stop_rule
 

@@ -13,7 +13,7 @@ module time_stepped
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
   use near_pairs, only: gap_between, near_pairs_t
-  use partners, only: axis_of, n_sides, nothing, obstacle_number, sense_of
+  use partners, only: axis_of, n_sides, nothing, sense_of
   use simulation_state, only: simulation_t
   use texts, only: written
   implicit none
@@ -114,7 +114,7 @@ contains
     logical :: yes
     integer(int32) :: i
 
-    yes = .not. (sim%box%falling() .or. any(sim%box%side%motion%travels()))
+    yes = .not. (sim%box%falling() .or. sim%box%has_moving_sides())
     do i = 1, sim%n_disks()
       if (.not. yes) return
       yes = .not. any(abs(sim%disk(i)%v) > slowest)
@@ -154,7 +154,7 @@ contains
           if (gap_between(self%x(:, i), self%x(:, partner), sim%disk(i)%radius + sim%disk(partner)%radius, period)) &
             call meet_disk(self, sim, i, partner)
         else
-          if (obstacle_gap(sim%box, obstacle_number(partner), self%x(:, i), sim%disk(i)%radius) < 0) &
+          if (obstacle_gap(sim%box, 1 - partner, self%x(:, i), sim%disk(i)%radius) < 0) &
             call meet_wall(self, sim, i, partner)
         end if
       end associate

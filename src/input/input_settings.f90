@@ -35,7 +35,7 @@ contains
     s = range_of(groups, ["species"])
     call take_run(groups(place_of("run", groups%name)), settings%run, problems)
     call take_box(groups(place_of("box", groups%name)), settings%box, problems)
-    call take_obstacles(groups(o(1):o(2)), settings%box%obstacle, problems)
+    call take_obstacles(groups(o(1):o(2)), settings%box, problems)
     call take_species(groups(s(1):s(2)), settings%box, settings%species, problems)
     call take_contact(groups(place_of("contact", groups%name)), size(settings%species), settings%law, wall_law, problems)
     call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), wall_law, settings%box, problems)
@@ -74,6 +74,7 @@ contains
     type(problem_list_t), intent(inout) :: problems
     integer :: axis
 
+    box = box_t()
     box%lower = group%reals_of("lower")
     box%upper = group%reals_of("upper")
     box%gravity = group%reals_of("gravity")
@@ -285,7 +286,7 @@ contains
     associate (stop_rules => settings%stop, law => settings%law, box => settings%box)
       if (min(stop_rules%time, stop_rules%wall_clock) < never) return
       if ((settings%drive%is_on() .or. box%is_sheared()) .and. settings%n_disks() == 1 .and. all(box%periodic) &
-        .and. box%n_obstacles() == 0) call problems%add(0, "stop", "a single disk in a periodic box that is sheared " &
+        .and. .not. box%has_obstacles()) call problems%add(0, "stop", "a single disk in a periodic box that is sheared " &
         //"(box.shear_rate) or where disks are kicked (drive.kind) meets nothing, for ever; give time")
       if (stop_rules%events < unlimited) return
       by_collisions = stop_rules%collisions < unlimited .or. stop_rules%collisions_per_disk < never

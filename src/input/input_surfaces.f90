@@ -18,10 +18,10 @@ module input_surfaces
 
 contains
 
-  !> Fills the list of obstacles; it is empty if one of them is incomplete.
-  subroutine take_obstacles(groups, obstacles, problems)
+  !> Puts the obstacles into the box; none if one of them is incomplete.
+  subroutine take_obstacles(groups, box, problems)
     type(group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
-    type(surface_t), allocatable, intent(out) :: obstacles(:)
+    type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
     integer :: k, v
@@ -37,10 +37,11 @@ contains
         end associate
       end do
     end do
-    allocate (obstacles(merge(size(groups), 0, complete)))
-    do k = 1, size(obstacles)
-      obstacles(k)%name = trim(groups(k)%instance)
-      call take_shape(groups(k), obstacles(k))
+    if (.not. complete) return
+    call box%add_obstacles(size(groups))
+    do k = 1, size(groups)
+      box%surface(n_sides + k)%name = trim(groups(k)%instance)
+      call take_shape(groups(k), box%surface(n_sides + k))
     end do
   end subroutine take_obstacles
 
@@ -67,8 +68,8 @@ contains
     type(problem_list_t), intent(inout) :: problems
     integer :: k, side, line_of(n_sides)
 
-    box%side%law = law
-    if (law%rule /= normal_rule) box%side%law%grip = grip_t()
+    box%surface%law = law
+    if (law%rule /= normal_rule) box%surface%law%grip = grip_t()
     line_of = 0
     do k = 1, size(sides)
       side = place_of(trim(sides(k)%instance), side_name)
@@ -82,13 +83,13 @@ contains
           problems)
       else
         line_of(side) = sides(k)%line
-        call take_law(sides(k), law, box%side(side)%law, problems)
-        call take_motion(sides(k), box%side(side)%motion, problems)
-        if (box%side(side)%motion%travels()) call check_room(sides(k), box, (side + 1)/2, problems)
+        call take_law(sides(k), law, box%surface(side)%law, problems)
+        call take_motion(sides(k), box%surface(side)%motion, problems)
+        if (box%surface(side)%motion%travels()) call check_room(sides(k), box, (side + 1)/2, problems)
       end if
     end do
-    do k = 1, size(box%obstacle)
-      call take_law(obstacles(k), law, box%obstacle(k)%law, problems)
+    do k = n_sides + 1, size(box%surface)
+      call take_law(obstacles(k - n_sides), law, box%surface(k)%law, problems)
     end do
   end subroutine take_wall_laws
 
@@ -150,7 +151,7 @@ contains
     real(real64) :: width
 
     width = box%upper(axis) - box%lower(axis)
-    if (width > 0 .and. sum(box%side(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
+    if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
       "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
   end subroutine check_room
 

@@ -132,7 +132,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: source
     type(component_file_t) :: file
-    type(simulation_t) :: blank
+    type(simulation_t), allocatable :: blank
     integer(int64) :: slot(1)
     integer :: trial
 
@@ -276,7 +276,7 @@ contains
     type(component_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
 
-    call sim%tally%make_room(sim%box%n_surfaces())
+    call sim%tally%make_room(size(sim%box%surface))
     associate (tally => sim%tally)
       call file%exchange("events", tally%events)
       call file%exchange("collisions", tally%collisions)

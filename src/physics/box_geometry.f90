@@ -1,22 +1,23 @@
-!> The container: four sides, walls or periodic by axis, fixed obstacles, and the acceleration in it.
+!> The container: its surfaces, which are four sides, walls or periodic by axis, and fixed obstacles; and the acceleration
+!> in it.
 !> Times of contact are pure functions of a disk's own state, counted from the epoch like its clock.
 module box_geometry
   use collisions, only: wall_law_t
   use disks, only: disk_t
   use images, only: images_t, sliding_images
   use kinds, only: int32, never, real64
-  use partners, only: axis_of, is_side, n_sides, obstacle_code, obstacle_number, sense_of, side_name, wall_index
+  use partners, only: axis_of, is_side, n_sides, sense_of, side_name
   use shapes, only: shape_t
   use side_motion, only: side_motion_t
   implicit none
   private
   public :: box_t, surface_t
-  public :: next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_law, wall_normal, surface_path, free_area
+  public :: next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, surface_path, free_area
 
-  !> What a disk bounces off: a side of the box, or an obstacle, which has a name and a shape.
+  !> What a disk bounces off: a side of the box, or an obstacle.
   type :: surface_t
     character(len=:), allocatable :: name
-    class(shape_t), allocatable :: shape
+    class(shape_t), allocatable :: shape        !! of an obstacle
     type(wall_law_t) :: law
     type(side_motion_t) :: motion               !! of a side
   end type surface_t
@@ -27,8 +28,8 @@ module box_geometry
     logical :: periodic(2) = .false.            !! by axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! of a sheared box [1/time]
-    type(surface_t) :: side(n_sides)            !! left, right, bottom, top, where they are walls
-    type(surface_t), allocatable :: obstacle(:)
+    !> Left, right, bottom, top, which count where they are walls; then the obstacles: see `partners` for their codes.
+    type(surface_t), allocatable :: surface(:)
     real(real64) :: epoch = 0.0_real64          !! that of the simulation: the motion of sides needs the time of the run [time]
   contains
     procedure :: edges
@@ -38,8 +39,9 @@ module box_geometry
     procedure :: is_sheared
     procedure :: slip
     procedure :: stream
-    procedure :: n_obstacles
-    procedure :: n_surfaces
+    procedure :: add_obstacles
+    procedure :: has_obstacles
+    procedure :: has_moving_sides
     procedure :: is_wall
     procedure :: has_lossy_walls
     procedure :: has_rough_walls
@@ -49,7 +51,36 @@ module box_geometry
     procedure :: reach
   end type box_t
 
+  interface box_t
+    module procedure new_box
+  end interface box_t
+
 contains
+
+  !> The unit box, without obstacles.
+  function new_box() result(box)
+    type(box_t) :: box
+    integer :: k
+
+    allocate (box%surface(n_sides))
+    do k = 1, n_sides
+      box%surface(k)%name = trim(side_name(k))
+    end do
+  end function new_box
+
+  !> Makes room for n obstacles more.
+  subroutine add_obstacles(self, n)
+    class(box_t), intent(inout) :: self
+    integer, intent(in) :: n
+    type(surface_t), allocatable :: more(:)
+    integer :: k
+
+    allocate (more(size(self%surface) + n))
+    do k = 1, size(self%surface)
+      more(k) = self%surface(k)
+    end do
+    call move_alloc(more, self%surface)
+  end subroutine add_obstacles
 
   !> Lengths of the sides.
   pure function edges(self) result(lengths)
@@ -111,27 +142,26 @@ contains
     v = [self%shear_rate*(x(2) - 0.5_real64*(self%lower(2) + self%upper(2))), 0.0_real64]
   end function stream
 
-  !> Number of obstacles.
-  pure function n_obstacles(self) result(n)
+  !> Whether there is more than the sides.
+  pure function has_obstacles(self) result(yes)
     class(box_t), intent(in) :: self
-    integer(int32) :: n
+    logical :: yes
 
-    n = 0
-    if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
-  end function n_obstacles
+    yes = size(self%surface) > n_sides
+  end function has_obstacles
 
-  !> Number of sides and obstacles.
-  pure function n_surfaces(self) result(n)
+  !> Whether the place of any side changes.
+  pure function has_moving_sides(self) result(yes)
     class(box_t), intent(in) :: self
-    integer(int32) :: n
+    logical :: yes
 
-    n = n_sides + self%n_obstacles()
-  end function n_surfaces
+    yes = any(self%surface%motion%travels())
+  end function has_moving_sides
 
-  !> Whether disks bounce off the k-th side or obstacle.
+  !> Whether disks bounce off surface k.
   pure function is_wall(self, k) result(yes)
     class(box_t), intent(in) :: self
-    integer, intent(in) :: k                    !! as in `partners: wall_index`
+    integer, intent(in) :: k
     logical :: yes
 
     yes = k > n_sides
@@ -142,54 +172,35 @@ contains
   pure function has_lossy_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
-    type(wall_law_t) :: law
     integer :: k
 
-    yes = .false.
-    do k = 1, self%n_surfaces()
-      if (.not. self%is_wall(k)) cycle
-      law = wall_law(self, 1 - k)
-      yes = yes .or. law%restitution < 1 .or. law%grip%is_rough()
-    end do
+    yes = self%has_rough_walls() .or. &
+      any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%restitution < 1)
   end function has_lossy_walls
 
   !> Whether any wall can make disks turn.
   pure function has_rough_walls(self) result(yes)
     class(box_t), intent(in) :: self
     logical :: yes
-    type(wall_law_t) :: law
     integer :: k
 
-    yes = .false.
-    do k = 1, self%n_surfaces()
-      if (.not. self%is_wall(k)) cycle
-      law = wall_law(self, 1 - k)
-      yes = yes .or. law%grip%is_rough()
-    end do
+    yes = any([(self%is_wall(k), k=1, size(self%surface))] .and. self%surface%law%grip%is_rough())
   end function has_rough_walls
 
   !> The highest temperature of a wall.
   pure function highest_temperature(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [energy]
-    integer :: m
 
-    highest = maxval(self%side%law%temperature)
-    do m = 1, self%n_obstacles()
-      highest = max(highest, self%obstacle(m)%law%temperature)
-    end do
+    highest = maxval(self%surface%law%temperature)
   end function highest_temperature
 
   !> The highest speed of a surface, along the wall or of a side that moves; or of the image above in a sheared box.
   pure function highest_speed(self) result(highest)
     class(box_t), intent(in) :: self
     real(real64) :: highest                     !! [length/time]
-    integer :: m
 
-    highest = max(maxval(abs(self%side%law%speed)), maxval(self%side%motion%top_speed()), abs(self%slip()))
-    do m = 1, self%n_obstacles()
-      highest = max(highest, abs(self%obstacle(m)%law%speed))
-    end do
+    highest = max(maxval(abs(self%surface%law%speed)), maxval(self%surface%motion%top_speed()), abs(self%slip()))
   end function highest_speed
 
   !> Whether disks can get energy from a wall, or from shear.
@@ -205,7 +216,7 @@ contains
     class(box_t), intent(in) :: self
     real(real64) :: length(2, 2)                !! (axis, lower or upper) [length]
 
-    length = transpose(reshape(self%side%motion%amplitude, [2, 2]))
+    length = transpose(reshape(self%surface(:n_sides)%motion%amplitude, [2, 2]))
   end function reach
 
   !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
@@ -215,7 +226,7 @@ contains
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: last          !! code of the obstacle that it left last, if nothing has happened since
-    integer(int32), intent(in) :: list(:)       !! numbers of the obstacles in question, ascending
+    integer(int32), intent(in) :: list(:)       !! codes of the obstacles in question, descending
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
@@ -223,11 +234,11 @@ contains
     integer :: k, image
 
     do k = 1, size(list)
-      associate (shape => box%obstacle(list(k))%shape)
+      associate (shape => box%surface(1 - list(k))%shape)
         images = merge(images_t(), box%images(), shape%encloses)
         t_m = never
         left = never                            ! the image that it leaves
-        if (last == obstacle_code(list(k)) .and. .not. (shape%encloses .or. box%falling())) &
+        if (last == list(k) .and. .not. (shape%encloses .or. box%falling())) &
           left = shape%from_nearest(disk%x, images, heading=disk%v)
         do image = 1, images%count()
           d = disk%x - (shape%middle + images%shift(images%around(image)))
@@ -237,37 +248,24 @@ contains
       end associate
       if (t_m < t) then
         t = t_m
-        code = obstacle_code(list(k))
+        code = list(k)
       end if
     end do
   end subroutine next_obstacle
 
-  !> Distance between the m-th obstacle and the rim of a disk at x; negative if they overlap.
-  pure function obstacle_gap(box, m, x, radius) result(length)
+  !> Distance between surface k, an obstacle, and the rim of a disk at x; negative if they overlap.
+  pure function obstacle_gap(box, k, x, radius) result(length)
     type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: m
+    integer, intent(in) :: k
     real(real64), intent(in) :: x(2), radius    !! [length]
     real(real64) :: length
 
-    associate (shape => box%obstacle(m)%shape)
+    associate (shape => box%surface(k)%shape)
       length = shape%gap(shape%from_nearest(x, box%images()), radius)
     end associate
   end function obstacle_gap
 
-  !> What happens at a side or obstacle.
-  pure function wall_law(box, code) result(law)
-    type(box_t), intent(in) :: box
-    integer(int32), intent(in) :: code
-    type(wall_law_t) :: law
-
-    if (is_side(code)) then
-      law = box%side(wall_index(code))%law
-    else
-      law = box%obstacle(obstacle_number(code))%law
-    end if
-  end function wall_law
-
-  !> Velocity of the surface of a side or obstacle where the normal is this one.
+  !> Velocity of a surface along itself where the normal is this one.
   pure function surface_velocity(box, code, normal) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -275,16 +273,16 @@ contains
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
-    if (is_side(code)) then
-      u(3 - axis_of(code)) = box%side(wall_index(code))%law%speed
-    else
-      associate (obstacle => box%obstacle(obstacle_number(code)))
-        if (abs(obstacle%law%speed) > 0) u = obstacle%law%speed*obstacle%shape%direction(normal)
-      end associate
-    end if
+    associate (surface => box%surface(1 - code))
+      if (is_side(code)) then
+        u(3 - axis_of(code)) = surface%law%speed
+      else if (abs(surface%law%speed) > 0) then
+        u = surface%law%speed*surface%shape%direction(normal)
+      end if
+    end associate
   end function surface_velocity
 
-  !> Velocity of a side, or of an obstacle, which stays where it is, along its normal.
+  !> Velocity of a surface along its normal: only sides move.
   pure function strike_velocity(box, code, normal, t) result(u)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -293,13 +291,12 @@ contains
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
-    if (.not. is_side(code)) return
-    associate (motion => box%side(wall_index(code))%motion)
+    associate (motion => box%surface(1 - code)%motion)
       if (motion%is_on()) u = motion%velocity(motion%moment(box%epoch, t))*normal
     end associate
   end function strike_velocity
 
-  !> Unit vector from a side or obstacle to a disk at x that hits it with the velocity v.
+  !> Unit vector from a surface to a disk at x that hits it with the velocity v.
   pure function wall_normal(box, code, x, v) result(normal)
     type(box_t), intent(in) :: box
     integer(int32), intent(in) :: code
@@ -311,37 +308,33 @@ contains
       normal = 0
       normal(axis_of(code)) = -sense_of(code)
     else
-      associate (shape => box%obstacle(obstacle_number(code))%shape)
+      associate (shape => box%surface(1 - code)%shape)
         normal = shape%normal(shape%from_nearest(x, box%images(), heading=-v))
       end associate
     end if
   end function wall_normal
 
-  !> The name of the k-th side or obstacle below /observables.
+  !> The name of surface k below /observables.
   pure function surface_path(box, k) result(path)
     type(box_t), intent(in) :: box
-    integer, intent(in) :: k                    !! as in `partners: wall_index`
+    integer, intent(in) :: k
     character(len=:), allocatable :: path
 
-    if (k <= n_sides) then
-      path = "sides/"//trim(side_name(k))
-    else
-      path = "walls/"//box%obstacle(k - n_sides)%name
-    end if
+    path = merge("sides/", "walls/", k <= n_sides)//box%surface(k)%name
   end function surface_path
 
   !> Where disks can be: the box less the obstacles, or the smallest outline that encloses them.
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]
-    integer :: m
+    integer :: k
 
     area = product(box%edges())
-    do m = 1, box%n_obstacles()
-      if (box%obstacle(m)%shape%encloses) area = min(area, box%obstacle(m)%shape%area())
+    do k = n_sides + 1, size(box%surface)
+      if (box%surface(k)%shape%encloses) area = min(area, box%surface(k)%shape%area())
     end do
-    do m = 1, box%n_obstacles()
-      if (.not. box%obstacle(m)%shape%encloses) area = area - box%obstacle(m)%shape%area()
+    do k = n_sides + 1, size(box%surface)
+      if (.not. box%surface(k)%shape%encloses) area = area - box%surface(k)%shape%area()
     end do
   end function free_area
 

@@ -5,7 +5,7 @@ module box_sides
   use disks, only: disk_t
   use free_flight, only: time_to_line
   use kinds, only: int32, never, real64
-  use partners, only: axis_of, n_sides, sense_of, wall_index
+  use partners, only: axis_of, n_sides, sense_of
   use side_motion, only: side_motion_t
   implicit none
   private
@@ -25,7 +25,7 @@ contains
 
     inwards = 0
     do k = 1, n_sides
-      associate (motion => box%side(k)%motion)
+      associate (motion => box%surface(k)%motion)
         if (motion%travels()) inwards(k) = motion%place(motion%moment(box%epoch, t))
       end associate
     end do
@@ -51,7 +51,7 @@ contains
     else
       gap = (box%upper(axis) - inset) - disk%x(axis)
     end if
-    associate (motion => box%side(wall_index(side))%motion)
+    associate (motion => box%surface(1 - side)%motion)
       if (motion%travels()) then
         tau = motion%moment(box%epoch, disk%clock)
         gap = gap - motion%place(tau)
@@ -94,7 +94,7 @@ contains
     integer(int32) :: side
 
     do side = 0, 1 - n_sides, -1
-      associate (motion => box%side(wall_index(side))%motion, x => disk%x(axis_of(side)))
+      associate (motion => box%surface(1 - side)%motion, x => disk%x(axis_of(side)))
         if (.not. motion%travels()) cycle
         step = no_gap(disk, axis_of(side), motion)
         do while (side_time(box, disk, side) < now)

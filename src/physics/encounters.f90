@@ -7,7 +7,7 @@ module encounters
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
-  use partners, only: axis_of, is_side, is_wall, obstacle_number, sense_of, side_name, wall_index
+  use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use tally, only: dissipated, stress, virial, work
@@ -312,9 +312,9 @@ contains
     if (code > 0) then
       text = text//" and "//disk_text(code)
     else if (is_side(code)) then
-      text = text//" and the "//trim(side_name(wall_index(code)))//" side"
+      text = text//" and the "//sim%box%surface(1 - code)%name//" side"
     else if (is_wall(code)) then
-      text = text//" and obstacle "//sim%box%obstacle(obstacle_number(code))%name
+      text = text//" and obstacle "//sim%box%surface(1 - code)%name
     end if
     text = text//" at time "//written(sim%time())
 

@@ -2,7 +2,7 @@
 !> that the collisions have gathered.
 module observables
   use kinds, only: int32, real64
-  use box_geometry, only: free_area, surface_path
+  use box_geometry, only: box_t, free_area, surface_path
   use drive, only: noise
   use partners, only: n_sides
   use simulation_state, only: simulation_t
@@ -75,7 +75,7 @@ contains
     if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%highest_speed() > 0) call list%add("work", [sim%tally%total(work)])
     if (sim%law%detailed) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
-    do k = 1, sim%box%n_surfaces()
+    do k = 1, size(sim%box%surface)
       if (sim%box%is_wall(k)) call add_surface(list, surface_path(sim%box, k), sim%tally%surface(k))
     end do
   end function observed
@@ -160,8 +160,9 @@ contains
     allocate (empty%species(0), empty%disk(0), empty%tag(0))
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
-    empty%box%side%law%temperature = 1            ! but all that can be measured
-    empty%box%side%law%speed = 1
+    empty%box = box_t()
+    empty%box%surface%law%temperature = 1         ! but all that can be measured
+    empty%box%surface%law%speed = 1
     empty%law%detailed = .true.
     list = observed(empty)
     allocate (names(list%n + 1))

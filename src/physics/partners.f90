@@ -1,14 +1,13 @@
-!> Whom or what a disk meets, as one number: another disk (> 0), a side of the box (0, -1, -2, -3: left, right,
-!> bottom, top), an obstacle (-4, -5, ...), or the end of its cell (far below). The event log writes the same numbers.
+!> Whom or what a disk meets, as one number: another disk (> 0), a surface of the box (0, -1, -2, -3: the left, right,
+!> bottom, top side; -4, -5, ...: an obstacle), or the end of its cell (far below). The event log writes the same numbers.
+!> Surface k of the box has the code 1 - k.
 module partners
   use kinds, only: int32
   implicit none
   private
-  public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, wall_index
-  public :: obstacle_code, obstacle_number, crossing, side_crossed, looks_again, nothing
+  public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, crossing, side_crossed, looks_again, nothing
 
   integer(int32), parameter :: n_sides = 4
-  integer(int32), parameter :: first_obstacle = -n_sides
   integer(int32), parameter :: first_crossing = -2000000000
   integer(int32), parameter :: looks_again = first_crossing - n_sides      !! the end of what was searched, within a cell
   integer(int32), parameter :: nothing = -huge(1_int32)
@@ -21,7 +20,7 @@ contains
     integer(int32), intent(in) :: code
     logical :: yes
 
-    yes = code > first_obstacle
+    yes = code > -n_sides
   end function is_side
 
   !> Whether the code, which is not a disk, is a side or an obstacle: not the end of a cell.
@@ -47,30 +46,6 @@ contains
 
     sense = 2*modulo(side, 2) - 1
   end function sense_of
-
-  !> The place of a side in arrays: left, right, bottom, top.
-  elemental function wall_index(side) result(k)
-    integer(int32), intent(in) :: side
-    integer(int32) :: k
-
-    k = 1 - side
-  end function wall_index
-
-  !> The code of the m-th obstacle.
-  elemental function obstacle_code(m) result(code)
-    integer(int32), intent(in) :: m
-    integer(int32) :: code
-
-    code = first_obstacle + 1 - m
-  end function obstacle_code
-
-  !> The number of the obstacle with a code.
-  elemental function obstacle_number(code) result(m)
-    integer(int32), intent(in) :: code
-    integer(int32) :: m
-
-    m = first_obstacle + 1 - code
-  end function obstacle_number
 
   !> The code of leaving a cell where side `side` would be.
   elemental function crossing(side) result(code)

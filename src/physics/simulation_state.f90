@@ -390,7 +390,7 @@ contains
     energy = self%start_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
       + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
     impulse = sqrt(8*maxval(mass))*sqrt(energy)
-    call self%tally%make_room(self%box%n_surfaces())
+    call self%tally%make_room(size(self%box%surface))
     call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven()) &
       *[energy, impulse, impulse*2*maxval(self%disk%radius)])
   end subroutine choose_units

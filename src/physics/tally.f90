@@ -26,7 +26,7 @@ module tally
     sum_t("stress_xx", moments), sum_t("stress_xy", moments), &   ! change of momentum times distance over pairs [energy]
     sum_t("stress_yx", moments), sum_t("stress_yy", moments)]
 
-  !> What has happened at one side of the box, or at one obstacle.
+  !> What has happened at one surface of the box.
   type :: surface_tally_t
     integer(int64) :: collisions = 0
     type(exact_sum_t) :: impulse(2)                !! given to it [mass length/time]
@@ -37,7 +37,7 @@ module tally
     integer(int64) :: events = 0                   !! collisions of any kind
     integer(int64) :: collisions = 0               !! of pairs
     type(exact_sum_t) :: sum(size(sums))
-    type(surface_tally_t), allocatable :: surface(:)   !! sides, then obstacles: as in `partners: wall_index`
+    type(surface_tally_t), allocatable :: surface(:)   !! those of the box
   contains
     procedure :: make_room
     procedure :: choose_units

@@ -1,11 +1,11 @@
-!> What changes in the state when a disk hits a side of the box or an obstacle; and what every contact does to a disk.
+!> What changes in the state when a disk hits a surface of the box; and what every contact does to a disk.
 module wall_hits
   use kinds, only: int32, real64
-  use box_geometry, only: strike_velocity, surface_velocity, wall_law, wall_normal
+  use box_geometry, only: strike_velocity, surface_velocity, wall_normal
   use collisions, only: grip_t, still_in_contact, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: contact_column, disk_t, spin_column
   use free_flight, only: flight, flight_velocity
-  use partners, only: is_side, wall_index
+  use partners, only: is_side
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat, work
@@ -52,7 +52,7 @@ contains
     end associate
   end subroutine spin_up
 
-  !> Collides disk i with a side or an obstacle at the time t.
+  !> Collides disk i with a surface of the box at the time t.
   subroutine collide_wall(sim, i, code, t, counts)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
@@ -65,7 +65,7 @@ contains
     elastic = .false.
     if (sim%law%contact_time > 0) call make_contact(sim, i, t, elastic)
     call land(sim%disk(i), sim%box%gravity, t)
-    law = wall_law(sim%box, code)
+    law = sim%box%surface(1 - code)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
     strike = strike_velocity(sim%box, code, normal, t)
     u = surface_velocity(sim%box, code, normal) + strike
@@ -80,7 +80,7 @@ contains
     end if
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
-    if (counts) call count_hit(sim, i, wall_index(code), law%temperature > 0, u, v, omega)
+    if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
   !> Gives disk i, at a thermal wall, a velocity as if it came out of a gas of that temperature: along the normal with the
@@ -126,7 +126,7 @@ contains
   pure subroutine count_hit(sim, i, k, heats, u, v, omega)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
-    integer, intent(in) :: k                     !! the surface, in the tally
+    integer, intent(in) :: k                     !! the surface
     logical, intent(in) :: heats                 !! it is a thermal wall
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
     real(real64), intent(in) :: v(2), omega      !! of the disk before [length/time, 1/time]

@@ -164,7 +164,7 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%falling = box%falling() .or. any(box%side%motion%travels())
+    self%falling = box%falling() .or. box%has_moving_sides()
     self%box = box
     call cut(self, 1, patch, self%column)
     call cut(self, 2, patch, self%row)
@@ -204,7 +204,7 @@ contains
     real(real64) :: reach(2, 2)
 
     reach = self%box%reach()
-    associate (side => self%box%side(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + radius)*(1 + spare))
+    associate (side => self%box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + radius)*(1 + spare))
       line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= self%box%lower(axis) + within(1)
       line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= self%box%upper(axis) - within(2)
     end associate

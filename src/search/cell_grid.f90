@@ -14,7 +14,7 @@ module cell_grid
   use images, only: images_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
   use obstacle_lists, only: obstacle_lists_t
-  use partners, only: axis_of, is_wall, looks_again, nothing, sense_of, side_crossed
+  use partners, only: axis_of, is_wall, looks_again, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none
@@ -72,7 +72,7 @@ contains
       end do
       call self%obstacles%renew(sim%box, patch, self%faces)
       call self%big%start(sim, patch%small, patch%n, self%faces)
-      if (.not. any(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. self%big%count == 0 &
+      if (.not. any(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. self%big%count == 0 &
         .and. .not. self%is_part) return
       do iy = 0, int(patch%n(2) + 1, int16)
         do ix = 0, int(patch%n(1) + 1, int16)
@@ -388,7 +388,7 @@ contains
     near%disk = i
     number = self%big%number_of(i)
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(m, m=1, sim%box%n_obstacles())], &
+    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(1 - m, m=n_sides + 1, size(sim%box%surface))], &
       near%time, near%partner)
     t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
       sim%box%gravity, self%big%margin, inside=.true.)

@@ -5,6 +5,7 @@ module obstacle_lists
   use cell_faces, only: cell_faces_t, patch_t
   use disks, only: disk_t, tag_t
   use images, only: images_t
+  use partners, only: n_sides
   use shapes, only: shape_t, spare
   use sorting, only: sort_by_count
   implicit none
@@ -15,7 +16,7 @@ module obstacle_lists
     private
     integer(int32) :: columns = 0
     integer(int32), allocatable :: first(:)        !! (cells+1) first entry of a cell in `list`; none without obstacles
-    integer(int32), allocatable :: list(:)         !! obstacles that reach into the cell, ascending
+    integer(int32), allocatable :: list(:)         !! codes of the obstacles that reach into the cell, descending
   contains
     procedure :: renew
     procedure :: next_contact
@@ -25,7 +26,7 @@ module obstacle_lists
   !> Obstacles in cells, before they are sorted by cell.
   type :: entries_t
     integer(int32) :: n = 0
-    integer(int32), allocatable :: cell(:), obstacle(:)    !! (n, and room for more)
+    integer(int32), allocatable :: cell(:), code(:)    !! (n, and room for more)
   end type entries_t
 
 contains
@@ -67,30 +68,30 @@ contains
     type(entries_t) :: entries
     integer(int32), allocatable :: place(:)
     type(images_t) :: images
-    integer(int32) :: m
+    integer(int32) :: k
     integer :: image
 
     if (allocated(self%first)) deallocate (self%first, self%list)
-    if (box%n_obstacles() == 0) return
+    if (.not. box%has_obstacles()) return
     self%columns = patch%n(1)
-    allocate (entries%cell(64), entries%obstacle(64))
-    do m = 1, box%n_obstacles()
-      associate (shape => box%obstacle(m)%shape)
+    allocate (entries%cell(64), entries%code(64))
+    do k = n_sides + 1, size(box%surface)
+      associate (shape => box%surface(k)%shape)
         images = merge(images_t(), box%images(), shape%encloses)
         do image = 1, images%count()
-          call enter(shape, m, images%shift(images%around(image)) - box%lower, patch, faces, entries)
+          call enter(shape, 1 - k, images%shift(images%around(image)) - box%lower, patch, faces, entries)
         end do
       end associate
     end do
     allocate (place(entries%n), self%list(entries%n))
     call sort_by_count(entries%cell(:entries%n), product(patch%n), self%first, place)
-    self%list(place) = entries%obstacle(:entries%n)
+    self%list(place) = entries%code(:entries%n)
   end subroutine renew
 
-  !> Adds the cells that an image of the m-th obstacle reaches into.
-  subroutine enter(shape, m, shift, patch, faces, entries)
+  !> Adds the cells that an image of an obstacle reaches into.
+  subroutine enter(shape, code, shift, patch, faces, entries)
     class(shape_t), intent(in) :: shape
-    integer(int32), intent(in) :: m
+    integer(int32), intent(in) :: code
     real(real64), intent(in) :: shift(2)           !! from the middle of the shape, to the corner of the box [length]
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
@@ -115,10 +116,10 @@ contains
         entries%n = entries%n + 1
         if (entries%n > size(entries%cell)) then
           entries%cell = [entries%cell, entries%cell]
-          entries%obstacle = [entries%obstacle, entries%obstacle]
+          entries%code = [entries%code, entries%code]
         end if
         entries%cell(entries%n) = here(1) + patch%n(1)*(here(2) - 1)
-        entries%obstacle(entries%n) = m
+        entries%code(entries%n) = code
       end do
     end do
   end subroutine enter

@@ -111,7 +111,7 @@ contains
     integer :: s, first
 
     mass = sim%masses()
-    balanced = all(sim%box%periodic) .and. sim%box%n_obstacles() == 0 .and. .not. sim%box%falling()
+    balanced = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. .not. sim%box%falling()
     first = 1
     do s = 1, size(settings%species)
       associate (species => settings%species(s), last => first + settings%species(s)%count - 1)

@@ -10,6 +10,7 @@ module input_fit
   use packing, only: packing_t
   use variables, only: obstacle_groups
   use input_groups, only: group_t, range_of
+  use partners, only: n_sides
   use position_file, only: angle_row, column_names, radius_row, spin_row
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
@@ -38,8 +39,8 @@ contains
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, law => settings%law)
-      do k = 1, size(box%obstacle)
-        call check_obstacle(groups(o(1) + k - 1), box%obstacle(k), box, problems)
+      do k = n_sides + 1, size(box%surface)
+        call check_obstacle(groups(o(1) + k - n_sides - 1), box%surface(k), box, problems)
       end do
       call survey_files(groups(s(1):s(2)), settings%species, box, problems)
       law%rotation = law%rotation .or. any(settings%species%spin_in_file)
@@ -134,10 +135,10 @@ contains
       if (.not. sound) return
     end do
     if (.not. s%radius_in_file) call check_fraction(group, s, problems)
-    do k = 1, size(box%obstacle)
-      associate (shape => box%obstacle(k)%shape)
+    do k = n_sides + 1, size(box%surface)
+      associate (shape => box%surface(k)%shape)
         if (shape%encloses .and. any(shape%extent() <= s%radius)) call group%complain("radius", "a disk of radius "// &
-          written(s%radius)//" does not fit in obstacle """//box%obstacle(k)%name//'"', problems)
+          written(s%radius)//" does not fit in obstacle """//box%surface(k)%name//'"', problems)
       end associate
     end do
   end subroutine check_species

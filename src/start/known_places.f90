@@ -68,9 +68,9 @@ contains
     text = "disk "//written(misfit%disk)//" at "//written(x(1, misfit%disk))//", "//written(x(2, misfit%disk))
     if (misfit%blocker == 0) then
       text = text//" is not wholly in its region"
-      if (any(packing%box%side%motion%travels())) text = text//", less what a side that moves takes of it at the start"
+      if (packing%box%has_moving_sides()) text = text//", less what a side that moves takes of it at the start"
     else if (misfit%blocker < 0) then
-      associate (obstacle => packing%box%obstacle(-misfit%blocker))
+      associate (obstacle => packing%box%surface(1 - misfit%blocker))
         text = text//trim(merge(" is not wholly inside", " overlaps            ", obstacle%shape%encloses))// &
           " obstacle """//obstacle%name//'"'
       end associate

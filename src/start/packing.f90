@@ -3,6 +3,7 @@
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
+  use partners, only: n_sides
   use box_geometry, only: box_t
   implicit none
   private
@@ -99,7 +100,7 @@ contains
   end subroutine add
 
   !> What keeps disks of this radius out of the whole rectangle `centre` +- `half`: a disk (its number), an obstacle
-  !> (minus its number), or nothing (0). With half = 0: whether a disk fits there.
+  !> (its code: see `partners`), or nothing (0). With half = 0: whether a disk fits there.
   pure subroutine find_blocker(self, centre, half, radius, blocker)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
@@ -108,7 +109,7 @@ contains
     real(real64) :: rho
     integer :: s, kx, ky, first(2), last(2)
 
-    do blocker = -1, -self%box%n_obstacles(), -1
+    do blocker = -n_sides, 1 - size(self%box%surface), -1
       if (self%covers(blocker, centre, half, radius)) return
     end do
     blocker = 0
@@ -223,14 +224,14 @@ contains
   !> `centre` +- `half`.
   pure function covers(self, by, centre, half, radius) result(yes)
     class(packing_t), intent(in) :: self
-    integer(int32), intent(in) :: by                !! > 0: a disk; < 0: minus the obstacle's number
+    integer(int32), intent(in) :: by                !! a disk (> 0), or the code of an obstacle
     real(real64), intent(in) :: centre(2), half(2)  !! [length]
     real(real64), intent(in) :: radius              !! [length]
     real(real64) :: corner(2)
     logical :: yes
 
     if (by < 0) then
-      associate (shape => self%box%obstacle(-by)%shape)
+      associate (shape => self%box%surface(1 - by)%shape)
         yes = shape%covers(shape%from_nearest(centre, self%box%images()), half, radius)
       end associate
     else

@@ -6,7 +6,7 @@
 module placement
   use images, only: images_t
   use kinds, only: int32, int64, pi, real64
-  use box_geometry, only: box_t, surface_t
+  use box_geometry, only: box_t
   use box_sides, only: bounds
   use collisions, only: wall_law_t
   use circles, only: new_circle
@@ -15,6 +15,7 @@ module placement
   use errors, only: error_t, exit_usage, fail
   use known_places, only: add_known, misfit_t, misfit_text
   use packing, only: packing_t
+  use partners, only: n_sides
   use position_file, only: angle_row, column_names, mass_row, radius_row, spin_row
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
@@ -242,18 +243,18 @@ contains
     type(packing_t), intent(in) :: packing
     real(real64), intent(in) :: region(4)
     type(box_t) :: box
-    type(surface_t), allocatable :: obstacle(:)
     real(real64) :: centre(2), radius
     type(images_t) :: images
     integer :: k, i, n, pass
 
+    box = box_t()
     call bounds(packing%box, 0.0_real64, box%lower, box%upper)
     box%lower = max(region([1, 3]), box%lower)
     box%upper = min(region([2, 4]), box%upper)
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
     do pass = 1, 2                                          ! count, then fill
-      n = packing%box%n_obstacles()
+      n = size(packing%box%surface)
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
         radius = packing%disk(k)%radius
@@ -262,17 +263,16 @@ contains
           if (any(centre < box%lower - radius .or. centre > box%upper + radius)) cycle
           n = n + 1
           if (pass == 1) cycle
-          obstacle(n)%name = "a disk"
-          allocate (obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
+          box%surface(n)%name = "a disk"
+          allocate (box%surface(n)%shape, source=new_circle(centre, radius, encloses=.false.))
         end do
       end do
-      if (pass == 1) allocate (obstacle(n))
+      if (pass == 1) call box%add_obstacles(n - n_sides)
     end do
-    do k = 1, packing%box%n_obstacles()
-      obstacle(k) = packing%box%obstacle(k)
-      obstacle(k)%law = wall_law_t()                        ! elastic
+    do k = n_sides + 1, size(packing%box%surface)
+      box%surface(k) = packing%box%surface(k)
+      box%surface(k)%law = wall_law_t()                     ! elastic
     end do
-    call move_alloc(obstacle, box%obstacle)
   end function growth_box
 
 end module placement

@@ -1,13 +1,14 @@
 !> Simulations for tests: states built in a line, followed by any method, and compared; and random cases.
 module test_systems
   use kinds, only: dp => real64, int32, int64, never
-  use box_geometry, only: box_t, obstacle_gap, surface_t
+  use box_geometry, only: box_t, obstacle_gap
   use box_sides, only: bounds
   use circles, only: new_circle
   use disks, only: disk_t, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
+  use partners, only: n_sides
   use random_stream, only: random_stream_t
   use segments, only: new_segment
   use shapes, only: shape_t
@@ -38,7 +39,7 @@ module test_systems
 contains
 
   !> Disks one by one, each a species of its own, in the unit box with elastic walls.
-  pure function few_disks(x, v, radius, mass) result(sim)
+  function few_disks(x, v, radius, mass) result(sim)
     real(dp), intent(in) :: x(:)           !! x1, y1, x2, y2, ... [length]
     real(dp), intent(in) :: v(:)           !! likewise [length/time]
     real(dp), intent(in) :: radius(:)      !! (n) [length]
@@ -46,6 +47,7 @@ contains
     type(simulation_t) :: sim
     integer(int32) :: i, n
     n = size(radius, kind=int32)
+    sim%box = box_t()
     allocate (sim%species(n), sim%law%restitution(n, n))
     call make_room(sim, n)
     sim%law%restitution = 1
@@ -84,6 +86,7 @@ contains
     type(random_stream_t) :: stream
     real(dp) :: spacing, radius(3)
     call stream%seed(seed, [1])
+    sim%box = box_t()
     sim%box%lower = [-1.0_dp, 0.5_dp]
     sim%box%upper = [2.0_dp, 2.5_dp]
     if (present(scale)) sim%box%upper = sim%box%lower + scale*[3.0_dp, 2.0_dp]
@@ -105,15 +108,15 @@ contains
     if (has("inelastic")) then
       sim%law%restitution = reshape([0.9_dp, 0.8_dp, 0.7_dp, 0.8_dp, 0.95_dp, 0.6_dp, 0.7_dp, 0.6_dp, &
         0.5_dp], [3, 3])
-      sim%box%side%law%restitution = 0.85_dp
+      sim%box%surface(:n_sides)%law%restitution = 0.85_dp
     end if
-    sim%box%side%law%rule = merge(2, 1, has("smooth"))
+    sim%box%surface(:n_sides)%law%rule = merge(2, 1, has("smooth"))
     if (has("contact")) sim%law%contact_time = 0.01_dp
     if (has("shaken")) then                       ! far, fast, and on the spot; all from their places
-      sim%box%side(3)%motion = side_motion_t(kind=3, amplitude=0.5_dp, period=4.0_dp)
-      if (.not. sim%box%periodic(1)) sim%box%side(2)%motion = side_motion_t(kind=2, amplitude=0.03_dp, period=0.25_dp, &
+      sim%box%surface(3)%motion = side_motion_t(kind=3, amplitude=0.5_dp, period=4.0_dp)
+      if (.not. sim%box%periodic(1)) sim%box%surface(2)%motion = side_motion_t(kind=2, amplitude=0.03_dp, period=0.25_dp, &
         phase=0.5_dp)
-      sim%box%side(4)%motion = side_motion_t(kind=4, strike=0.5_dp)
+      sim%box%surface(4)%motion = side_motion_t(kind=4, strike=0.5_dp)
     end if
     call fill_lattice(sim, spacing, radius, count([has("giant"), has("giants")]), stream)
     if (has("bed")) call lay_to_rest(sim%disk(2:))
@@ -145,22 +148,17 @@ contains
   end subroutine add_obstacles
 
   !> Adds an obstacle to a box.
-  pure subroutine add_obstacle(box, name, shape)
+  subroutine add_obstacle(box, name, shape)
     type(box_t), intent(inout) :: box
     character(len=*), intent(in) :: name
     class(shape_t), intent(in) :: shape
-    type(surface_t), allocatable :: more(:)
-    integer :: m, n
 
-    n = box%n_obstacles()
-    allocate (more(n + 1))
-    do m = 1, n
-      more(m) = box%obstacle(m)
-    end do
-    more(n + 1)%name = name
-    more(n + 1)%law = box%side(1)%law
-    allocate (more(n + 1)%shape, source=shape)
-    call move_alloc(more, box%obstacle)
+    call box%add_obstacles(1)
+    associate (added => box%surface(size(box%surface)))
+      added%name = name
+      added%law = box%surface(1)%law
+      allocate (added%shape, source=shape)
+    end associate
   end subroutine add_obstacle
 
   !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
@@ -225,8 +223,8 @@ contains
     logical :: yes
     integer :: k
     yes = .true.
-    do k = 1, sim%box%n_obstacles()
-      associate (shape => sim%box%obstacle(k)%shape)
+    do k = n_sides + 1, size(sim%box%surface)
+      associate (shape => sim%box%surface(k)%shape)
         yes = yes .and. .not. shape%covers(shape%from_nearest(site, sim%box%images()), [0.0_dp, 0.0_dp], radius)
       end associate
     end do
@@ -362,7 +360,7 @@ contains
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
         gap = min(gap, minval(merge(never, min(x - low, high - x) - r, sim%box%periodic))/(2*r))
-        do m = 1, sim%box%n_obstacles()
+        do m = n_sides + 1, size(sim%box%surface)
           gap = min(gap, obstacle_gap(sim%box, m, x, r)/(2*r))
         end do
       end associate
