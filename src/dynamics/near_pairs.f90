@@ -2,7 +2,7 @@
 !> moved by half the `skin`, so one list serves many steps (Verlet, Phys. Rev. 159, 98 (1967)).
 module near_pairs
   use kinds, only: int32, pi, real64
-  use box_geometry, only: box_t, obstacle_gap
+  use box_geometry, only: obstacle_gap
   use partners, only: n_sides
   use shapes, only: spare
   use simulation_state, only: simulation_t
