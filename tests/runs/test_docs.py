@@ -97,9 +97,9 @@ def procedures_of(module):
     return re.findall(r"^ *(?!end\b)[^!'\"\n]*?\b(?:subroutine|function) +(\w+) *\(", code, re.M)
 
 
-def test_procedures_that_the_page_where_names_exist():
-    """On docs/where.md `folder/file: procedure` is one in src/."""
-    page = (ROOT / "docs" / "where.md").read_text()
+def test_procedures_that_are_named_exist():
+    """On docs/inside.md `folder/file: procedure` is one in src/."""
+    page = (ROOT / "docs" / "inside.md").read_text()
     named = re.findall(r"`((?:\w+/)?\w+): (\w+)`", page)
     assert len(named) > 30
     missing = [f"{module}: {name}" for module, name in named if name not in procedures_of(module)]
@@ -126,7 +126,7 @@ def called(build, *words, cwd):
 
 
 @pytest.mark.check
-def test_procedures_that_the_page_where_names_are_called_in_its_examples(tmp_path):
+def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
     if not shutil.which("gcov"):
         pytest.skip("gcov counts the calls")
     build = tmp_path / "build"
@@ -135,13 +135,15 @@ def test_procedures_that_the_page_where_names_are_called_in_its_examples(tmp_pat
     make = ["make", "-j2", flags, f"BUILD={build}", "all"]
     subprocess.run(make, cwd=ROOT, env=environment, check=True, capture_output=True)
     (tmp_path / "input").symlink_to(ROOT / "input")
-    rows = re.findall(
-        r"^\| (.+) \| (.+) \| (`.+`) \|$", (ROOT / "docs" / "where.md").read_text(), re.M
-    )
-    assert len(rows) > 40
+    page = section("inside", "## Where is it decided …\\?")
+    short = dict(re.findall(r"\*(\w+)\* is\s+`(.+)`", page))
+    rows = re.findall(r"^\| (.+) \| (.+) \| ?(.*) \|$", page, re.M)
+    rows = [row for row in rows if row[2] not in ("-", "seen in")]
+    assert len(rows) > 40 and len(short) == 3
     calls, missing = {}, []
     for question, answer, cell in rows:
-        examples = re.findall(r"`([^`]+)`", cell)
+        commands = re.sub(r"\*(\w+)\*", lambda name: f"`{short[name[1]]}`", cell)
+        examples = re.findall(r"`([^`]+)`", commands) or ["gas.nml"]
         for example in examples:
             if example not in calls:
                 first, *options = example.split()
@@ -260,8 +262,8 @@ def test_every_script_of_post_is_in_the_list():
     assert [name for name in scripts if not re.search(rf"^\|.*`{name}`.*\| ", page, re.M)] == []
 
 
-def test_the_script_that_the_page_on_extending_shows_works(tmp_path):
-    page = (ROOT / "docs" / "extending.md").read_text()
+def test_the_script_of_a_recipe_works(tmp_path):
+    page = section("inside", "### An observable")
     script = re.search(r'    """The largest speed in time.*?launch\(main\)\n', page, re.DOTALL)[0]
     (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
     still = np.zeros((2, 3, 2))
@@ -353,50 +355,39 @@ def test_completion_knows_ensembles(program, tmp_path):
     subprocess.run(["bash", "-c", known, "bash", COMPLETION], stdout=subprocess.PIPE, check=True)
 
 
-def code_after(text: str, start: int) -> tuple[str, int]:
-    """The indented block that begins at or after a place in a page, without the indent; its end."""
-    lines, block, place = text[start:].splitlines(keepends=True), [], start
-    for line in lines:
-        if block and line.strip() and not line.startswith("    "):
-            break
-        if block or line.startswith("    "):
-            block.append(line[4:] or "\n")
-        place += len(line)
-    return "".join(block).rstrip("\n") + "\n", place
-
-
-def replace_lines(text: str, old: str, new: str) -> str:
+def replace_lines(text: str, old: list[str], new: list[str]) -> str:
     """The text with some whole lines, found by all but their indent, replaced once."""
-    pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old.splitlines())
+    pattern = "".join(rf"^( *){re.escape(line.strip())}\n" for line in old)
     (found,) = re.finditer(pattern, text, re.MULTILINE)
-    lines = [found[1] + line if line.strip() else line for line in new.splitlines(keepends=True)]
+    lines = [f"{found[1]}{line}\n" if line.strip() else "\n" for line in new]
     return text[: found.start()] + "".join(lines) + text[found.end() :]
 
 
 def carry_out_recipes(page: str, root: Path) -> int:
-    """Makes the changes to the sources that a page describes: a new file, `after` and `change`."""
-    path = r"[Ii]n\s+`((?:src|post)/[\w/]+\.(?:f90|py))`"
-    for found in re.finditer(r"`(src/[\w/]+\.f90)`, a new file:", page):
-        (root / found[1]).write_text(code_after(page, found.end())[0])
-    steps = list(re.finditer(rf"{path}, (after|change)\n", page))
-    for found in steps:
-        anchor, place = code_after(page, found.end())
-        code, _ = code_after(page, place)
-        file = root / found[1]
-        new = anchor + code if found[2] == "after" else code
-        file.write_text(replace_lines(file.read_text(), anchor, new))
-    return len(steps)
+    """Makes the changes to the sources that a page describes: new files, and blocks of lines."""
+    for name, code in re.findall(r"`(src/\S+)`, a new file:\n\n((?:    .*\n|\n)+)", page):
+        (root / name).write_text(textwrap.dedent(code).rstrip("\n") + "\n")
+    changes = 0
+    for block in re.findall(r"^```diff\n(.*?)^```", page, re.M | re.S):
+        for name, text in re.findall(r"^--- (\S+)\n(.*?)(?=^--- |\Z)", block, re.M | re.S):
+            for lines in map(str.splitlines, text.split("@@\n")):
+                old = [line[1:] for line in lines if line[0] != "+"]
+                new = [line[1:] for line in lines if line[0] != "-"]
+                file = root / name
+                file.write_text(replace_lines(file.read_text(), old, new))
+                changes += 1
+    return changes
 
 
-def look_at_blocks(run, folder):
-    """The block is on the pages of Python; paths are known that meet it more than once."""
+def look_at_bars(run, folder):
+    """The bar is on the pages of Python; paths are known that meet it more than once."""
     more = ["--set", "contact.wall_rule=normal", "--force"]
     subprocess.run([*run, *more], cwd=folder, check=True)
     code = """if True:
         from ricochet import read_run
         from ricochet.paths import Paths
         run = read_run("all.h5")
-        assert run.walls.shape == (4, 2, 2) and (run.walls.mean((0, 1)) == (1, 0.5)).all()
+        assert run.walls.tolist() == [[[1, 0.3], [1, 0.7]]]
         turns = [turn for turn in Paths(run).along(range(0, run.frames, 50))]
         assert not any(turn.guessed.any() for turn in turns)
         assert sum(len(turn.time) for turn in turns) == (run.events[0] <= run.time[300]).sum() > 200
@@ -408,12 +399,11 @@ def look_at_blocks(run, folder):
         subprocess.run(command, cwd=folder, env=environment, check=True)
 
 
-def test_the_recipes_of_the_page_on_extending_work(tmp_path):
+def test_the_recipes_work(tmp_path):
     for name in ("src", "post", "Makefile", "tests"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    steps = carry_out_recipes((ROOT / "docs" / "extending.md").read_text(), tmp_path)
-    assert steps >= 14
+    assert carry_out_recipes((ROOT / "docs" / "inside.md").read_text(), tmp_path) > 30
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
     style = [sys.executable, "tests/support/check_style.py"]
     said = subprocess.run(style, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
@@ -429,7 +419,7 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
         assert made.returncode == 0, made.stdout + made.stderr
     (tmp_path / "all.nml").write_text(
         """&box upper = 2, 1 / &run dynamics = 'ideal' /
-        &block name = 'brick' centre = 1, 0.5 sides = 0.5, 0.5 /
+        &bar name = 'rod' from = 1, 0.3 to = 1, 0.7 thickness = 0.1 /
         &species count = 50 radius = 0.02 speed = 1 region = 0, 0.7, 0, 1 /
         &contact wall_rule = 'sticky' wall_restitution = 1 / &stop time = 3 /
         &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
@@ -438,14 +428,14 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
     subprocess.run(run, cwd=tmp_path, check=True)
     with h5py.File(tmp_path / "all.h5") as file:
         fastest = file["observables/largest_speed/value"][:]
-        outside = np.abs(file["particles/disks/position/value"][:] - (1, 0.5)) - 0.25
+        x, y = np.moveaxis(file["particles/disks/position/value"][:], -1, 0)
         assert file["observables/collisions/value"][-1] == 0
         assert file["observables/obstacle_collisions/value"][-1] > 10
-        assert file["parameters/block/sides"][:].tolist() == [[0.5, 0.5]]
-    assert np.hypot(*np.moveaxis(np.maximum(outside, 0), -1, 0)).min() > 0.02 - 1e-9
+        assert file["parameters/bar/thickness"][:].tolist() == [0.1]
+    assert np.hypot(x - 1, np.maximum(np.abs(y - 0.5) - 0.2, 0)).min() > 0.07 - 1e-9
     assert fastest[0] == pytest.approx(1) and (np.diff(fastest) <= 1e-15).all()
     assert fastest[-1] < 1  # sticky walls take the tangential velocity
-    look_at_blocks(run, tmp_path)
+    look_at_bars(run, tmp_path)
     gas = """&species count = 3000 packing_fraction = 0.3 temperature = 1 /
         &contact restitution = 1 wall_restitution = 0.5 / &stop wall_hits = 1500 /
         &side name = 'bottom' elastic_below = 1e9 /
@@ -462,9 +452,6 @@ def test_the_recipes_of_the_page_on_extending_work(tmp_path):
     for other in ("cores", "parts"):
         found = differences(tmp_path / "plain.h5", tmp_path / f"{other}.h5")
         assert [name for name in found if "parameters" not in name] == []
-    more = [run[0], "gas.nml", "-o", "plain.h5", "--resume"]
-    ended = subprocess.run(more, cwd=tmp_path, capture_output=True, text=True)
-    assert ended.returncode == 3 and "such as --set stop.wall_hits=3000" in ended.stderr
     with h5py.File(tmp_path / "plain.h5") as file:
         exchanged = file["observables/exchanged_impulse/value"][:]
         hits = file["particles/disks/wall_hits/value"][:]
