@@ -3,7 +3,7 @@
 module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use variables, only: allowed, either, name_length, row_of, table, words_of
+  use variables, only: allowed, either, excludes, name_length, row_of, table, words_of
   use texts, only: written, written_exactly
   implicit none
   private
@@ -43,7 +43,7 @@ module input_groups
     procedure :: integer_of, real_of, reals_of, text_of
     procedure :: given, faulty, line_of
     procedure :: put_text, put_reals
-    procedure :: complain, demand, refuse
+    procedure :: complain, demand
     procedure :: infer_choices, check_choices
     procedure :: value_line
   end type group_t
@@ -203,19 +203,6 @@ contains
     end associate
   end subroutine demand
 
-  !> Reports those of some variables that the user has set.
-  pure subroutine refuse(self, names, why, problems)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: names(:)
-    character(len=*), intent(in) :: why
-    type(problem_list_t), intent(inout) :: problems
-    integer :: k
-
-    do k = 1, size(names)
-      if (self%given(names(k))) call self%complain(trim(names(k)), why, problems)
-    end do
-  end subroutine refuse
-
   !> A choice that is not given follows from the variables that go with it; the last one in the table counts.
   pure subroutine infer_choices(self)
     class(group_t), intent(inout) :: self
@@ -229,28 +216,33 @@ contains
     end do
   end subroutine infer_choices
 
-  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given,
-  !> that is a mistake: nothing is ignored silently.
+  !> A choice may need a variable. A variable that does not go with the choice has no value; if it is given, that is a
+  !> mistake: nothing is ignored silently. Variables may exclude each other.
   pure subroutine check_choices(self, problems)
     class(group_t), intent(inout) :: self
     type(problem_list_t), intent(inout) :: problems
     character(len=len(table%goes_with)), allocatable :: words(:)   ! the choice, then its words
     character(len=len(table%goes_with)) :: word
-    integer :: k
+    integer :: j, k
 
     do k = 1, size(self%values)
-      words = words_of(table(self%values(k)%row)%goes_with)
-      if (size(words) == 0) cycle
-      word = self%text_of(words(1))
-      associate (slot => self%values(k))
-        if (any(words(2:) == word)) then
-          if (table(slot%row)%status == "optional" .and. .not. slot%given) &
+      associate (slot => self%values(k), row => table(self%values(k)%row))
+        words = words_of(row%goes_with)
+        if (size(words) > 0) then
+          word = self%text_of(words(1))
+          if (.not. any(words(2:) == word)) then
+            call slot%clear()
+            if (slot%given .and. word /= "" .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), &
+              "has no effect with "//trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
+          else if (row%status == "required" .and. .not. slot%given) then
             call self%complain(trim(words(1)), "'"//trim(word)//"' needs "//trim(self%name)//"."//slot%name, problems)
-        else
-          call slot%clear()
-          if (slot%given .and. .not. self%faulty(words(1))) call self%complain(trim(slot%name), "has no effect with "// &
-            trim(words(1))//" = '"//trim(word)//"'; it goes with "//either(words(2:)), problems)
+          end if
         end if
+        if (.not. slot%given) cycle
+        do j = 1, size(self%values)
+          if (self%values(j)%given .and. excludes(slot%row, self%values(j)%row)) call self%complain(trim(slot%name), &
+            "is given with "//trim(self%values(j)%name)//"; give one of them", problems)
+        end do
       end associate
     end do
   end subroutine check_choices

@@ -113,8 +113,6 @@ contains
     s%angular_velocity = group%real_of("angular_velocity", 0.0_real64)
     s%rotational_temperature = group%real_of("rotational_temperature", -1.0_real64)
     s%spin_in_file = s%velocities == "file" .and. .not. (group%given("angular_velocity") .or. group%given("rotational_temperature"))
-    if (group%given("angular_velocity") .and. group%given("rotational_temperature")) call group%complain("angular_velocity", &
-      "is given with rotational_temperature; give one of them", problems)
     call take_pairs(group, "velocity", s%velocity, problems)
     associate (n => size(s%velocity, 2))
       if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
@@ -225,9 +223,7 @@ contains
     radius = group%real_of("radius", 0.0_real64)
     if (group%given("packing_fraction")) then
       if (group%given("radius") .or. group%given("relative_to")) then
-        call group%complain("packing_fraction", "fixes the radius, as does "//trim(merge("radius     ", &
-          "relative_to", group%given("radius")))//"; give only one of them", problems)
-        radius = 0
+        radius = 0                                       ! told already
       else if (s%count > 0 .and. area(s%region) > 0) then
         radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
       end if

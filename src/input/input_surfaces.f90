@@ -14,7 +14,7 @@ module input_surfaces
   use texts, only: place_of, written
   implicit none
   private
-  public :: refuse_grip, take_grip, take_obstacles, take_wall_laws
+  public :: take_grip, take_obstacles, take_wall_laws
 
 contains
 
@@ -100,22 +100,17 @@ contains
     type(wall_law_t), intent(out) :: law
     type(problem_list_t), intent(inout) :: problems
 
-    law%speed = group%real_of("speed", 0.0_real64)
-    law%temperature = group%real_of("temperature", 0.0_real64)
-    if (group%given("temperature")) then
-      call group%refuse([character(len=22) :: "restitution", "rule", "tangential_restitution", "friction"], &
-        "has no effect at a thermal wall; leave it out, or temperature", problems)
-      return
-    end if
+    associate (rules => words_of(wall_rules), thermal => group%given("temperature"))
+      if (.not. (thermal .or. group%given("rule"))) call group%put_text("rule", trim(rules(otherwise%rule)))
+      call group%check_choices(problems)
+      law%speed = group%real_of("speed", 0.0_real64)
+      law%temperature = group%real_of("temperature", 0.0_real64)
+      if (thermal) return
+      law%rule = max(1, place_of(group%text_of("rule"), rules))
+    end associate
     law%restitution = group%real_of("restitution", otherwise%restitution)
     call group%put_reals("restitution", [law%restitution])
-    associate (rules => words_of(wall_rules))
-      law%rule = otherwise%rule
-      if (group%given("rule")) law%rule = max(1, place_of(group%text_of("rule"), rules))
-      call group%put_text("rule", trim(rules(law%rule)))
-    end associate
     if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
-    if (law%rule /= normal_rule) call refuse_grip(group, "", problems)
     if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
     if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
       call group%put_reals("friction", [law%grip%friction])
@@ -125,11 +120,10 @@ contains
 
   !> How a side moves.
   subroutine take_motion(group, motion, problems)
-    type(group_t), intent(inout) :: group
+    type(group_t), intent(in) :: group
     type(side_motion_t), intent(out) :: motion
     type(problem_list_t), intent(inout) :: problems
 
-    call group%check_choices(problems)
     if (group%faulty("motion")) return
     motion%kind = place_of(group%text_of("motion"), words_of(motions))
     motion%amplitude = group%real_of("amplitude", 0.0_real64)
@@ -138,8 +132,6 @@ contains
     motion%strike = group%real_of("velocity", 0.0_real64)
     if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
       written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
-    if (motion%is_on() .and. group%given("temperature")) call group%complain("motion", &
-      "excludes temperature: a thermal wall does not move; leave one of them out", problems)
   end subroutine take_motion
 
   !> Sides must not meet, whenever each is how far inwards.
@@ -168,17 +160,5 @@ contains
     if (group%given(prefix//"friction") .and. .not. grip%is_rough()) call group%complain(prefix//"friction", &
       "has no effect without "//prefix//"tangential_restitution, which is -1 (smooth); give it, too", problems)
   end subroutine take_grip
-
-  !> A wall with the rule 'velocity' leaves rotation alone.
-  subroutine refuse_grip(group, prefix, problems)
-    type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: prefix                !! as above
-    type(problem_list_t), intent(inout) :: problems
-    character(len=27) :: names(2)
-
-    names(1) = prefix//"tangential_restitution"
-    names(2) = prefix//"friction"
-    call group%refuse(names, "has no effect with "//prefix//"rule = 'velocity'; take "//prefix//"rule = 'normal'", problems)
-  end subroutine refuse_grip
 
 end module input_surfaces

@@ -45,7 +45,7 @@ contains
     character(len=:), allocatable :: indent
 
     indent = "  "
-    if (row%status == "optional" .or. row%status == "fallback") indent = "  ! "
+    if (row%status /= "default" .and. row%status /= "example") indent = "  ! "
     if (any(wall_groups == row%group)) indent = "!   "
     line = padded(indent//trim(row%name)//" = "//trim(row%value))//" ! "
     if (row%status == "example") line = line//"an example: "

@@ -10,7 +10,7 @@ module variables
   private
   public :: variable_t, table, free_to_change, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
   public :: full_names
-  public :: track_of, words_of, allowed, either, smallest, largest, most_disks, most_threads, name_length
+  public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37
   integer, parameter :: most_threads = 1024, most_disks = 100000000
@@ -51,13 +51,15 @@ module variables
     character(len=16) :: unit = ""
     character(len=100) :: choices = ""        !! of texts, separated by blanks; none: free text
     character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
+    character(len=80) :: excludes = ""       !! variables of the same group that are not given with it
   end type variable_t
 
   ! status     value                           line in the reference file
   ! default    the default                     as it is
   ! fallback   the default where one applies   as a comment
   ! example    an example, no default          as it is, because something must be given
-  ! optional   an example, no default          as a comment; its choice needs it, if it goes with one
+  ! required   an example, no default          as a comment; must be given with the choice that it goes with
+  ! optional   an example, no default          as a comment
 
   character(len=8), parameter :: group_names(10) = [character(len=8) :: &
     "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
@@ -92,13 +94,13 @@ module variables
       choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
       "how it moves about its place in time; sawtooth: it stays and strikes", choices=motions), &
-    variable_t("side", "amplitude", "real", 1, "optional", "0.05", "how far it moves from its place", positive, &
+    variable_t("side", "amplitude", "real", 1, "required", "0.05", "how far it moves from its place", positive, &
       "length", goes_with="motion sine parabolic"), &
-    variable_t("side", "period", "real", 1, "optional", "1", "of the motion", positive, "time", &
+    variable_t("side", "period", "real", 1, "required", "1", "of the motion", positive, "time", &
       goes_with="motion sine parabolic"), &
     variable_t("side", "phase", "real", 1, "fallback", "0", &
       "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
-    variable_t("side", "velocity", "real", 1, "optional", "1", "with which it strikes, inwards", positive, &
+    variable_t("side", "velocity", "real", 1, "required", "1", "with which it strikes, inwards", positive, &
       "length/time", goes_with="motion sawtooth")]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
@@ -119,17 +121,17 @@ module variables
       "of a disk and this wall; default contact.wall_restitution", unit_interval), &
     variable_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules), &
     variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
-      "of a rough wall; default contact.wall_tangential_restitution", tangential), &
+      "of a rough wall; default contact.wall_tangential_restitution", tangential, goes_with="rule normal"), &
     variable_t("", "friction", "real", 1, "optional", "0.3", "Coulomb's coefficient; default contact.wall_friction", &
-      not_negative), &
+      not_negative, goes_with="rule normal"), &
     variable_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
-      positive, "energy"), &
+      positive, "energy", excludes="restitution rule tangential_restitution friction motion"), &
     variable_t("", "speed", "real", 1, "fallback", "0", &
       "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time")]
   integer, private :: g, r
   type(variable_t), parameter :: wall_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
     law_rows(r)%size, law_rows(r)%status, law_rows(r)%value, law_rows(r)%help, law_rows(r)%range, law_rows(r)%unit, &
-    law_rows(r)%choices, law_rows(r)%goes_with), r=1, size(law_rows)), g=1, size(wall_groups))]
+    law_rows(r)%choices, law_rows(r)%goes_with, law_rows(r)%excludes), r=1, size(law_rows)), g=1, size(wall_groups))]
 
   type(variable_t), parameter :: species_rows(*) = [ &
     variable_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
@@ -139,7 +141,7 @@ module variables
     variable_t("species", "radius", "real", 1, "example", "0.01", &
       "radius of a disk; give it or packing_fraction, or leave it to file", positive, "length"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
-      "area of the disks divided by the area of their region; fixes the radius", fraction), &
+      "area of the disks divided by the area of their region; fixes the radius", fraction, excludes="radius relative_to"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "another species; mass and radius are then multiples of its own (radius: 1)"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
@@ -147,13 +149,13 @@ module variables
     variable_t("species", "placement", "text", 1, "default", "'random'", &
       "where disks start; follows from grid, position or file if one is given", &
       choices="random grid lattice dense explicit file grown"), &
-    variable_t("species", "grid", "integer", 2, "optional", "10, 10", &
+    variable_t("species", "grid", "integer", 2, "required", "10, 10", &
       "columns and rows of placement = 'grid'", count_of_disks, goes_with="placement grid"), &
-    variable_t("species", "file", "text", 1, "optional", "'runs/gas.h5'", &
+    variable_t("species", "file", "text", 1, "required", "'runs/gas.h5'", &
       "text with lines x y [vx vy] or named columns, or a run whose last frame is used", goes_with="placement file grown"), &
     variable_t("species", "scale_positions", "logical", 1, "fallback", ".false.", &
       "stretch the positions in the file of a run from its box to this one", goes_with="placement file grown"), &
-    variable_t("species", "position", "real", 0, "optional", "0.2, 0.5, 0.8, 0.5", &
+    variable_t("species", "position", "real", 0, "required", "0.2, 0.5, 0.8, 0.5", &
       "x1, y1, x2, y2, ... of placement = 'explicit'", unit="length", goes_with="placement explicit"), &
     variable_t("species", "velocities", "text", 1, "default", "'rest'", &
       "how disks start; follows from velocity, speed, temperature or file", &
@@ -165,12 +167,12 @@ module variables
       goes_with="velocities maxwell"), &
     variable_t("species", "exact_temperature", "real", 1, "optional", "1", &
       "scale the velocities so that kT of the species is exactly this", not_negative, "energy"), &
-    variable_t("species", "velocity", "real", 0, "optional", "1, 0", &
+    variable_t("species", "velocity", "real", 0, "required", "1, 0", &
       "vx1, vy1, vx2, vy2, ... of 'explicit'; one pair is used for all disks", unit="length/time", &
       goes_with="velocities explicit"), &
     variable_t("species", "angular_velocity", "real", 1, "optional", "2", "of all disks at the start", unit="1/time"), &
     variable_t("species", "rotational_temperature", "real", 1, "optional", "1", &
-      "mean of I omega**2 at the start, instead of angular_velocity", not_negative, "energy")]
+      "mean of I omega**2 at the start, instead of angular_velocity", not_negative, "energy", excludes="angular_velocity")]
 
   type(variable_t), parameter :: contact_rows(*) = [ &
     variable_t("contact", "restitution", "real", 1, "default", "1", &
@@ -188,26 +190,26 @@ module variables
     variable_t("contact", "inertia", "real", 1, "default", "0.5", &
       "moment of inertia of a disk over mass times radius squared", moment), &
     variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
-      "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential), &
+      "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential, goes_with="wall_rule normal"), &
     variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", "of the same; default as friction", &
-      not_negative), &
+      not_negative, goes_with="wall_rule normal"), &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
       "for species 1-1, 1-2, ..., 2-1, 2-2, ...; instead of restitution", unit_interval)]
 
   type(variable_t), parameter :: drive_rows(*) = [ &
     variable_t("drive", "kind", "text", 1, "default", "'none'", &
       "kicks: random changes of velocity, a heat bath, Brownian or active disks", choices=drive_kinds), &
-    variable_t("drive", "interval", "real", 1, "optional", "0.01", "time from kick to kick", positive, "time", &
+    variable_t("drive", "interval", "real", 1, "required", "0.01", "time from kick to kick", positive, "time", &
       goes_with="kind noise andersen brownian active"), &
-    variable_t("drive", "strength", "real", 1, "optional", "0.1", &
+    variable_t("drive", "strength", "real", 1, "required", "0.1", &
       "growth of the variance of each component of all velocities", positive, "velocity**2/time", goes_with="kind noise"), &
     variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
       "subtract the mean velocity that each kick gives", goes_with="kind noise"), &
-    variable_t("drive", "fraction", "real", 1, "optional", "0.1", &
+    variable_t("drive", "fraction", "real", 1, "required", "0.1", &
       "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen"), &
-    variable_t("drive", "temperature", "real", 1, "optional", "1", "kT of the new velocities", positive, "energy", &
+    variable_t("drive", "temperature", "real", 1, "required", "1", "kT of the new velocities", positive, "energy", &
       goes_with="kind andersen brownian active"), &
-    variable_t("drive", "speed", "real", 1, "optional", "1", "added along the orientation of a disk", &
+    variable_t("drive", "speed", "real", 1, "required", "1", "added along the orientation of a disk", &
       not_negative, "length/time", goes_with="kind active"), &
     variable_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
       "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active"), &
@@ -316,6 +318,15 @@ contains
       text = text//trim(table(k)%group)//"."//name
     end do
   end function full_names
+
+  !> Whether one variable is not given with another of its group; of those that time the same samples, one is.
+  pure function excludes(one, other) result(yes)
+    integer, intent(in) :: one, other        !! rows
+    logical :: yes
+
+    yes = any(words_of(table(one)%excludes) == table(other)%name)
+    if (other < one .and. track_of(table(one)%name) /= "") yes = track_of(table(one)%name) == track_of(table(other)%name)
+  end function excludes
 
   !> Whose samples a variable times: `frames` of frames_every_time; empty if it is no cadence.
   pure function track_of(name) result(track)

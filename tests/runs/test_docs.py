@@ -410,7 +410,7 @@ def test_the_recipes_work(tmp_path):
     assert (said.returncode, said.stdout) == (0, "")
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    about = "observables", "parameters", "namelist_input"
+    about = "observables", "variables", "namelist_input"
     laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
     for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
         made = subprocess.run(

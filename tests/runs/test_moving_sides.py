@@ -226,7 +226,7 @@ SINE = "motion = 'sine' amplitude = 0.1 period = 1"
         ("&side name = 'top' motion = 'sine' amplitude = 1 period = 1 /", "leaves no room"),
         (f"&side name = 'top' {SINE} phase = 2 /", "from 0 to 1"),
         ("&side name = 'top' motion = 'sawtooth' velocity = 0 /", "> 0"),
-        (f"&side name = 'top' {SINE} temperature = 1 /", "excludes temperature"),
+        (f"&side name = 'top' {SINE} temperature = 1 /", "given with motion"),
         (f"&side name = 'left' {SINE} / &box boundary = 'periodic', 'wall' /", "is periodic"),
         (f"&side name = 'top' {SINE} / &stop energy_fraction = 0.5 /", "motion"),
         ("&wall motion = 'sine' from = 0, 0 to = 1, 1 /", "side.motion"),

@@ -24,7 +24,9 @@ def report(ricochet, folder, text) -> tuple[int, list[str]]:
     if "&stop" not in text:
         text += "\n&stop time = 1 /"
     (folder / "f").write_text(text + "\n")
-    run = ricochet("f", "--check", *(word for own in settings for word in ("--set", own)))
+    run = ricochet(
+        "f", "--check", "--quiet", *(word for own in settings for word in ("--set", own))
+    )
     assert run.stdout == ""
     return run.returncode, run.stderr.splitlines()
 
