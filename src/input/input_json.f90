@@ -59,7 +59,7 @@ contains
       member("unit", row%unit /= "", quoted(row%unit))//member("help", .true., quoted(row%help))// &
       member("allowed", .true., quoted(allowed(row)))//", ""goes_with"": {"
     if (size(words) > 0) text = text//quoted(words(1))//": "//list(words(2:))
-    text = text//"}"//member("repeated", .true., truth(is_repeated(row%group)))// &
+    text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))//member("repeated", .true., truth(is_repeated(row%group)))// &
       member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
   end function row_text
 
