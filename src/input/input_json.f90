@@ -60,7 +60,8 @@ contains
       member("allowed", .true., quoted(allowed(row)))//", ""goes_with"": {"
     if (size(words) > 0) text = text//quoted(words(1))//": "//list(words(2:))
     text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
-      member("repeated", .true., truth(is_repeated(row%group)))//member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
+      member("repeated", .true., truth(is_repeated(row%group)))// &
+      member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
   end function row_text
 
   !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
