@@ -149,10 +149,16 @@ contains
     periods = 0
     associate (last => self%last(axis), n => self%n(axis))
       if (last == 0) return
-      periods = merge(1, 0, there > last) - merge(1, 0, cell > last)
-      if (last < n) return                         ! the side lies within the patch
-      periods = floor(real(there - 1, real64)/n, int32)
-      there = there - periods*n
+      if (last < n) periods = merge(1, 0, there > last) - merge(1, 0, cell > last)      ! the side lies within the patch
+      if (last < n) return
+      do while (there > n)
+        there = there - n
+        periods = periods + 1
+      end do
+      do while (there < 1)
+        there = there + n
+        periods = periods - 1
+      end do
     end associate
   end subroutine step
 

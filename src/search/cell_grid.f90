@@ -8,7 +8,7 @@ module cell_grid
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
-  use cell_scans, only: scan_around_seam, scan_cell, scan_chains_around, scan_one
+  use cell_scans, only: scan_around_seam, scan_cells, scan_chains_around, scan_one
   use disks, only: disk_t, tag_t
   use free_flight, only: time_to_circle
   use images, only: images_t
@@ -36,6 +36,7 @@ module cell_grid
     type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
     type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
     type(obstacle_lists_t) :: obstacles            !! that reach into the cells
+    type(images_t) :: images                       !! of the box, in this epoch
   contains
     procedure :: build
     procedure :: predict
@@ -59,6 +60,7 @@ contains
 
     if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
     associate (patch => self%patch)
+      self%images = sim%images()
       call self%faces%set(sim%box, patch)
       self%roomy = any(self%faces%width > spacious*patch%reach)
       call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
@@ -343,7 +345,6 @@ contains
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
-    type(images_t) :: images
     real(real64) :: t
     integer(int32) :: e
 
@@ -353,11 +354,10 @@ contains
       near%cell = self%cells%number(cell)
       call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
       if (self%patch%at_seam(cell)) then
-        images = sim%images()
-        t = images%look_again(sim%now, self%patch%width(1))
+        t = self%images%look_again(sim%now, self%patch%width(1))
         if (t < near%time) near%partner = looks_again
         near%time = min(t, near%time)
-        call scan_around_seam(self%cells, self%patch, sim, near)
+        call scan_around_seam(self%cells, self%patch, sim, self%images, near)
       else
         call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
         call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
@@ -367,8 +367,8 @@ contains
       e = self%big%first(cell(1), cell(2))
     end associate
     do while (e > 0)
-      associate (listing => self%big%listing(e), images => sim%images())
-        call scan_one(sim, self%big%disk(listing%number), images%image(real(listing%image, real64)), near)
+      associate (listing => self%big%listing(e))
+        call scan_one(sim, self%big%disk(listing%number), self%images%image(real(listing%image, real64)), near)
         e = listing%next
       end associate
     end do
@@ -382,7 +382,6 @@ contains
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
     real(real64) :: t_margin
-    type(images_t) :: images
     integer(int32) :: number, m, image
 
     near%disk = i
@@ -394,16 +393,15 @@ contains
       sim%box%gravity, self%big%margin, inside=.true.)
     if (t_margin < near%time) near%partner = looks_again
     near%time = min(near%time, t_margin)
-    images = sim%images()
-    do image = 1, images%count()
+    do image = 1, self%images%count()
       do m = 1, self%big%count
-        call scan_one(sim, self%big%disk(m), images%image(images%around(image)), near)
+        call scan_one(sim, self%big%disk(m), self%images%image(self%images%around(image)), near)
       end do
     end do
     do m = 1, size(self%big%ring(number)%at, kind=int32)
       associate (place => self%big%ring(number)%at(m))
-        call scan_cell(self%cells, sim, place%cell(1) + self%cells%stride*place%cell(2), &
-          images%image(real(-place%image, real64)), near)
+        call scan_cells(self%cells, sim, [place%cell(1) + self%cells%stride*place%cell(2)], near, &
+          self%images%image(real(-place%image, real64)))
       end associate
     end do
   end subroutine find_event_of_big

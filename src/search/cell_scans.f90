@@ -9,7 +9,7 @@ module cell_scans
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: scan_around_seam, scan_cell, scan_chains_around, scan_one
+  public :: scan_around_seam, scan_cells, scan_chains_around, scan_one
 
 contains
 
@@ -25,21 +25,29 @@ contains
     call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
   end subroutine scan_one
 
-  !> Contacts with the disks of one cell, seen through an image.
-  pure subroutine scan_cell(cells, sim, c, image, near)
+  !> Contacts with the disks of some cells, seen through an image.
+  pure subroutine scan_cells(cells, sim, c, near, image)
     type(cell_contents_t), intent(in) :: cells
     type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: c
-    type(image_t), intent(in) :: image             !! through which it is seen
+    integer(int32), intent(in) :: c(:)             !! numbers of up to nine cells
     type(prospect_t), intent(inout) :: near
+    type(image_t), intent(in) :: image             !! through which they are seen
     integer(int64) :: n
+    integer(int32) :: k, crowded
 
     n = 0
-    call append(cells%cell(c), near%list, n)
+    crowded = 0
+    do k = 1, size(c, kind=int32)
+      call append(cells%cell(c(k)), near%list, n)
+      crowded = max(crowded, cells%chain(c(k)))
+    end do
     near%n = int(n, int32)
     call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
-    call scan_chain(cells, sim, c, near, image)
-  end subroutine scan_cell
+    if (crowded == 0) return
+    do k = 1, size(c, kind=int32)
+      call scan_chain(cells, sim, c(k), near, image)
+    end do
+  end subroutine scan_cells
 
   !> Contacts with the chained disks of a crowded cell.
   pure subroutine scan_chain(cells, sim, c, near, image)
@@ -79,63 +87,45 @@ contains
   !> Contacts where some of the nine cells are images beyond a periodic side, cells of one image together. If the images
   !> above and below slide, they are more columns, all that come near until they have slid by one: disks two columns apart
   !> never touch.
-  subroutine scan_around_seam(cells, patch, sim, near)
+  pure subroutine scan_around_seam(cells, patch, sim, images, near)
     type(cell_contents_t), intent(in) :: cells
     type(patch_t), intent(in) :: patch
     type(simulation_t), intent(in) :: sim
+    type(images_t), intent(in) :: images
     type(prospect_t), intent(inout) :: near
-    type(images_t) :: images
-    real(real64) :: displacement, periods(-1:1)
-    integer(int32) :: own(2), dy, dx, low(-1:1), row(-1:1), above(-1:1), width, column, beside, c, seen(2)
-    integer(int64) :: n
-    integer :: pass
+    real(real64) :: displacement, periods
+    integer(int32) :: own(2), row(-1:1), above(-1:1), column(6), beside(6), columns, first, x, y, k, m, c(9), n
 
-    images = sim%images()
     own = sim%tag(near%disk)%cell
-    low = -1
-    periods = 0
-    do dy = -1, 1
-      call patch%step(2, own(2), dy, row(dy), above(dy))
-      if (above(dy) == 0 .or. .not. abs(images%slip) > 0) cycle
-      displacement = images%displacement(real(above(dy), real64), sim%now)
-      periods(above(dy)) = anint(displacement/images%period(1))
-      low(dy) = -nint((displacement - periods(above(dy))*images%period(1))/patch%width(1)) &
-        - merge(3, 2, above(dy)*images%slip > 0)
+    do k = -1, 1
+      call patch%step(2, own(2), k, row(k), above(k))
     end do
-    n = 0
-    seen = 0
-    do pass = 1, 2                                 ! the box itself first
-      do dy = -1, 1
-        width = merge(5, 2, above(dy) /= 0 .and. abs(images%slip) > 0)
-        do dx = low(dy), low(dy) + width
-          call patch%step(1, own(1), dx, column, beside)
-          if ((beside == 0 .and. above(dy) == 0) .neqv. pass == 1) cycle
-          if (beside /= seen(1) .or. above(dy) /= seen(2)) call scan_listed()
-          seen = [beside, above(dy)]
-          c = column + cells%stride*row(dy)
-          call append(cells%cell(c), near%list, n)
-          if (cells%chain(c) == 0) cycle
-          call scan_listed()
-          call scan_chain(cells, sim, c, near, image())
+    do y = above(-1), above(1)
+      first = -1
+      columns = 3
+      periods = 0
+      if (y /= 0 .and. abs(images%slip) > 0) then
+        displacement = images%displacement(real(y, real64), sim%now)
+        periods = anint(displacement/images%period(1))
+        first = -nint((displacement - periods*images%period(1))/patch%width(1)) - merge(3, 2, y*images%slip > 0)
+        columns = 6
+      end if
+      do k = 1, columns
+        call patch%step(1, own(1), first + k - 1, column(k), beside(k))
+      end do
+      do x = beside(1), beside(columns)
+        n = 0
+        do k = -1, 1
+          if (above(k) /= y) cycle
+          do m = 1, columns
+            if (beside(m) /= x) cycle
+            n = n + 1
+            c(n) = column(m) + cells%stride*row(k)
+          end do
         end do
+        call scan_cells(cells, sim, c(:n), near, images%image([x - periods, real(y, real64)]))
       end do
     end do
-    call scan_listed()
-
-  contains
-
-    !> That of the cells listed.
-    type(image_t) function image()
-      image = images%image([seen(1) - periods(seen(2)), real(seen(2), real64)])
-    end function image
-
-    !> Contacts with the disks listed so far.
-    subroutine scan_listed()
-      if (n == 0) return
-      near%n = int(n, int32)
-      n = 0
-      call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image())
-    end subroutine scan_listed
   end subroutine scan_around_seam
 
 end module cell_scans
