@@ -387,7 +387,7 @@ def look_at_bars(run, folder):
         from ricochet import read_run
         from ricochet.paths import Paths
         run = read_run("all.h5")
-        assert run.walls.tolist() == [[[1, 0.3], [1, 0.7]]]
+        assert run.walls.tolist() == [[[1, 0.1], [1, 0.9]]]
         turns = [turn for turn in Paths(run).along(range(0, run.frames, 50))]
         assert not any(turn.guessed.any() for turn in turns)
         assert sum(len(turn.time) for turn in turns) == (run.events[0] <= run.time[300]).sum() > 200
@@ -419,7 +419,7 @@ def test_the_recipes_work(tmp_path):
         assert made.returncode == 0, made.stdout + made.stderr
     (tmp_path / "all.nml").write_text(
         """&box upper = 2, 1 / &run dynamics = 'ideal' /
-        &bar name = 'rod' from = 1, 0.3 to = 1, 0.7 thickness = 0.1 /
+        &bar name = 'rod' from = 1, 0.1 to = 1, 0.9 thickness = 0.3 /
         &species count = 50 radius = 0.02 speed = 1 region = 0, 0.7, 0, 1 /
         &contact wall_rule = 'sticky' wall_restitution = 1 / &stop time = 3 /
         &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
@@ -431,8 +431,8 @@ def test_the_recipes_work(tmp_path):
         x, y = np.moveaxis(file["particles/disks/position/value"][:], -1, 0)
         assert file["observables/collisions/value"][-1] == 0
         assert file["observables/obstacle_collisions/value"][-1] > 10
-        assert file["parameters/bar/thickness"][:].tolist() == [0.1]
-    assert np.hypot(x - 1, np.maximum(np.abs(y - 0.5) - 0.2, 0)).min() > 0.07 - 1e-9
+        assert file["parameters/bar/thickness"][:].tolist() == [0.3]
+    assert np.hypot(x - 1, np.maximum(np.abs(y - 0.5) - 0.4, 0)).min() > 0.17 - 1e-9
     assert fastest[0] == pytest.approx(1) and (np.diff(fastest) <= 1e-15).all()
     assert fastest[-1] < 1  # sticky walls take the tangential velocity
     look_at_bars(run, tmp_path)
