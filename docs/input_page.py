@@ -44,9 +44,9 @@ mass. What has no default has an example instead: *e.g.*
 def row(entry: dict) -> str:
     """A line of the table."""
     value = f"`{entry['value']}`" if entry["kind"] == "default" else f"e.g. `{entry['value']}`"
-    unit = entry["unit"] or ""
     name = entry["name"].split(".")[-1]
-    cells = (f"`{name}`", entry["help"], entry["allowed"], value, unit)
+    meaning = entry["help"] + (f" [{entry['unit']}]" if entry["unit"] else "")
+    cells = (f"`{name}`", meaning, entry["allowed"], value)
     return "| " + " | ".join(cell.replace("|", "\\|").replace("**", "^") for cell in cells) + " |"
 
 
@@ -60,7 +60,7 @@ def page(program: Path) -> str:
     lines = [HEAD]
     for group, words in GROUPS.items():
         lines += [f"## {group.capitalize() if group == LAW else '&' + group}", "", words, ""]
-        lines += ["| variable | meaning | allowed | default | unit |", "|---|---|---|---|---|"]
+        lines += ["| variable | meaning [unit] | allowed | default |", "|---|---|---|---|"]
         lines += [*rows[group], ""]
     return "\n".join(lines)
 
