@@ -1,7 +1,7 @@
 !> One run, from the input file to the finished output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use checkpoint, only: read_checkpoint
+  use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
   use evolution, only: evolution_t, limits_t
@@ -14,6 +14,7 @@ module run
   use partners, only: n_sides
   use progress, only: progress_t
   use progress_line, only: progress_line_t
+  use run_files, only: is_file, source_of, unfinished
   use run_setup, only: choose_evolution, new_simulation, read_input
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
@@ -58,6 +59,7 @@ contains
     call watch_signals()
     call run%line%open(command%quiet)
     call end_at_signals("stopped before the run began; nothing is lost: repeat the command", exit_stopped)
+    if (command%resume) call recall_overrides(command%output, run%command%overrides)
     call read_input(command%input, run%command%overrides, run%input, error)
     if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
@@ -69,7 +71,10 @@ contains
     else
       call begin(run, error)
     end if
-    if (allocated(error) .or. command%check) return
+    if (allocated(error) .or. command%check) then
+      call run%output%release()
+      return
+    end if
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
     if (.not. allocated(error)) call run%output%finish(run%sim, cost(run), note(run), error)
@@ -87,7 +92,7 @@ contains
   subroutine begin(run, error)
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
-    logical :: folder_is_new
+    logical :: folder_is_new, over_broken
 
     call new_simulation(run%input%settings, run%line, run%sim, error)
     call run%line%clear()
@@ -100,8 +105,12 @@ contains
         return
       end if
       folder_is_new = .not. is_folder(folder_of(command%output))
-      call run%output%open(command%output, run%input, run%sim, command%force, error)
+      call run%output%claim(command%output, error)
+      over_broken = is_file(command%output//unfinished)
+      if (.not. allocated(error)) call run%output%open(run%input, run%sim, command%force, error)
       if (allocated(error) .or. command%quiet) return
+      if (over_broken .and. .not. command%force) write (error_unit, "(a)") "note: "//legible(command%output)//unfinished// &
+        ", of a run that broke off, has been replaced"
       if (planned_bytes(run%input, run%sim) > much) write (error_unit, "(a)") &
         "note: the output needs at least "//size_text(planned_bytes(run%input, run%sim))
       if (folder_is_new) write (error_unit, "(a)") &
@@ -119,7 +128,8 @@ contains
 
     associate (command => run%command, sim => run%sim)
       call describe_system(run%input%settings, sim)
-      call read_checkpoint(command%output, run%input, sim, progress, finished, error)
+      if (is_file(source_of(command%output)) .and. .not. command%check) call run%output%claim(command%output, error)
+      if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (allocated(error)) return
       rule = stop_rule_t(run%input%settings%stop, sim)
       if (finished .and. rule%met(sim)) then
@@ -130,7 +140,7 @@ contains
       else if (command%check) then
         call print_text(legible(command%input)//": valid; the run goes on from time "//written(sim%time()), error)
       else
-        call run%output%resume(command%output, run%input, sim, progress, finished, error)
+        call run%output%resume(run%input, sim, progress, finished, error)
       end if
     end associate
   end subroutine go_on

@@ -10,8 +10,8 @@ module system
   private
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, remove_file, make_folders_of, synchronize
-  public :: what_is, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
-  public :: file_size, read_bytes
+  public :: what_is, identity_of, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
+  public :: file_size, read_bytes, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
   !> What a path can name.
@@ -96,6 +96,19 @@ module system
       integer(c_int64_t), value :: position, count
       integer(c_int64_t) :: n
     end function c_read_bytes
+
+    subroutine c_identify(path, identity) bind(C, name="system_identify")
+      import :: c_char, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t), intent(out) :: identity(3)
+    end subroutine c_identify
+
+    function c_write_word(path, position, word) bind(C, name="system_write_word") result(status)
+      import :: c_char, c_int, c_int64_t
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t), value :: position, word
+      integer(c_int) :: status
+    end function c_write_word
 
     subroutine c_opening_problem(path, writable, text, size) bind(C, name="system_opening_problem")
       import :: c_bool, c_char, c_size_t
@@ -217,6 +230,15 @@ contains
     kind = trim(kinds_of_files(c_what_is(path//c_null_char)))
   end function what_is
 
+  !> What tells a file from any other, and from itself once it has changed: inode, size, and time of change; zeros if
+  !> there is none. A copy is another file.
+  function identity_of(path) result(identity)
+    character(len=*), intent(in) :: path
+    integer(int64) :: identity(3)
+
+    call c_identify(path//c_null_char, identity)
+  end function identity_of
+
   !> Size of a file; 0 for pipes and devices, -1 if there is none. [bytes]
   function file_size(path) result(bytes)
     character(len=*), intent(in) :: path
@@ -234,6 +256,16 @@ contains
 
     n = c_read_bytes(path//c_null_char, first - 1, bytes, len(bytes, int64))
   end subroutine read_bytes
+
+  !> Writes a number over eight bytes of a file.
+  subroutine write_word(path, position, word, done)
+    character(len=*), intent(in) :: path
+    integer(int64), intent(in) :: position             !! of the first byte, from 0
+    integer(int64), intent(in) :: word
+    logical, intent(out) :: done
+
+    done = c_write_word(path//c_null_char, position, word) == 0
+  end subroutine write_word
 
   !> Whether a path leads to a folder.
   function is_folder(path) result(yes)

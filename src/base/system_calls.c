@@ -213,6 +213,17 @@ int64_t system_read_bytes(const char *path, int64_t position, char *bytes, int64
     return closed(descriptor, 0) + (more < 0 ? -1 : total);
 }
 
+/* Writes a number over eight bytes of a file, the lowest byte first. */
+int system_write_word(const char *path, int64_t position, int64_t word)
+{
+    const char *problem;
+    unsigned char bytes[8];
+    const int descriptor = open_regular(path, O_WRONLY, &problem);
+    if (descriptor < 0) return -1;
+    for (int k = 0; k < 8; k++) bytes[k] = (unsigned char)((uint64_t)word >> 8*k);
+    return closed(descriptor, pwrite(descriptor, bytes, sizeof bytes, (off_t)position) == sizeof bytes ? 0 : -1);
+}
+
 int system_find_folder(const char *path)
 {
     struct stat found;
@@ -228,6 +239,16 @@ int system_what_is(const char *path)
         return errno == ENOENT || errno == ENOTDIR || errno == ENAMETOOLONG ? nothing : hidden;
     return S_ISREG(found.st_mode) ? file : S_ISDIR(found.st_mode) ? folder
          : S_ISLNK(found.st_mode) ? symbolic_link : pipe_or_device;
+}
+
+/* Inode, size, time of change [ns]; links are not followed. */
+void system_identify(const char *path, int64_t identity[3])
+{
+    struct stat found = {0};
+    (void)!lstat(path, &found);
+    identity[0] = (int64_t)found.st_ino;
+    identity[1] = (int64_t)found.st_size;
+    identity[2] = (int64_t)found.st_ctim.tv_sec*1000000000 + found.st_ctim.tv_nsec;
 }
 
 /* 0 for pipes and devices, -1 if there is no file. */

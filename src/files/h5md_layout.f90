@@ -10,7 +10,7 @@ module h5md_layout
     events_group = "events/", &
     parameters_group = "parameters/", &
     provenance = "provenance", &
-    checkpoint_group = "checkpoint/", &           !! the state of a finished run, to go on from
+    checkpoint_group = "checkpoint/", &           !! the state to go on from
     box_group = disks_group//"box", &
     all_disks = "all"                             !! the group of means over all disks in `observables_group`
 
@@ -22,6 +22,11 @@ module h5md_layout
     disk_radius = disks_group//"radius", &
     species_names = parameters_group//"species/names", &
     species_counts = parameters_group//"species/counts"
+
+  ! Attributes
+  character(len=*), parameter, public :: &
+    wall_time = provenance//"@wall_time", &
+    replaced_file = provenance//"@replaced"       !! identity of the file that the finished one may replace
 
   ! Elements: groups of step, time, value
   character(len=*), parameter, public :: &

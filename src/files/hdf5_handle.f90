@@ -4,20 +4,19 @@
 !> call: `report` says at the end whether all went well.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
-  use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
+  use hdf5, only: hid_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
     h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
-    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5dget_space_f, h5dget_storage_size_f, &
-    h5dget_type_f, h5sclose_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tget_size_f
+    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
   use system, only: free_bytes, last_problem, move_file, opening_problem
   use texts, only: written
   implicit none
   private
-  public :: hdf5_handle_t, hdf5_version, is_whole
+  public :: hdf5_handle_t, hdf5_version
 
   integer(size_t), parameter :: sieve = 4096      !! size of the buffer that small writes share [bytes]
 
@@ -179,29 +178,6 @@ contains
     call self%check(status, "be written")
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
-
-  !> Whether an open dataset that is not in chunks has as many bytes in the file as it says: of a damaged one HDF5 1.10 reads
-  !> what is not there.
-  function is_whole(dataset) result(yes)
-    integer(hid_t), intent(in) :: dataset
-    logical :: yes
-    integer(hid_t) :: space, type
-    integer(hsize_t) :: n, stored
-    integer(size_t) :: bytes                      ! of a value
-    integer :: status, closed
-
-    call h5dget_space_f(dataset, space, status)
-    call h5sget_simple_extent_npoints_f(space, n, status)
-    yes = status < 0 .or. n == 0                  ! for Fortran to have no values is an error
-    if (.not. yes) then
-      call h5dget_type_f(dataset, type, status)
-      call h5tget_size_f(type, bytes, status)
-      call h5dget_storage_size_f(dataset, stored, status)
-      yes = status >= 0 .and. stored == n*int(bytes, hsize_t)
-      call h5tclose_f(type, closed)
-    end if
-    call h5sclose_f(space, closed)
-  end function is_whole
 
   !> Closes the file if it is open; its failure, if any, can still be reported.
   subroutine close_file(self)

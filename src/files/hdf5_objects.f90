@@ -1,17 +1,19 @@
-!> Groups, attributes, and datasets that are written once, in an open HDF5 file.
+!> Groups, attributes, datasets and parts of them in an open HDF5 file.
 !>
 !> A name is a path, `group/dataset`, or with @ an attribute, `group@name`.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
-  use hdf5, only: hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, h5ocopy_f, &
-    h5lcreate_hard_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
+  use hdf5, only: haddr_t, hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, h5ocopy_f, &
+    h5lcreate_hard_f, h5ldelete_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
     h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
-    h5dget_create_plist_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, h5d_chunked_f, h5d_virtual_f, &
-    h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
-    h5sget_simple_extent_npoints_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, h5tget_class_f, h5tis_variable_str_f, h5tclose_f, &
-    h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, h5t_fortran_s1
-  use hdf5_handle, only: hdf5_handle_t, is_whole
+    h5dget_create_plist_f, h5dget_offset_f, h5dget_storage_size_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, &
+    h5d_chunked_f, h5d_virtual_f, h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+    h5sget_simple_extent_npoints_f, h5sselect_hyperslab_f, h5s_select_set_f, h5tcopy_f, h5tset_size_f, h5tget_size_f, &
+    h5tget_class_f, h5tis_variable_str_f, h5tclose_f, h5t_native_double, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
+    h5t_fortran_s1
+  use hdf5_handle, only: hdf5_handle_t
   use kinds, only: int32, int64, real64
+  use system, only: write_word
   implicit none
   private
   public :: hdf5_file_t, scalar
@@ -25,19 +27,19 @@ module hdf5_objects
   type, extends(hdf5_handle_t) :: hdf5_file_t
   contains
     procedure :: make_group
-    procedure :: copy_group
-    procedure :: make_dataset
-    procedure :: open_dataset
+    procedure :: copy
     procedure :: link
+    procedure :: remove_last
+    procedure :: make_dataset
     procedure :: extents
     procedure :: length
+    procedure :: exchange_part
     generic :: put => put_reals, put_integers, put_longs, put_text, put_texts
-    generic :: fetch => fetch_reals, fetch_integers, fetch_longs
-    procedure :: fetch_attribute
+    generic :: fetch => fetch_reals, fetch_longs
     procedure :: fetch_text
     procedure :: fetch_texts
     procedure, private :: put_reals, put_integers, put_longs, put_text, put_texts, put_values, put_attribute
-    procedure, private :: fetch_reals, fetch_integers, fetch_longs, fetch_values
+    procedure, private :: fetch_reals, fetch_longs, fetch_values, open_dataset
   end type hdf5_file_t
 
 contains
@@ -55,8 +57,8 @@ contains
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
 
-  !> Copies a group with all that is in it from another file.
-  subroutine copy_group(self, name, source)
+  !> Copies a dataset, or a group with all that is in it, from another file.
+  subroutine copy(self, name, source)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     class(hdf5_file_t), intent(in) :: source
@@ -65,7 +67,44 @@ contains
     if (allocated(self%failure)) return
     call h5ocopy_f(source%id, name, self%id, name, status)
     call self%check(status, "copy "//name)
-  end subroutine copy_group
+  end subroutine copy
+
+  !> Gives an object a second name.
+  subroutine link(self, name, second_name)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name, second_name
+    integer :: status
+
+    if (allocated(self%failure)) return
+    call h5lcreate_hard_f(self%id, name, self%id, second_name, status, lcpl_id=self%links)
+    call self%check(status, "link "//second_name)
+  end subroutine link
+
+  !> Takes the dataset out of the file that was made last; the file then ends where the values of the one before end. HDF5
+  !> cuts the file before the header says so, and a kill between would leave one that nobody can open: so the header says it
+  !> first.
+  subroutine remove_last(self, name, before)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name, before
+    integer(int64), parameter :: header_end = 40  ! where the header of an HDF5 file has its length
+    integer(hid_t) :: dataset
+    integer(hsize_t) :: bytes
+    integer(hsize_t), allocatable :: extents(:)
+    integer(haddr_t) :: offset
+    integer :: status, closed
+    logical :: done
+
+    call self%flush()
+    if (allocated(self%failure)) return
+    call self%open_dataset(before, dataset, extents, status)
+    if (status >= 0) call h5dget_offset_f(dataset, offset, status)
+    if (status >= 0) call h5dget_storage_size_f(dataset, bytes, status)
+    call h5dclose_f(dataset, closed)
+    done = status >= 0
+    if (done) call write_word(self%path, header_end, int(offset + bytes, int64), done)
+    if (done) call h5ldelete_f(self%id, name, status)
+    call self%check(merge(status, -1, done), "remove "//name)
+  end subroutine remove_last
 
   !> Makes a dataset and leaves it open.
   subroutine make_dataset(self, name, type, extents, dataset)
@@ -85,16 +124,21 @@ contains
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
-  !> Opens a dataset whose values are in this file. Those of another file may be a device, or not ours to write.
-  subroutine open_dataset(self, name, dataset, status, like)
+  !> Opens a dataset whose values are in this file, all of them. Those of another file may be a device, or not ours to
+  !> write; and of a damaged one HDF5 1.10 reads what is not there.
+  subroutine open_dataset(self, name, dataset, extents, status, like)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
+    integer(hsize_t), allocatable, intent(out) :: extents(:)
     integer, intent(out) :: status                !! negative: there is none
     integer(hid_t), intent(in), optional :: like  !! an HDF5 type of the kind that it must have: real, integer, text
-    integer(hid_t) :: creation, type
-    integer :: layout, n_files, kinds(2), closed
+    integer(hid_t) :: creation, space, type
+    integer(hsize_t) :: most(32), shape(32), n, stored
+    integer(size_t) :: bytes                      ! of a value
+    integer :: layout, n_files, kinds(2), rank, closed
 
+    extents = [-1_hsize_t]
     call h5dopen_f(self%id, name, dataset, status)
     if (status < 0) return
     call h5dget_create_plist_f(dataset, creation, status)
@@ -103,52 +147,38 @@ contains
     if (status >= 0 .and. (layout == h5d_virtual_f .or. n_files > 0)) status = -1
     call self%check(status, "be used: "//name//" keeps its values in another file")
     call h5pclose_f(creation, closed)
-    if (status >= 0 .and. layout /= h5d_chunked_f) status = merge(status, -1, is_whole(dataset))
-    if (status >= 0 .and. present(like)) then
-      call h5dget_type_f(dataset, type, status)
+    if (status >= 0) call h5dget_space_f(dataset, space, status)
+    if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
+    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
+    if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
+    call h5sclose_f(space, closed)
+    if (status >= 0) call h5dget_type_f(dataset, type, status)
+    if (status >= 0) call h5tget_size_f(type, bytes, status)
+    if (status >= 0) call h5dget_storage_size_f(dataset, stored, status)
+    if (status >= 0 .and. layout /= h5d_chunked_f .and. stored /= n*int(bytes, hsize_t)) status = -1
+    if (present(like)) then
       if (status >= 0) call h5tget_class_f(type, kinds(1), status)
       if (status >= 0) call h5tget_class_f(like, kinds(2), status)
       if (status >= 0 .and. kinds(1) /= kinds(2)) status = -1
-      call h5tclose_f(type, closed)
     end if
+    call h5tclose_f(type, closed)
+    if (status >= 0) extents = shape(:rank)
+    if (status >= 0 .and. rank == 0 .and. n == 0) extents = [n]           ! it was made to have no values
     if (status < 0) call h5dclose_f(dataset, closed)
   end subroutine open_dataset
-
-  !> Gives an object a second name.
-  subroutine link(self, name, second_name)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name, second_name
-    integer :: status
-
-    if (allocated(self%failure)) return
-    call h5lcreate_hard_f(self%id, name, self%id, second_name, status, lcpl_id=self%links)
-    call self%check(status, "link "//second_name)
-  end subroutine link
 
   !> Shape of a dataset; [-1] if it does not exist.
   function extents(self, name) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer(hsize_t), allocatable :: extent(:), largest(:)
-    integer(hsize_t) :: n
-    integer(hid_t) :: dataset, space
-    integer :: status, closed, rank
+    integer(hsize_t), allocatable :: extent(:)
+    integer(hid_t) :: dataset
+    integer :: status
 
     extent = [-1_hsize_t]
     if (allocated(self%failure)) return
-    call self%open_dataset(name, dataset, status)
-    if (status < 0) return
-    call h5dget_space_f(dataset, space, status)
-    if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
-    n = 1
-    if (status >= 0 .and. rank == 0) call h5sget_simple_extent_npoints_f(space, n, status)
-    if (status >= 0 .and. n == 1) then              ! else it was made to have no values
-      deallocate (extent)
-      allocate (extent(rank), largest(rank))
-      if (rank > 0) call h5sget_simple_extent_dims_f(space, extent, largest, status)
-    end if
-    call h5sclose_f(space, closed)
-    call h5dclose_f(dataset, closed)
+    call self%open_dataset(name, dataset, extent, status)
+    if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 
   !> Number of values in a dataset; -1 if it does not exist, or says that it has more than any file can hold.
@@ -157,11 +187,49 @@ contains
     character(len=*), intent(in) :: name
     integer(int64) :: n
 
-    n = -1
-    associate (extents => self%extents(name))
-      if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
-    end associate
+    n = product_of(self%extents(name))
   end function length
+
+  !> Number of values of a shape; -1 if no file can hold as many.
+  pure function product_of(extents) result(n)
+    integer(hsize_t), intent(in) :: extents(:)
+    integer(int64) :: n
+
+    n = -1
+    if (product(real(extents, real64)) < real(huge(n), real64)) n = product(extents)
+  end function product_of
+
+  !> Writes or reads a part of a dataset from or to the memory at an address.
+  subroutine exchange_part(self, name, first, counts, type, address, writing)
+    class(hdf5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(int64), intent(in) :: first           !! along the last dimension, from 1
+    integer(int64), intent(in) :: counts(:)       !! values along each dimension; of all but the last one these are all
+    integer(hid_t), intent(in) :: type            !! HDF5 type in memory
+    type(c_ptr), intent(in) :: address
+    logical, intent(in) :: writing
+    integer(hid_t) :: dataset, in_file, in_memory
+    integer(hsize_t) :: start(size(counts))
+    integer(hsize_t), allocatable :: extents(:)
+    type(c_ptr) :: place
+    integer :: status, closed
+
+    if (allocated(self%failure)) return
+    start = 0
+    start(size(start)) = first - 1
+    place = address
+    call self%open_dataset(name, dataset, extents, status)
+    call h5screate_simple_f(size(counts), int(counts, hsize_t), in_memory, closed)
+    if (status >= 0) call h5dget_space_f(dataset, in_file, status)
+    if (status >= 0) call h5sselect_hyperslab_f(in_file, h5s_select_set_f, start, int(counts, hsize_t), status)
+    if (status >= 0 .and. writing) call h5dwrite_f(dataset, type, place, status, in_memory, in_file)
+    if (status >= 0 .and. .not. writing) call h5dread_f(dataset, type, place, status, in_memory, in_file)
+    call self%check(status, trim(merge("write   ", "be read:", writing))//" "//name)
+    call h5sclose_f(in_file, closed)
+    call h5sclose_f(in_memory, closed)
+    call h5dclose_f(dataset, status)              ! writes what has been buffered
+    call self%check(status, "write "//name)
+  end subroutine exchange_part
 
   !> Writes reals as doubles.
   subroutine put_reals(self, name, extents, values)
@@ -241,6 +309,7 @@ contains
     integer(hid_t), intent(in) :: stored_as, in_memory     !! HDF5 types
     type(c_ptr), intent(in) :: address
     integer(hid_t) :: dataset
+    integer(hsize_t), allocatable :: there(:)
     integer(size_t) :: bytes
     integer :: status
 
@@ -251,10 +320,10 @@ contains
       call self%put_attribute(name, int(extents, hsize_t), stored_as, in_memory, address)
       return
     end if
-    call self%open_dataset(name, dataset, status, like=stored_as)
+    call self%open_dataset(name, dataset, there, status, like=stored_as)
     if (status < 0) then
       call self%make_dataset(name, stored_as, int(extents, hsize_t), dataset)
-    else if (self%length(name) /= product(int(extents, int64))) then
+    else if (product_of(there) /= product(int(extents, int64))) then
       call self%check(-1, "write "//name)
     end if
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
@@ -285,32 +354,7 @@ contains
     call h5sclose_f(space, closed)
   end subroutine put_attribute
 
-  !> Reads an attribute that is a real.
-  subroutine fetch_attribute(self, name, value)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    real(real64), intent(inout), target :: value
-    type(c_ptr) :: place
-    integer(hid_t) :: object, space, attribute
-    integer(hsize_t) :: n
-    integer :: status, closed, at
-
-    if (allocated(self%failure)) return
-    at = index(name, "@")
-    place = c_loc(value)
-    call h5oopen_f(self%id, name(:at - 1), object, status)
-    if (status >= 0) call h5aopen_f(object, name(at + 1:), attribute, status)
-    if (status >= 0) call h5aget_space_f(attribute, space, status)
-    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
-    if (status >= 0 .and. n /= 1) status = -1
-    if (status >= 0) call h5aread_f(attribute, h5t_native_double, place, status)
-    call self%check(status, "be read: "//name)
-    call h5sclose_f(space, closed)
-    call h5aclose_f(attribute, closed)
-    call h5oclose_f(object, closed)
-  end subroutine fetch_attribute
-
-  !> Reads a dataset of n reals.
+  !> Reads a dataset, or an attribute, of n reals.
   subroutine fetch_reals(self, name, n, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -320,17 +364,7 @@ contains
     call self%fetch_values(name, n, h5t_native_double, c_loc(values))
   end subroutine fetch_reals
 
-  !> Reads a dataset of n integers of 32 bits.
-  subroutine fetch_integers(self, name, n, values)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    integer, intent(in) :: n
-    integer(int32), intent(inout), target :: values(*)
-
-    call self%fetch_values(name, n, h5kind_to_type(int32, h5_integer_kind), c_loc(values))
-  end subroutine fetch_integers
-
-  !> Reads a dataset of n integers of 64 bits.
+  !> Reads a dataset, or an attribute, of n integers.
   subroutine fetch_longs(self, name, n, values)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -340,7 +374,7 @@ contains
     call self%fetch_values(name, n, h5kind_to_type(int64, h5_integer_kind), c_loc(values))
   end subroutine fetch_longs
 
-  !> Reads a dataset of n values; they stay as they are if it has another number or kind, or cannot be read.
+  !> Reads a dataset, or an attribute, of n values; they stay as they are if it has another number or kind, or cannot be read.
   subroutine fetch_values(self, name, n, in_memory, address)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -348,21 +382,35 @@ contains
     integer(hid_t), intent(in) :: in_memory
     type(c_ptr), intent(in) :: address
     type(c_ptr) :: place
-    integer(hid_t) :: dataset
-    integer :: status, closed
+    integer(hid_t) :: object, attribute, dataset, space
+    integer(hsize_t), allocatable :: extents(:)
+    integer(hsize_t) :: there
+    integer :: status, closed, at
 
     if (allocated(self%failure)) return
     place = address
-    status = -1
-    if (self%length(name) == n) then
+    there = -1
+    at = index(name, "@")
+    if (at > 0) then
+      call h5oopen_f(self%id, name(:at - 1), object, status)
+      if (status >= 0) call h5aopen_f(object, name(at + 1:), attribute, status)
+      if (status >= 0) call h5aget_space_f(attribute, space, status)
+      if (status >= 0) call h5sget_simple_extent_npoints_f(space, there, status)
+      if (status >= 0 .and. there == n) call h5aread_f(attribute, in_memory, place, status)
+      call h5sclose_f(space, closed)
+      call h5aclose_f(attribute, closed)
+      call h5oclose_f(object, closed)
+    else
       if (in_memory == h5t_native_double) then
-        call self%open_dataset(name, dataset, status)       ! integers make reals, too
+        call self%open_dataset(name, dataset, extents, status)      ! integers make reals, too
       else
-        call self%open_dataset(name, dataset, status, like=in_memory)
+        call self%open_dataset(name, dataset, extents, status, like=in_memory)
       end if
-      if (status >= 0) call h5dread_f(dataset, in_memory, place, status)
+      there = product_of(extents)
+      if (status >= 0 .and. there == n) call h5dread_f(dataset, in_memory, place, status)
       call h5dclose_f(dataset, closed)
     end if
+    if (there /= n) status = -1
     call self%check(status, "be read: "//name)
   end subroutine fetch_values
 
@@ -389,13 +437,14 @@ contains
     character(len=:), allocatable, intent(out) :: text
     character(len=:), allocatable, target :: buffer
     integer(hid_t) :: dataset, string
+    integer(hsize_t), allocatable :: extents(:)
     integer(size_t) :: bytes
     integer :: status, closed
     logical :: elsewhere
 
     text = ""
     if (allocated(self%failure)) return
-    call self%open_dataset(name, dataset, status, like=h5t_fortran_s1)
+    call self%open_dataset(name, dataset, extents, status, like=h5t_fortran_s1)
     if (status >= 0) call h5dget_type_f(dataset, string, status)
     if (status >= 0) call h5tis_variable_str_f(string, elsewhere, status)
     if (status >= 0) call h5tget_size_f(string, bytes, status)

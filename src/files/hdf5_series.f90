@@ -4,9 +4,8 @@
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, &
-    h5dread_f, h5dwrite_f, h5dclose_f, h5dget_space_f, h5screate_simple_f, h5sclose_f, &
-    h5sselect_hyperslab_f, h5s_select_set_f, h5t_ieee_f32le, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le
+  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5dclose_f, h5t_ieee_f32le, h5t_ieee_f64le, &
+    h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
   implicit none
@@ -18,21 +17,19 @@ module hdf5_series
   integer, parameter :: bytes_of(4) = [8, 4, 4, 8]
   integer(int64), parameter :: copied_at_once = 1048576     !! [bytes]
 
-  !> One series: its name, storage and shape are given, then it is made or opened.
+  !> One series: its name, storage and shape are given, then it is made, or found in a file.
   type :: series_t
     character(len=96) :: name = ""                !! path of the dataset
     integer :: storage = double_precision
     integer :: rank = 0                           !! of one sample; 0: a number
     integer :: shape(2) = 1                       !! of one sample, as far as it has dimensions
     integer(int64) :: capacity = 0                !! samples there is room for
-    integer(hid_t), private :: id = -1
   contains
     procedure :: make
-    procedure :: open => open_series
+    procedure :: find
     procedure :: write => write_samples
     procedure :: read => read_sample
     procedure :: copy
-    procedure :: close => close_series
     procedure :: width
     procedure :: room
     procedure, private :: exchange
@@ -50,7 +47,7 @@ contains
   end function width
 
   !> Bytes of one sample in the file.
-  pure function room(self) result(bytes)
+  elemental function room(self) result(bytes)
     class(series_t), intent(in) :: self
     integer(int64) :: bytes
 
@@ -71,38 +68,28 @@ contains
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: capacity
+    integer(hid_t) :: dataset
+    integer :: closed
 
     self%capacity = capacity
     call file%make_dataset(trim(self%name), self%storage_type(), &
-      int([int(self%shape(:self%rank), int64), capacity], hsize_t), self%id)
+      int([int(self%shape(:self%rank), int64), capacity], hsize_t), dataset)
+    call h5dclose_f(dataset, closed)
   end subroutine make
 
-  !> Opens the series in a file that has it; its samples must have the shape that is expected.
-  subroutine open_series(self, file)
+  !> Finds the series in a file that has it; its samples must have the shape that is expected.
+  subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(hsize_t), allocatable :: extents(:)
-    integer :: status
+    logical :: there
 
-    if (allocated(file%failure)) return
-    extents = file%extents(trim(self%name))
-    status = -1
-    if (size(extents) == self%rank + 1) then
-      self%capacity = extents(self%rank + 1)
-      if (all(extents(:self%rank) == self%shape(:self%rank))) &
-        call file%open_dataset(trim(self%name), self%id, status, like=self%storage_type())
-    end if
-    call file%check(status, "be read: "//trim(self%name))
-  end subroutine open_series
-
-  !> Closes the series if it is open.
-  subroutine close_series(self)
-    class(series_t), intent(inout) :: self
-    integer :: status
-
-    if (self%id >= 0) call h5dclose_f(self%id, status)
-    self%id = -1
-  end subroutine close_series
+    allocate (extents, source=file%extents(trim(self%name)))
+    there = size(extents) == self%rank + 1 .and. extents(1) >= 0
+    if (there) there = all(extents(:self%rank) == self%shape(:self%rank))
+    if (there) self%capacity = extents(self%rank + 1)
+    call file%check(merge(0, -1, there), "be read: "//trim(self%name))
+  end subroutine find
 
   !> Writes samples, converted to what is stored: HDF5 would take ten times as long to shorten reals. A
   !> single sample of doubles is written from where it is, as it may be large.
@@ -121,7 +108,6 @@ contains
 
     if (allocated(file%failure)) return
     count = size(values, 2)
-    file%unsaved = file%unsaved + count*self%room()
     select case (self%storage)
     case (double_precision)
       type = h5kind_to_type(real64, h5_real_kind)
@@ -158,10 +144,9 @@ contains
   end subroutine read_sample
 
   !> Copies the first `count` samples from the same series in another file.
-  subroutine copy(self, file, source, source_file, count)
+  subroutine copy(self, file, source, count)
     class(series_t), intent(in) :: self
-    type(hdf5_file_t), intent(inout) :: file, source_file
-    class(series_t), intent(in) :: source
+    type(hdf5_file_t), intent(inout) :: file, source
     integer(int64), intent(in) :: count
     integer(int8), allocatable, target :: buffer(:)
     integer(int64) :: first, n, step
@@ -170,8 +155,7 @@ contains
     allocate (buffer(min(step, count)*self%room()))
     do first = 1, count, step
       n = min(step, count - first + 1)
-      file%unsaved = file%unsaved + n*self%room()
-      call source%exchange(source_file, first, n, self%storage_type(), c_loc(buffer), writing=.false.)
+      call self%exchange(source, first, n, self%storage_type(), c_loc(buffer), writing=.false.)
       call self%exchange(file, first, n, self%storage_type(), c_loc(buffer), writing=.true.)
     end do
   end subroutine copy
@@ -184,28 +168,9 @@ contains
     integer(hid_t), intent(in) :: type            !! HDF5 type in memory
     type(c_ptr), intent(in) :: address
     logical, intent(in) :: writing
-    integer(hid_t) :: in_file, in_memory
-    integer(hsize_t) :: start(self%rank + 1), counts(self%rank + 1)
-    type(c_ptr) :: place
-    integer :: status, closed
 
-    if (allocated(file%failure)) return
-    counts = [int(self%shape(:self%rank), hsize_t), int(count, hsize_t)]
-    start = 0
-    start(size(start)) = first - 1
-    place = address
-    call h5screate_simple_f(size(counts), counts, in_memory, status)
-    if (status >= 0) call h5dget_space_f(self%id, in_file, status)
-    if (status >= 0) call h5sselect_hyperslab_f(in_file, h5s_select_set_f, start, counts, status)
-    if (writing) then
-      if (status >= 0) call h5dwrite_f(self%id, type, place, status, in_memory, in_file)
-      call file%check(status, "write "//trim(self%name))
-    else
-      if (status >= 0) call h5dread_f(self%id, type, place, status, in_memory, in_file)
-      call file%check(status, "be read: "//trim(self%name))
-    end if
-    call h5sclose_f(in_file, closed)
-    call h5sclose_f(in_memory, closed)
+    if (writing) file%unsaved = file%unsaved + count*self%room()
+    call file%exchange_part(trim(self%name), first, [int(self%shape(:self%rank), int64), count], type, address, writing)
   end subroutine exchange
 
 end module hdf5_series

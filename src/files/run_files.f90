@@ -3,20 +3,17 @@
 module run_files
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
-  use system, only: last_problem, move_file, read_bytes, remove_file, synchronize, what_is
+  use system, only: identity_of, last_problem, move_file, read_bytes, synchronize, what_is
   implicit none
   private
-  public :: output_of, is_file, check_places, check_start, remove_temporaries, take_final_name
+  public :: output_of, is_file, source_of, check_places, check_replaced, take_final_name
 
-  ! What the name of a file ends with. An ending with .h5 replaces that of the output; an output without has none.
+  ! What the name of a file ends with.
   character(len=*), parameter, public :: &
     unfinished = ".part", &                       !! the output while it is being written
     unfinished_new = ".part_new", &               !! the same until all that is written once is in it
     lock = ".lock"                                !! keeps other runs from this output
-  character(len=12), parameter :: endings(*) = [character(len=12) :: "", unfinished, unfinished_new, lock]
-
-  ! What such files begin with.
-  character(len=8), parameter :: hdf5 = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+  character(len=9), parameter :: endings(*) = [character(len=9) :: "", unfinished, unfinished_new, lock]
 
 contains
 
@@ -34,12 +31,28 @@ contains
     end do
   end function output_of
 
+  !> Whether there is a file of this name.
+  function is_file(path) result(yes)
+    character(len=*), intent(in) :: path
+    logical :: yes
+
+    yes = what_is(path) /= "nothing"
+  end function is_file
+
+  !> The file from which a run goes on: its output, finished or not.
+  function source_of(output) result(path)
+    character(len=*), intent(in) :: output        !! path of the finished one
+    character(len=:), allocatable :: path
+
+    path = output
+    if (is_file(output//unfinished)) path = output//unfinished
+  end function source_of
+
   !> Fails if something that no run has written stands where the run is to write.
   subroutine check_places(output, error)
     character(len=*), intent(in) :: output        !! path of the output
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: path, what
-    logical :: ours
     integer :: k
 
     do k = 1, size(endings)
@@ -47,8 +60,7 @@ contains
       what = what_is(path)
       if (what == "nothing" .or. endings(k) == lock) cycle
       if (what == "a file") then
-        ours = begins(path, [hdf5])
-        if (ours) cycle
+        if (begins_like_a_run(path)) cycle
         what = "not a file of a run"
       end if
       call fail(error, exit_files, path//": exists already and is "//what//"; it is left as it is; remove it, " &
@@ -57,62 +69,43 @@ contains
     end do
   end subroutine check_places
 
-  !> Whether a file is empty, or begins in one of several ways.
-  function begins(path, ways) result(yes)
+  !> Whether a file begins as HDF5 files do, or as one whose run was killed before it was complete: empty, or with zeros.
+  function begins_like_a_run(path) result(yes)
     character(len=*), intent(in) :: path
-    character(len=8), intent(in) :: ways(:)
     logical :: yes
     character(len=8) :: first
     integer(int64) :: n
 
     call read_bytes(path, 1_int64, first, n)
-    yes = n == 0 .or. (n == 8 .and. any(ways == first))
-  end function begins
+    yes = n == 0 .or. (n == 8 .and. any(first == [char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10), &
+      repeat(achar(0), 8)]))
+  end function begins_like_a_run
 
-  !> Fails if a new run would replace an output, or delete what another run has left: that needs --force.
-  subroutine check_start(output, error)
+  !> Fails if the finished output would replace another file than the one that was there when the run began.
+  subroutine check_replaced(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
+    integer(int64), intent(in) :: replaced(:)     !! the identity of that file
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: there(3)
 
-    if (is_file(output)) then
-      call fail(error, exit_files, output//": exists already; --resume with a longer stop rule continues it, " &
-        //"--force replaces it when the run has finished, -o writes elsewhere")
-    else if (is_file(output//unfinished)) then
-      call fail(error, exit_files, output//unfinished//": exists already, from a run that did not finish; --resume " &
-        //"goes on, --force starts over")
-    end if
-  end subroutine check_start
+    there = identity_of(output)
+    if (.not. is_file(output) .or. all(there == replaced)) return
+    call fail(error, exit_files, output//": is not the file that was there when the run began; it is left as it is, and " &
+      //"the results stay in "//output//unfinished//" until it is moved away")
+  end subroutine check_replaced
 
-  !> Gives an output that is complete its final name; of a file that was not there when the run began nothing is taken.
-  subroutine take_final_name(output, replaces, error)
+  !> Gives an output that is complete its final name.
+  subroutine take_final_name(output, replaced, error)
     character(len=*), intent(in) :: output        !! path of the output
-    logical, intent(in) :: replaces               !! a file of this name
+    integer(int64), intent(in) :: replaced(:)     !! the identity of the file that it may replace
     type(error_t), allocatable, intent(out) :: error
     logical :: done
 
     call synchronize(output//unfinished, done)
-    if (is_file(output) .and. .not. replaces) then
-      call fail(error, exit_files, output//": has come since the run began; it is left as it is, and the results stay in " &
-        //output//unfinished//" until it is moved away")
-      return
-    end if
+    if (done) call check_replaced(output, replaced, error)
+    if (allocated(error)) return
     if (done) call move_file(output//unfinished, output, done)
     if (.not. done) call fail(error, exit_files, output//unfinished//": cannot be renamed: "//last_problem())
   end subroutine take_final_name
-
-  !> Removes what a run that was killed has left half made.
-  subroutine remove_temporaries(output)
-    character(len=*), intent(in) :: output        !! path of the output
-
-    call remove_file(output//unfinished_new)
-  end subroutine remove_temporaries
-
-  !> Whether there is a file of this name.
-  function is_file(path) result(yes)
-    character(len=*), intent(in) :: path
-    logical :: yes
-
-    yes = what_is(path) /= "nothing"
-  end function is_file
 
 end module run_files

@@ -1,34 +1,43 @@
 !> Checkpoints: what changes in a simulation, and how far its output has come, kept in the output itself. A run that goes
 !> on from one gives the same data as one that never stopped, bit for bit.
 !>
-!> A file has room for two: one counts, the other is written next. When all of it has reached the disk, a number says that
-!> it counts from now on. So there is a whole one at every moment, from the first on.
+!> While a run lasts its file has room for two: one counts, the other is written next. When all of it has reached the disk,
+!> a number says that it counts from now on. So there is a whole one at every moment, from the first on; each has a checksum.
+!> A finished file keeps one. In that of a run that broke off there is none.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, real64
+  use kinds, only: int64, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use checksums, only: checksum
-  use component_file, only: component_file_t
-  use disks, only: angle_column, columns, mass_column, n_columns, radius_column, spin_column
+  use disks, only: mass_column, n_columns, radius_column
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
-  use h5md_layout, only: checkpoint_group, provenance
+  use h5md_layout, only: checkpoint_group, parameters_group
   use hdf5_objects, only: hdf5_file_t, scalar
-  use input_groups, only: most_written, group_t
-  use variables, only: free_to_change
+  use input_groups, only: group_t, most_written
   use progress, only: progress_t
-  use run_files, only: is_file, unfinished
-  use settings, only: run_input_t, settings_t
+  use record, only: counting, reading, record_t, writing
+  use run_files, only: is_file, source_of, unfinished
+  use settings, only: run_input_t
   use simulation_state, only: simulation_t
-  use system, only: synchronize
-  use texts, only: growing_text_t, legible, written
+  use system, only: last_problem, synchronize
+  use texts, only: growing_text_t, legible, lower_case, text_t, written
+  use variables, only: free_to_change
   use version, only: program_version
   implicit none
   private
-  public :: make_checkpoints, put_checkpoint, read_checkpoint
+  public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
+  public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides
 
-  character(len=*), parameter :: eol = new_line("a"), current = checkpoint_group//"current"
+  integer, parameter :: layout = 6                !! of the checkpoints; another one is not understood
+  character(len=*), parameter :: eol = new_line("a"), slots(2) = checkpoint_group//["1", "2"]
+  character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
+  integer, parameter :: none = 0, only_first = 3
+
+  !> A second name of the first. HDF5 writes over the name that was made last when it is taken away, one call before it
+  !> strikes it off the list: a kill between would leave a file that h5dump cannot list.
+  character(len=*), parameter :: kept = checkpoint_group//"kept"
 
 contains
 
@@ -36,7 +45,7 @@ contains
   pure function program() result(text)
     character(len=:), allocatable :: text
 
-    text = "ricochet "//program_version
+    text = "ricochet "//program_version//", checkpoint "//written(layout)
     if (index(build_flags, "-ffp-contract=off") == 0) text = text//", contracted arithmetic"
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
@@ -66,148 +75,37 @@ contains
     text = growing%text()
   end function fixed_input
 
-  !> Gives a new file its checkpoints: both are of the present state.
-  subroutine make_checkpoints(file, groups, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file
-    type(group_t), intent(in) :: groups(:)
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
-    type(progress_t), intent(in) :: progress
-    integer :: slot
-
-    call file%put(checkpoint_group//"program", program())
-    call file%put(checkpoint_group//"input", fixed_input(groups))
-    do slot = 1, 2
-      call put_slot(file, slot, sim, progress)
-    end do
-    call file%put(current, scalar, [1_int64])
-  end subroutine make_checkpoints
-
-  !> Writes a checkpoint in place of the one that does not count; it counts when it has reached the disk.
-  subroutine put_checkpoint(file, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(inout) :: sim      !! stays as it is
-    type(progress_t), intent(in) :: progress
-    integer(int64) :: slot(1)
-
-    call file%fetch(current, 1, slot)
-    slot = 3 - slot
-    call put_slot(file, int(slot(1)), sim, progress)
-    call settle()
-    call file%put(current, scalar, slot)
-    call settle()
-  contains
-    !> Returns when all that was written is on the disk.
-    subroutine settle()
-      logical :: done
-
-      call file%flush()
-      call synchronize(file%path, done)
-      if (.not. done) call file%check(-1, "be written")
-    end subroutine settle
-  end subroutine put_checkpoint
-
-  !> Writes one of the two.
-  subroutine put_slot(file, slot, sim, progress)
-    type(hdf5_file_t), intent(inout) :: file
-    integer, intent(in) :: slot
-    type(simulation_t), intent(inout) :: sim
-    type(progress_t), intent(in) :: progress
-    type(component_file_t) :: components
-    type(progress_t) :: copy
-
-    components%hdf5 = file
-    components%writing = .true.
-    copy = progress
-    call exchange_slot(components, slot, sim, copy)
-    file = components%hdf5
-  end subroutine put_slot
-
-  !> Restores a run from its output, finished or not, which goes on with what `progress` says.
-  subroutine read_checkpoint(path, input, sim, progress, finished, error)
-    character(len=*), intent(in) :: path        !! of the output
-    type(run_input_t), intent(in) :: input
-    type(simulation_t), intent(inout) :: sim    !! in: with the box, law and species of the input
-    type(progress_t), intent(out) :: progress
-    logical, intent(out) :: finished            !! the run had come to its end
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: source
-    type(component_file_t) :: file
-    type(simulation_t), allocatable :: blank
-    integer(int64) :: slot(1)
-    integer :: trial
-
-    source = path//unfinished
-    finished = .not. is_file(source)
-    if (finished) source = path
-    if (.not. is_file(source)) then
-      call fail(error, exit_files, source//": there is no run to go on from")
-      return
-    end if
-    call file%hdf5%open(source, writable=.false.)
-    call check_origin(file, input%groups, error)
-    if (.not. allocated(error)) call check_elements(file, input%settings, sim, error)
-    if (.not. allocated(error)) then
-      slot = 1
-      call file%hdf5%fetch(current, 1, slot)
-      blank = sim
-      do trial = 1, 2                             ! the other one if that which counts is damaged
-        if (allocated(file%hdf5%failure)) deallocate (file%hdf5%failure)
-        sim = blank
-        progress = progress_t(input%settings)
-        call exchange_slot(file, merge(1, 2, slot(1) == 1), sim, progress)
-        if (.not. allocated(file%hdf5%failure)) exit
-        slot = 3 - slot
-      end do
-      call file%hdf5%report(error)
-      if (.not. sim%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
-      call sim%choose_units()
-      call progress%frames%look_ahead(sim)
-      call progress%observables%look_ahead(sim)
-      if (finished) call file%hdf5%fetch_attribute(provenance//"@wall_time", progress%spent)
-    end if
-    call file%hdf5%close()
-  end subroutine read_checkpoint
-
-  !> Refuses to go on if disks had more than the input gives them now, or less: a starting file decides that, too.
-  subroutine check_elements(file, settings, sim, error)
-    type(component_file_t), intent(inout) :: file
-    type(settings_t), intent(in) :: settings
-    type(simulation_t), intent(in) :: sim
-    type(error_t), allocatable, intent(out) :: error
-    logical :: there(2), here(2)
+  !> What the command line set when the run began, and may not change, need not be said again.
+  subroutine recall_overrides(output, overrides)
+    character(len=*), intent(in) :: output                       !! path
+    type(text_t), allocatable, intent(inout) :: overrides(:)     !! GROUP.VARIABLE=VALUE of now; then those of both
+    type(hdf5_file_t) :: file
+    type(text_t), allocatable :: given(:)
+    character(len=:), allocatable :: text, line
     integer :: k
 
-    there = [(file%hdf5%length(checkpoint_group//"1/disks/"//trim(columns(k)%name)) >= 0, k=spin_column, angle_column)]
-    here = [sim%law%rotation, sim%law%rotation .or. sim%law%orientation]
-    if (all(there .eqv. here) .or. allocated(file%hdf5%failure)) return
-    if (.not. any([(settings%species(k)%file /= "", k=1, size(settings%species))])) return
-    call fail(error, exit_files, file%hdf5%path//": whether its disks turn was read from species.file, which is not what it " &
-      //"was, or not there; --resume needs it as it was, --force instead starts over")
-  end subroutine check_elements
-
-  !> Refuses the checkpoint of another program or another input.
-  subroutine check_origin(file, groups, error)
-    type(component_file_t), intent(inout) :: file
-    type(group_t), intent(in) :: groups(:)
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: there, here
-    integer :: k
-
-    call file%hdf5%fetch_text(checkpoint_group//"program", there)
-    if (there /= program() .and. .not. allocated(file%hdf5%failure)) then
-      call fail(error, exit_usage, file%hdf5%path//": was written by "//legible(there)//", this is "//program())
-      return
-    end if
-    call file%hdf5%fetch_text(checkpoint_group//"input", there)
-    if (allocated(file%hdf5%failure)) return
-    here = fixed_input(groups)
-    if (there == here) return
-    do k = 1, min(len(there), len(here))
-      if (there(k:k) /= here(k:k)) exit
+    if (.not. is_file(source_of(output))) return
+    call file%open(source_of(output), writable=.false.)
+    call file%fetch_text(parameters_group//"overrides", text)
+    call file%close()
+    call move_alloc(overrides, given)
+    allocate (overrides(0))
+    do while (text /= "")
+      line = line_at(text, 1)
+      text = text(min(len(line) + 1, len(text)) + 1:)
+      if (free_to_change(variable_of(line)) .or. any([(variable_of(given(k)%text) == variable_of(line), k=1, size(given))])) cycle
+      overrides = [overrides, text_t(line)]
     end do
-    call fail(error, exit_usage, file%hdf5%path//": belongs to another input: there "//legible(line_at(there, k)) &
-      //", here "//legible(line_at(here, k))//"; --resume needs the input as it was there, --force instead starts over")
-  end subroutine check_origin
+    overrides = [overrides, given]
+  end subroutine recall_overrides
+
+  !> The variable of an override.
+  pure function variable_of(override) result(name)
+    character(len=*), intent(in) :: override
+    character(len=:), allocatable :: name
+
+    name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
+  end function variable_of
 
   !> The line of a text in which a character stands, or would stand behind the end.
   pure function line_at(text, k) result(line)
@@ -219,130 +117,321 @@ contains
     line = line(:index(line//eol, eol) - 1)
   end function line_at
 
-  !> Writes or reads one of the two checkpoints, and the checksum of all its values.
-  subroutine exchange_slot(file, slot, sim, progress)
-    type(component_file_t), intent(inout) :: file
-    integer, intent(in) :: slot
-    type(simulation_t), intent(inout) :: sim      !! when read it must know its box and species
-    type(progress_t), intent(inout) :: progress
-    integer(int64) :: sum_there(1)
+  !> Gives a new file its checkpoints: both are of the present state.
+  subroutine make_checkpoints(file, groups, sim, progress)
+    type(hdf5_file_t), intent(inout) :: file
+    type(group_t), intent(in) :: groups(:)
+    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(progress_t), intent(in) :: progress
 
-    file%group = checkpoint_group//written(slot)//"/"
-    file%crc = 0
-    call exchange_state(file, sim)
-    call exchange_cadence(file, "frames", progress%frames)
-    call exchange_cadence(file, "observables", progress%observables)
-    call file%exchange("progress/events", progress%events)
-    call file%exchange("progress/spent", progress%spent)
-    sum_there = file%crc
-    if (file%writing) call file%hdf5%put(file%name_of("checksum"), scalar, sum_there)
-    if (.not. file%writing) call file%hdf5%fetch(file%name_of("checksum"), 1, sum_there)
-    if (sum_there(1) /= file%crc) call file%hdf5%check(-1, "be read: the checksum of its state is wrong")
-  end subroutine exchange_slot
+    call file%put(checkpoint_group//"program", program())
+    call file%put(checkpoint_group//"input", fixed_input(groups))
+    call file%put(current, scalar, [2_int64])
+    call put_slot(file, slots(1), sim, progress)
+    call put_slot(file, slots(2), sim, progress)
+    call file%link(slots(1), kept)
+  end subroutine make_checkpoints
 
-  !> Writes or reads what changes in a simulation. When read it must know its box and species.
-  subroutine exchange_state(file, sim)
-    type(component_file_t), intent(inout) :: file
+  !> Gives a new file both checkpoints of another.
+  subroutine copy_checkpoints(file, source)
+    type(hdf5_file_t), intent(inout) :: file
+    type(hdf5_file_t), intent(in) :: source
+
+    call file%make_group(checkpoint_group)
+    call file%copy(checkpoint_group//"program", source)
+    call file%copy(checkpoint_group//"input", source)
+    call file%copy(current, source)
+    call file%copy(slots(1), source)
+    call file%copy(slots(2), source)
+    call file%link(slots(1), kept)
+  end subroutine copy_checkpoints
+
+  !> Writes a checkpoint in place of the one that does not count; it counts when it has reached the disk.
+  subroutine put_checkpoint(file, sim, progress)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(progress_t), intent(in) :: progress
+    integer :: slot
+    logical :: done
+
+    slot = merge(2, 1, checkpoint_number(file) == 1)
+    call put_slot(file, slots(slot), sim, progress)
+    call file%flush()
+    call synchronize(file%path, done)
+    if (.not. done) call file%check(-1, "be written: "//last_problem())
+    call file%put(current, scalar, [int(slot, int64)])
+    call file%flush()
+  end subroutine put_checkpoint
+
+  !> Makes a checkpoint that stays for good, in the first place, and gives up the room of the other.
+  subroutine put_last_checkpoint(file, sim, progress)
+    type(hdf5_file_t), intent(inout) :: file
+    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    type(progress_t), intent(in) :: progress
+
+    call put_checkpoint(file, sim, progress)
+    if (checkpoint_number(file) /= 1) call put_checkpoint(file, sim, progress)
+    call file%put(current, scalar, [int(only_first, int64)])
+    call file%remove_last(slots(2), before=slots(1))
+  end subroutine put_last_checkpoint
+
+  !> Marks the new file of a run that broke off: nothing in it is to go on from.
+  subroutine mark_as_broken(file)
+    type(hdf5_file_t), intent(inout) :: file
+
+    call file%put(current, scalar, [int(none, int64)])
+  end subroutine mark_as_broken
+
+  !> The number of the checkpoint that counts, or what stands for it; -1 if the file does not say.
+  function checkpoint_number(file) result(number)
+    type(hdf5_file_t), intent(inout) :: file
+    integer :: number
+    integer(int64) :: there(1)
+
+    there = -1
+    if (file%length(current) == 1) call file%fetch(current, 1, there)
+    number = int(there(1))
+  end function checkpoint_number
+
+  !> Whether a file has room for a checkpoint beside that which counts.
+  function has_both_checkpoints(file) result(yes)
+    type(hdf5_file_t), intent(inout) :: file
+    logical :: yes
+
+    yes = any(checkpoint_number(file) == [1, 2])
+  end function has_both_checkpoints
+
+  !> Whether the run of an unfinished output broke off.
+  function has_broken_off(output) result(yes)
+    character(len=*), intent(in) :: output        !! path of the finished one
+    logical :: yes
+    type(hdf5_file_t) :: file
+
+    call file%open(output//unfinished, writable=.false.)
+    yes = checkpoint_number(file) == none
+    call file%close()
+  end function has_broken_off
+
+  !> Bytes of one checkpoint.
+  function checkpoint_bytes(sim) result(bytes)
+    type(simulation_t), intent(inout) :: sim      !! stays as it is
+    integer(int64) :: bytes
+    type(record_t) :: record
+    type(progress_t) :: progress
+
+    call exchange_all(record, sim, progress)
+    bytes = 8*record%words
+  end function checkpoint_bytes
+
+  !> Writes one of the two; makes it if it is not there.
+  subroutine put_slot(file, name, sim, progress)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name
     type(simulation_t), intent(inout) :: sim
-    logical :: stored
+    type(progress_t), intent(in) :: progress
+    type(record_t) :: record
+    type(progress_t) :: copy
+
+    record%file = file
+    record%name = name
+    copy = progress
+    if (file%length(name) < 0) then
+      call exchange_all(record, sim, copy)
+      call record%make()
+    end if
+    call record%begin(writing)
+    call exchange_all(record, sim, copy)
+    file = record%file
+  end subroutine put_slot
+
+  !> Restores a run from its output, finished or not, which goes on with what `progress` says.
+  subroutine read_checkpoint(output, input, sim, progress, finished, error)
+    character(len=*), intent(in) :: output      !! path
+    type(run_input_t), intent(in) :: input
+    type(simulation_t), intent(inout) :: sim    !! in: with the box, law and species of the input
+    type(progress_t), intent(out) :: progress
+    logical, intent(out) :: finished            !! the run had come to its end
+    type(error_t), allocatable, intent(out) :: error
+    type(record_t) :: record
+    character(len=:), allocatable :: source
+
+    source = source_of(output)
+    finished = source == output
+    if (.not. is_file(source)) then
+      call fail(error, exit_files, source//": there is no run to go on from")
+      return
+    end if
+    progress = progress_t(input%settings)
+    call record%file%open(source, writable=.false.)
+    if (checkpoint_number(record%file) == none) then
+      call fail(error, exit_files, source//": its run broke off and cannot go on; without --resume it starts over")
+    else
+      call check_origin(record%file, input%groups, error)
+    end if
+    if (.not. allocated(error)) call read_slot(record, sim, progress, error)
+    call record%file%close()
+    if (allocated(error)) return
+    if (.not. sim%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
+    call sim%choose_units()
+    call progress%frames%look_ahead(sim)
+    call progress%observables%look_ahead(sim)
+  end subroutine read_checkpoint
+
+  !> Reads the checkpoint that counts; if it is damaged the other one.
+  subroutine read_slot(record, sim, progress, error)
+    type(record_t), intent(inout) :: record
+    type(simulation_t), intent(inout) :: sim
+    type(progress_t), intent(inout) :: progress
+    type(error_t), allocatable, intent(out) :: error
+    type(simulation_t) :: blank
+    character(len=:), allocatable :: failure      ! of the first trial
+    integer(int64) :: words
+    integer :: number, trial
+
+    number = checkpoint_number(record%file)
+    call sim%make_room(sum(sim%species%count))
+    blank = sim
+    do trial = 1, merge(1, 2, number == only_first)
+      sim = blank
+      record%name = slots(merge(2, 1, number == 2 .eqv. trial == 1))
+      call record%begin(counting)
+      call exchange_all(record, sim, progress)
+      words = record%file%length(record%name)
+      if (words > 0 .and. words /= record%words) then
+        call fail(error, exit_files, record%file%path//": has other disks than the input describes now: a starting file is not " &
+          //"what it was; --resume needs it as it was, --force instead starts over")
+        return
+      end if
+      call record%begin(reading)
+      call exchange_all(record, sim, progress)
+      if (any(sim%tag%species < 1 .or. sim%tag%species > size(sim%species) .or. sim%tag%id < 1 .or. sim%tag%id > size(sim%tag))) &
+        call record%file%check(-1, "be read: "//record%name//" has disks that are none")
+      if (.not. allocated(record%file%failure)) return
+      if (trial == 1) call move_alloc(record%file%failure, failure)
+    end do
+    call move_alloc(failure, record%file%failure)
+    call record%file%report(error)
+  end subroutine read_slot
+
+  !> Refuses the checkpoint of another program or another input.
+  subroutine check_origin(file, groups, error)
+    type(hdf5_file_t), intent(inout) :: file
+    type(group_t), intent(in) :: groups(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: there, here
+    integer :: k
+
+    call file%fetch_text(checkpoint_group//"program", there)
+    if (there /= program() .and. .not. allocated(file%failure)) &
+      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", this is "//program())
+    if (.not. allocated(error)) call file%fetch_text(checkpoint_group//"input", there)
+    if (.not. allocated(error)) call file%report(error)
+    if (allocated(error)) return
+    here = fixed_input(groups)
+    if (there == here) return
+    do k = 1, min(len(there), len(here))
+      if (there(k:k) /= here(k:k)) exit
+    end do
+    call fail(error, exit_usage, file%path//": belongs to another input: there "//legible(line_at(there, k)) &
+      //", here "//legible(line_at(here, k))//"; --resume needs the input as it was there, --force instead starts over")
+  end subroutine check_origin
+
+  !> Writes or reads a checkpoint. When read, a simulation must know its box and species.
+  subroutine exchange_all(record, sim, progress)
+    type(record_t), intent(inout) :: record
+    type(simulation_t), intent(inout) :: sim
+    type(progress_t), intent(inout) :: progress
+
+    call exchange_state(record, sim)
+    call exchange_cadence(record, progress%frames)
+    call exchange_cadence(record, progress%observables)
+    call record%exchange(progress%events)
+    call record%seal()
+  end subroutine exchange_all
+
+  !> Writes or reads what changes in a simulation.
+  subroutine exchange_state(record, sim)
+    type(record_t), intent(inout) :: record
+    type(simulation_t), intent(inout) :: sim
     integer(int64) :: settled
     integer :: k
 
-    call file%exchange("epoch", sim%epoch)
-    call file%exchange("now", sim%now)
+    call record%exchange(sim%epoch)
+    call record%exchange(sim%now)
     settled = merge(1, 0, sim%settled)
-    call file%exchange("settled", settled)
+    call record%exchange(settled)
     sim%settled = settled == 1
-    call file%exchange("epoch_begin", sim%epoch_begin)
-    call file%exchange("epoch_end", sim%epoch_end)
-    call file%exchange("epoch_events", sim%epoch_events)
-    call file%exchange("blink", sim%blink)
-    call file%exchange("last_advance", sim%last_advance)
-    call file%exchange("events_then", sim%events_then)
-    call file%exchange("start_energy", sim%start_energy)
-    call file%exchange("kicks", sim%kicks)
-    call exchange_tally(file, sim)
-    if (.not. allocated(sim%disk)) call sim%make_room(sum(sim%species%count))
+    call record%exchange(sim%epoch_begin)
+    call record%exchange(sim%epoch_end)
+    call record%exchange(sim%epoch_events)
+    call record%exchange(sim%blink)
+    call record%exchange(sim%last_advance)
+    call record%exchange(sim%events_then)
+    call record%exchange(sim%start_energy)
+    call record%exchange(sim%kicks)
+    call exchange_tally(record, sim)
     do k = 1, n_columns
-      stored = sim%has_column(k)
-      if (k == radius_column .or. k == mass_column) stored = sim%own_sizes     ! else they follow from the input
-      if (stored) call exchange_column(file, sim, k)
+      if (.not. sim%has_column(k)) cycle
+      if ((k == radius_column .or. k == mass_column) .and. .not. sim%own_sizes) cycle     ! they follow from the input
+      call exchange_column(record, sim, k)
     end do
-    if (sim%own_sizes .and. .not. file%writing) call sim%settle_masses()
+    if (sim%own_sizes .and. record%way == reading) call sim%settle_masses()
   end subroutine exchange_state
 
   !> Writes or reads what collisions have gathered.
-  subroutine exchange_tally(file, sim)
-    type(component_file_t), intent(inout) :: file
+  subroutine exchange_tally(record, sim)
+    type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
 
     call sim%tally%make_room(size(sim%box%surface))
     associate (tally => sim%tally)
-      call file%exchange("events", tally%events)
-      call file%exchange("collisions", tally%collisions)
-      call exchange_sums(file, "sums", tally%sum)
-      call file%exchange("surfaces/collisions", tally%surface%collisions)
-      call exchange_sums(file, "surfaces/impulse1", tally%surface%impulse(1))
-      call exchange_sums(file, "surfaces/impulse2", tally%surface%impulse(2))
-      call exchange_sums(file, "surfaces/energy", tally%surface%energy)
+      call record%exchange(tally%events)
+      call record%exchange(tally%collisions)
+      call exchange_sums(record, tally%sum)
+      call record%exchange(tally%surface%collisions)
+      call exchange_sums(record, tally%surface%impulse(1))
+      call exchange_sums(record, tally%surface%impulse(2))
+      call exchange_sums(record, tally%surface%energy)
     end associate
   end subroutine exchange_tally
 
-  !> Writes or reads sums: the halves of whole numbers of units, which may grow to twice as much.
-  subroutine exchange_sums(file, name, sums)
-    type(component_file_t), intent(inout) :: file
-    character(len=*), intent(in) :: name
+  !> Writes or reads sums: whole numbers of units, which may grow to twice as many bits as an integer has.
+  subroutine exchange_sums(record, sums)
+    type(record_t), intent(inout) :: record
     type(exact_sum_t), intent(inout) :: sums(:)
-    integer(int64) :: halves(2, size(sums))
+    integer(int64) :: halves(2*size(sums))
     integer :: k
 
     do k = 1, size(sums)
-      halves(:, k) = transfer(sums(k)%units, halves)
+      halves(2*k - 1:2*k) = transfer(sums(k)%units, halves)
     end do
-    call file%exchange(name//"/low", halves(1, :))
-    call file%exchange(name//"/high", halves(2, :))
+    call record%exchange(halves)
     do k = 1, size(sums)
-      sums(k)%units = transfer(halves(:, k), sums(k)%units)
+      sums(k)%units = transfer(halves(2*k - 1:2*k), sums(k)%units)
     end do
   end subroutine exchange_sums
 
   !> Writes or reads a column of `disks: columns`.
-  subroutine exchange_column(file, sim, k)
-    type(component_file_t), intent(inout) :: file
+  subroutine exchange_column(record, sim, k)
+    type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     integer, intent(in) :: k
     real(real64), allocatable :: values(:)
-    integer(int32), allocatable :: numbers(:)
-    integer(int64), allocatable :: long_numbers(:)
 
     allocate (values, source=sim%values_of(k))
-    associate (name => "disks/"//trim(columns(k)%name))
-      select case (columns(k)%kind)
-      case ("real")
-        call file%exchange(name, values)
-      case ("int")
-        numbers = int(values, int32)
-        call file%exchange(name, numbers)
-        values = numbers
-      case default                                 ! "long"
-        long_numbers = int(values, int64)
-        call file%exchange(name, long_numbers)
-        values = long_numbers
-      end select
-    end associate
-    if (.not. file%writing) call sim%take_values(k, values)
+    call record%exchange(values)
+    if (record%way == reading) call sim%take_values(k, values)
   end subroutine exchange_column
 
   !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
   !> follows from them.
-  subroutine exchange_cadence(file, name, cadence)
-    type(component_file_t), intent(inout) :: file
-    character(len=*), intent(in) :: name
+  subroutine exchange_cadence(record, cadence)
+    type(record_t), intent(inout) :: record
     type(cadence_t), intent(inout) :: cadence
 
-    call file%exchange("progress/"//name//"/count", cadence%count)
-    call file%exchange("progress/"//name//"/last_events", cadence%last_events)
-    call file%exchange("progress/"//name//"/last_time", cadence%last_time)
+    call record%exchange(cadence%count)
+    call record%exchange(cadence%last_events)
+    call record%exchange(cadence%last_time)
   end subroutine exchange_cadence
 
 end module checkpoint

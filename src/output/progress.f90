@@ -2,7 +2,6 @@
 module progress
   use kinds, only: int64, real64
   use cadence, only: cadence_t
-  use h5md_file, only: n_tracks
   use settings, only: settings_t
   implicit none
   private
@@ -12,7 +11,6 @@ module progress
   type :: progress_t
     type(cadence_t) :: frames, observables
     integer(int64) :: events = 0                  !! collisions written to the event log
-    real(real64) :: spent = 0.0_real64            !! wall time of earlier parts of the run [s]
   contains
     procedure :: counts
   end type progress_t
@@ -36,10 +34,10 @@ contains
     end associate
   end function new_progress
 
-  !> Number of samples of each track.
+  !> Number of samples of frames, observables and events.
   pure function counts(self)
     class(progress_t), intent(in) :: self
-    integer(int64) :: counts(n_tracks)
+    integer(int64) :: counts(3)
 
     counts = [self%frames%count, self%observables%count, self%events]
   end function counts

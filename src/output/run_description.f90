@@ -7,7 +7,7 @@ module run_description
   use build_info, only: build_flags, git_commit
   use disks, only: names_of
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
-    parameters_group, provenance, species_counts, species_names
+    parameters_group, provenance, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
   use input_groups, only: group_t, value_t, range_of
@@ -271,7 +271,7 @@ contains
 
     padded = note
     call file%put(provenance//"@threads", scalar, [int(threads, int64)])
-    call file%put(provenance//"@wall_time", scalar, [wall_seconds])
+    call file%put(wall_time, scalar, [wall_seconds])
     call file%put(provenance//"@collisions_per_second", scalar, [rate])
     call file%put(provenance//"@note", padded)
   end subroutine describe_end

@@ -30,7 +30,7 @@ contains
     if (sim%has_column(image_column)) series = [series, series_t(image//value_of, long_integer, 2, [2, n])]
     do k = 1, n_columns
       if (in_frames(sim, k)) series = [series, series_t(disks_group//trim(columns(k)%element)//value_of, &
-        merge(reals, long_integer, columns(k)%kind == "real"), 1, [n, 1])]
+        reals, 1, [n, 1])]
     end do
   end function frame_series
 

@@ -3,7 +3,7 @@
 !> columns that are there only where something needs them. What is derived is not in the table: it is rebuilt at every
 !> start.
 module disks
-  use kinds, only: int16, int32, int64, most_exact, never, real64
+  use kinds, only: int16, int32, int64, real64
   implicit none
   private
   public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
@@ -45,40 +45,24 @@ module disks
 
   !> A number that every disk has, or that it has only in some simulations: see `simulation_state: choose_columns`.
   type :: column_t
-    character(len=16) :: name                   !! in checkpoints
-    character(len=4) :: kind                    !! in checkpoints: "real", "int", or "long" (whole numbers)
-    real(real64) :: range(2)                    !! lowest and highest value; 0, 0: depends on the simulation
+    character(len=16) :: name
     logical :: is_moment = .false.              !! a time since the epoch
     character(len=20) :: element = ""           !! of frames that have it; position, velocity and image have more to them
     integer :: rate = 0                         !! number of the column by which it grows in time; 0: none
   end type column_t
-
-  real(real64), parameter :: longest = 1.0e101_real64       !! of times; inputs have numbers up to 1e100
-  real(real64), parameter, public :: clocks(2) = [-longest, longest]
-  real(real64), parameter :: places(2) = [-never, never]    !! where a disk collided last, any number of periods away
-  real(real64), parameter :: speeds(2) = [-1.0e102_real64, 1.0e102_real64]
-  real(real64), parameter :: sizes(2) = [1.0e-100_real64, 1.0e100_real64]
-  real(real64), parameter :: counts(2) = [0.0_real64, most_exact]
-  real(real64), parameter :: periods(2) = [-counts(2), counts(2)]
-  real(real64), parameter :: anything(2) = [-never, never]
-  real(real64), parameter :: of_simulation(2) = 0.0_real64
 
   !> The table. The first columns are in records and tags, the others are optional.
   integer, parameter :: n_fixed = 10
   integer, parameter, public :: radius_column = 6, species_column = 7, id_column = 8, met_column = 10
   integer, parameter, public :: mass_column = 11, image_column = 12, contact_column = 14, spin_column = 15, angle_column = 16
   type(column_t), parameter :: columns(*) = [ &
-    column_t("x1", "real", places), column_t("x2", "real", places), &
-    column_t("v1", "real", speeds), column_t("v2", "real", speeds), &
-    column_t("clock", "real", clocks, is_moment=.true.), &
-    column_t("radius", "real", sizes), &
-    column_t("species", "int", of_simulation), column_t("id", "int", of_simulation), &
-    column_t("collisions", "long", counts), column_t("met", "int", of_simulation), &
-    column_t("mass", "real", sizes), &                            ! other than that of the species [mass]
-    column_t("image1", "long", periods), column_t("image2", "long", periods), &     ! periods travelled
-    column_t("last_contact", "real", clocks, is_moment=.true.), & ! time of the last collision, for the TC model [time]
-    column_t("angular_velocity", "real", anything, element="angular_velocity"), &   ! [1/time]
-    column_t("orientation", "real", anything, element="orientation", rate=15)]      ! at `clock`, not wrapped [radian]
+    column_t("x1"), column_t("x2"), column_t("v1"), column_t("v2"), column_t("clock", is_moment=.true.), &
+    column_t("radius"), column_t("species"), column_t("id"), column_t("collisions"), column_t("met"), &
+    column_t("mass"), &                                           ! other than that of the species [mass]
+    column_t("image1"), column_t("image2"), &                     ! periods travelled
+    column_t("last_contact", is_moment=.true.), &                 ! time of the last collision, for the TC model [time]
+    column_t("angular_velocity", element="angular_velocity"), &   ! [1/time]
+    column_t("orientation", element="orientation", rate=15)]      ! at `clock`, not wrapped [radian]
   integer, parameter :: n_columns = size(columns)
 
 contains

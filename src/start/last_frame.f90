@@ -1,6 +1,6 @@
 !> Disks from the last complete frame of a run, finished or not.
 module last_frame
-  use kinds, only: int32, int64, real64
+  use kinds, only: int64, real64
   use box_geometry, only: box_t
   use errors, only: error_t, exit_usage, fail
   use h5md_layout, only: angular_velocity, box_group, disk_mass, disk_radius, disk_species, frame_counter, orientation, &
@@ -37,7 +37,7 @@ contains
     integer, allocatable, intent(out) :: chosen(:)          !! their rows in a frame
     type(error_t), allocatable, intent(out) :: error
     character(len=name_length), allocatable :: names(:)
-    integer(int32), allocatable :: species(:)
+    integer(int64), allocatable :: species(:)
     integer(int64) :: n_disks
     integer :: k
 
@@ -152,9 +152,8 @@ contains
     if (frames(1) < 1 .or. frames(1) > there) call file%check(-1, "be read: "//frame_counter//" is "//written(frames(1)) &
       //", but "//name//" has room for "//counted(there, "frame")//" of "//counted(int(n, int64), "disk"))
     series = series_t(name, rank=width, shape=merge([n, 1], [width, n], width == 1))
-    call series%open(file)
+    call series%find(file)
     call series%read(file, frames(1), frame)
-    call series%close()
     if (.not. allocated(file%failure)) values = frame(:, chosen)
   end subroutine read_element
 

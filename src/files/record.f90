@@ -1,0 +1,115 @@
+!> A record: numbers one after the other in one dataset. They are counted, written or read, each by one line for all
+!> three; a checksum behind the last one tells whether they are right.
+module record
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int8
+  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5dclose_f, h5kind_to_type, h5t_std_i64le
+  use checksums, only: crc_of
+  use hdf5_objects, only: hdf5_file_t
+  use kinds, only: int64, real64
+  implicit none
+  private
+  public :: record_t, counting, reading, writing
+
+  integer, parameter :: counting = 0, writing = 1, reading = 2
+  integer(int64), parameter :: bytes_of_word = 8
+
+  !> All numbers are words of 64 bits.
+  type :: record_t
+    type(hdf5_file_t) :: file
+    character(len=:), allocatable :: name         !! path of the dataset
+    integer :: way = counting
+    integer(int64) :: words = 0                   !! so far
+    integer(int64), private :: crc = 0            !! of these
+  contains
+    generic :: exchange => exchange_real, exchange_reals, exchange_long, exchange_longs
+    procedure :: make
+    procedure :: begin
+    procedure :: seal
+    procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, pass
+  end type record_t
+
+contains
+
+  !> Makes the dataset of a record that has been counted.
+  subroutine make(self)
+    class(record_t), intent(inout) :: self
+    integer(hid_t) :: dataset
+    integer :: closed
+
+    call self%file%make_dataset(self%name, h5t_std_i64le, [int(self%words, hsize_t)], dataset)
+    call h5dclose_f(dataset, closed)
+  end subroutine make
+
+  !> Begins anew, to count, write or read.
+  subroutine begin(self, way)
+    class(record_t), intent(inout) :: self
+    integer, intent(in) :: way
+
+    self%way = way
+    self%words = 0
+    self%crc = 0
+  end subroutine begin
+
+  !> The next number is a real.
+  subroutine exchange_real(self, value)
+    class(record_t), intent(inout) :: self
+    real(real64), intent(inout), target :: value
+
+    call self%pass(c_loc(value), 1)
+  end subroutine exchange_real
+
+  !> The next numbers are reals.
+  subroutine exchange_reals(self, values)
+    class(record_t), intent(inout) :: self
+    real(real64), intent(inout), target, contiguous :: values(:)
+
+    call self%pass(c_loc(values), size(values))
+  end subroutine exchange_reals
+
+  !> The next number is an integer.
+  subroutine exchange_long(self, value)
+    class(record_t), intent(inout) :: self
+    integer(int64), intent(inout), target :: value
+
+    call self%pass(c_loc(value), 1)
+  end subroutine exchange_long
+
+  !> The next numbers are integers.
+  subroutine exchange_longs(self, values)
+    class(record_t), intent(inout) :: self
+    integer(int64), intent(inout), target, contiguous :: values(:)
+
+    call self%pass(c_loc(values), size(values))
+  end subroutine exchange_longs
+
+  !> Ends a record with its checksum, or fails if that which is there is another.
+  subroutine seal(self)
+    class(record_t), intent(inout) :: self
+    integer(int64) :: crc, there
+
+    crc = self%crc
+    there = crc
+    call self%exchange(there)
+    if (there /= crc) call self%file%check(-1, "be read: the checksum of "//self%name//" is wrong")
+  end subroutine seal
+
+  !> Writes or reads the next n numbers from or to the memory at an address.
+  subroutine pass(self, address, n)
+    class(record_t), intent(inout) :: self
+    type(c_ptr), intent(in) :: address
+    integer, intent(in) :: n
+    integer(int8), pointer :: bytes(:)
+
+    if (n == 0) return
+    if (self%way /= counting) then
+      if (self%way == writing) self%file%unsaved = self%file%unsaved + bytes_of_word*n
+      call self%file%exchange_part(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
+        address, self%way == writing)
+      call c_f_pointer(address, bytes, [bytes_of_word*n])
+      self%crc = crc_of(bytes, self%crc)
+    end if
+    self%words = self%words + n
+  end subroutine pass
+
+end module record
