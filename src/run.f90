@@ -4,6 +4,7 @@ module run
   use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
+  use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
   use kicks, only: kick
@@ -29,6 +30,7 @@ module run
   public :: perform_run
 
   real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
+  integer, parameter :: most_unwritten = 4096              !! collisions in the event log
   integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
   character(len=1), parameter :: eol = new_line("a")
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
@@ -38,6 +40,7 @@ module run
     type(run_input_t) :: input
     type(simulation_t) :: sim
     class(evolution_t), allocatable :: evolution
+    type(event_log_t), allocatable :: log
     type(stop_rule_t) :: stop_rule
     type(output_t) :: output
     type(progress_line_t) :: line
@@ -65,6 +68,7 @@ contains
     if (allocated(error)) return
     call start_threads(run%input%settings, warning)
     call choose_evolution(run%input%settings, run%evolution)
+    if (run%input%settings%output%event_log) run%log = event_log_t(most=most_unwritten)
     if (warning /= "" .and. .not. command%quiet) write (error_unit, "(a)") "warning: "//warning
     if (command%resume) then
       call go_on(run, error)
@@ -199,7 +203,7 @@ contains
       kicks = run%sim%kicks
       events = run%sim%tally%events
       time = run%sim%time()
-      call run%evolution%advance(run%sim, limits, error)
+      call run%evolution%advance(run%sim, limits, error, run%log)
       do while (run%evolution%arrived .and. run%sim%time() >= kick_time .and. next_kick(run) <= kick_time)
         call kick(run%sim, kicked)
         call run%evolution%renew(run%sim, kicked)
@@ -209,7 +213,7 @@ contains
       end associate
       turns = adapted(turns, seconds() - now, limits%reached(run%sim%tally) .or. run%sim%time() >= limits%time &
         .or. run%sim%kicks > kicks)
-      call run%output%write_events(run%sim, run%evolution%log)
+      if (allocated(run%log)) call run%output%write_events(run%sim, run%log)
       if (allocated(error)) exit
       call run%output%write_what_is_due(run%sim, error)
       if (allocated(error)) exit

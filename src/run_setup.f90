@@ -3,7 +3,6 @@
 module run_setup
   use errors, only: error_t, exit_files, exit_usage
   use event_driven, only: event_driven_t
-  use event_log, only: event_log_t, log_capacity
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
   use input_fit, only: check_fit
@@ -86,7 +85,7 @@ contains
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 
-  !> The dynamics that the input names, with its search, queue and event log.
+  !> The dynamics that the input names, with its search and queue.
   subroutine choose_evolution(settings, evolution)
     type(settings_t), intent(in) :: settings
     class(evolution_t), allocatable, intent(out) :: evolution
@@ -117,7 +116,6 @@ contains
         call move_alloc(events, evolution)
       end if
     end if
-    if (settings%output%event_log) evolution%log = event_log_t(log_capacity)
   end subroutine choose_evolution
 
 end module run_setup

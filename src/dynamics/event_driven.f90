@@ -11,6 +11,7 @@ module event_driven
   use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
+  use event_log, only: event_log_t, is_full
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
   use partners, only: is_wall
@@ -86,27 +87,28 @@ contains
 
   !> Executes events until a limit is met. None after a stop has been requested: many predictions take long and are
   !> then left unfinished; the state itself is whole.
-  subroutine advance(self, sim, limits, error)
+  subroutine advance(self, sim, limits, error, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
     type(event_t) :: event
     real(real64) :: t_limit
     integer(int64) :: turns, pause_at, events
 
     turns = limits%turns
     self%turns_left = turns
-    self%thorough = self%log%is_on() .or. sim%law%rotation .or. sim%law%detailed
+    self%thorough = present(log) .or. sim%law%rotation .or. sim%law%detailed
     self%arrived = .false.
     do while (turns > 0)
-      if (limits%reached(sim%tally) .or. self%log%is_full()) return
+      if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
       t_limit = min(limits%time - sim%epoch, sim%epoch_end)
-      pause_at = next_pause(self, sim, limits)
+      pause_at = next_pause(self, sim, limits, log)
       if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
       events = sim%tally%events
-      call self%run_events(sim, t_limit, pause_at, turns, event)
+      call self%run_events(sim, t_limit, pause_at, turns, event, log)
       self%turns_left = turns
       if (turns == 0 .and. .not. sim%now < t_limit) turns = 1    ! a sample of this moment waits for all its events
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
@@ -155,13 +157,14 @@ contains
 
   !> The loop: event after event, up to the number `pause_at` of collisions, to the limit of time, or as long as
   !> there are turns. Hot path only; rare work is left to the caller.
-  subroutine run_events(self, sim, t_limit, pause_at, turns, event)
+  subroutine run_events(self, sim, t_limit, pause_at, turns, event, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: t_limit            !! since the epoch [time]
     integer(int64), intent(in) :: pause_at
     integer(int64), intent(inout) :: turns         !! that are left
     type(event_t), intent(out) :: event            !! the last one; beyond the limit of time: not executed
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
     integer(int32) :: i, code
 
@@ -173,22 +176,23 @@ contains
       if (.not. t <= t_limit) exit
       call self%queue%drop_first(sim%tag, i)
       sim%now = max(sim%now, t)
-      call execute(self, sim, i, code, t)
+      call execute(self, sim, i, code, t, log)
       if (sim%tally%events >= pause_at) exit
     end do
     event = event_t(t, i, code)
   end subroutine run_events
 
   !> The event count before which no check is due.
-  pure function next_pause(self, sim, limits) result(events)
+  pure function next_pause(self, sim, limits, log) result(events)
     class(event_driven_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     type(limits_t), intent(in) :: limits
+    type(event_log_t), intent(in), optional :: log
     integer(int64) :: events
 
     events = min(most_events(sim), limits%events, &
       sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
-    if (limits%watches() .or. self%log%is_on() .or. self%search%everyone) events = sim%tally%events + 1
+    if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
   end function next_pause
 
   !> Prefetches what the next events will read, and pauses soon to do so again.
@@ -207,11 +211,12 @@ contains
   end subroutine read_ahead
 
   !> Executes the event of disk i, and predicts the disks concerned again.
-  subroutine execute(self, sim, i, code, t)
+  subroutine execute(self, sim, i, code, t, log)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code          !! the disk and its partner: see `partners`
     real(real64), intent(in) :: t
+    type(event_log_t), intent(inout), optional :: log
     logical :: counts
 
     counts = .true.
@@ -219,7 +224,7 @@ contains
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
         if (self%thorough .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
-          call collide(sim, i, code, t, counts, self%log)
+          call collide(sim, i, code, t, counts, log)
         else
           call collide_pair(sim, i, code, t, counts)
         end if
@@ -232,7 +237,7 @@ contains
       end if
     else if (is_wall(code) .and. .not. passes(sim, code)) then
       if (self%thorough) then
-        call collide(sim, i, code, t, counts, self%log)
+        call collide(sim, i, code, t, counts, log)
       else
         call collide_wall(sim, i, code, t, counts)
       end if

@@ -32,7 +32,6 @@ module evolution
   type, abstract :: evolution_t
     logical :: idle = .false.     !! nothing will ever happen again
     logical :: arrived = .false.  !! at the limit of time of the last advance, with all that happens up to it behind
-    type(event_log_t) :: log      !! collisions to be written; the caller empties it
   contains
     procedure :: warning
     procedure :: pause_at
@@ -50,12 +49,13 @@ module evolution
     end subroutine start_evolution
 
     !> Moves on until a limit is met or the log is full. Where it pauses leaves no trace in the trajectory.
-    subroutine advance_evolution(self, sim, limits, error)
-      import :: error_t, evolution_t, limits_t, simulation_t
+    subroutine advance_evolution(self, sim, limits, error, log)
+      import :: error_t, event_log_t, evolution_t, limits_t, simulation_t
       class(evolution_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: sim
       type(limits_t), intent(in) :: limits
       type(error_t), allocatable, intent(out) :: error
+      type(event_log_t), intent(inout), optional :: log    !! of the collisions; without it there is none
     end subroutine advance_evolution
   end interface
 

@@ -10,6 +10,7 @@ module time_stepped
   use box_sides, only: bounds
   use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
+  use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
   use near_pairs, only: gap_between, near_pairs_t
@@ -73,17 +74,18 @@ contains
   end subroutine renew
 
   !> Takes steps; the k-th is at the time k*dt, wherever this paused before.
-  subroutine advance(self, sim, limits, error)
+  subroutine advance(self, sim, limits, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
     integer(int64) :: k, turn
 
     self%arrived = .false.
     k = steps_taken(sim%now, self%dt)
     do turn = 1, limits%turns
-      if (limits%reached(sim%tally) .or. self%log%is_full()) return
+      if (limits%reached(sim%tally) .or. is_full(log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
         if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
@@ -92,7 +94,7 @@ contains
       end if
       k = k + 1
       sim%now = k*self%dt
-      call take_step(self, sim, error)
+      call take_step(self, sim, error, log)
       if (allocated(error)) return
     end do
   end subroutine advance
@@ -123,10 +125,11 @@ contains
 
   !> All collisions at `sim%now`: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
   !> result does not depend on how they are found.
-  subroutine take_step(self, sim, error)
+  subroutine take_step(self, sim, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(inout) :: error
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: low(2), high(2), inset(2), period(2)
     integer(int32) :: i, k
 
@@ -144,7 +147,7 @@ contains
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
-      call meet_sides(self, sim, i)
+      call meet_sides(self, sim, i, log)
     end do
     call self%near%update(sim, self%x, self%dt, self%every_pair)
     do k = 1, self%near%n
@@ -152,20 +155,21 @@ contains
       associate (partner => self%near%partner(k))
         if (partner > 0) then
           if (gap_between(self%x(:, i), self%x(:, partner), sim%disk(i)%radius + sim%disk(partner)%radius, period)) &
-            call meet_disk(self, sim, i, partner)
+            call meet_disk(self, sim, i, partner, log)
         else
           if (obstacle_gap(sim%box, 1 - partner, self%x(:, i), sim%disk(i)%radius) < 0) &
-            call meet_wall(self, sim, i, partner)
+            call meet_wall(self, sim, i, partner, log)
         end if
       end associate
     end do
   end subroutine take_step
 
   !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
-  subroutine meet_sides(self, sim, i)
+  subroutine meet_sides(self, sim, i, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: beyond, inset, before(2), low(2), high(2)
     integer(int32) :: side
     integer :: axis
@@ -186,36 +190,38 @@ contains
         self%x(:, i) = sim%position(i)
         call self%near%shift(i, self%x(:, i) - before)
       else
-        call meet_wall(self, sim, i, side)
+        call meet_wall(self, sim, i, side, log)
       end if
     end do
   end subroutine meet_sides
 
   !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out of it. It keeps its position and so
   !> its potential energy.
-  subroutine meet_wall(self, sim, i, code)
+  subroutine meet_wall(self, sim, i, code, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: normal(2)
 
     normal = wall_normal(sim%box, code, self%x(:, i), sim%velocity(i))
     if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
-      call collide(sim, i, code, sim%now, .true., self%log)
+      call collide(sim, i, code, sim%now, .true., log)
   end subroutine meet_wall
 
   !> Collides the disks i < j, which overlap, if they approach.
-  subroutine meet_disk(self, sim, i, j)
+  subroutine meet_disk(self, sim, i, j, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
+    type(event_log_t), intent(inout), optional :: log
     type(images_t) :: images
     real(real64) :: dx(2)
 
     images = sim%box%images()
     dx = self%x(:, j) - self%x(:, i)
     dx = dx + images%shift(images%nearest_image(dx))
-    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., self%log)
+    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., log)
   end subroutine meet_disk
 
   !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the

@@ -273,7 +273,7 @@ contains
     if (log%n == 0) return
     call self%append(events, log%record(:sum(self%track(events)%series%width()), :log%n), sim)
     self%progress%events = self%progress%events + log%n
-    call log%clear()
+    log%n = 0
   end subroutine write_events
 
   !> Appends samples to a track, in a larger file if there is no room for them in this one.

@@ -16,11 +16,10 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: copy_of, domain_t, due_t, forever, follow_event, gather, keep_log, list_copies, load, merge_logs, move_on
+  public :: copy_of, domain_t, due_t, forever, follow_event, gather, list_copies, load, merge_logs, move_on
   public :: next_due, news_t
 
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
-  integer, parameter :: log_capacity = 1024
   real(real64), parameter :: longest_window = 5.0_real64   !! of one domain, after which it is given up [s]
   integer(int64), parameter :: turns_to_look = 100000      !! between two looks at signals and clock
   integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
@@ -44,7 +43,7 @@ module domains
     type(event_driven_t) :: engine
     integer(int32), allocatable :: home(:)         !! (slots) number of the disk in the whole simulation; or next vacant slot
     integer(int32) :: vacant = 0                   !! the first vacant slot; 0: none
-    type(event_log_t) :: log                       !! of the collisions booked here, with times since the epoch
+    type(event_log_t), allocatable :: log          !! of the collisions booked here, with times since the epoch
     integer(int64) :: turns = 0                    !! of the engine, in this window
     logical :: done = .false.                      !! the engine came to the end of the window
     logical :: good = .false.                      !! no own disk can have met a wrong copy
@@ -91,8 +90,7 @@ contains
     self%good = .true.
     self%sim%now = sim%now
     self%sim%box%epoch = sim%epoch                 ! for its sides; what happens here is told by times since the epoch
-    call self%engine%log%clear()
-    call self%log%clear()
+    if (allocated(self%log)) self%log%n = 0
     self%sim%tally = sim%tally
     call self%sim%tally%clear()
     call start(self, n)
@@ -222,9 +220,8 @@ contains
     left = turns
     do while (left > 0)
       limits%turns = min(left, turns_to_look)
-      call self%engine%advance(self%sim, limits, error)
+      call self%engine%advance(self%sim, limits, error, self%log)
       left = left - (limits%turns - self%engine%turns_left)
-      call take_log(self)
       if (allocated(error)) exit
       self%done = self%sim%now >= t_end
       if (self%done) exit
@@ -269,36 +266,10 @@ contains
     type(domain_t), intent(inout) :: self
     type(error_t), allocatable :: error
 
-    call self%engine%advance(self%sim, limits_t(turns=1_int64), error)
-    call take_log(self)
+    call self%engine%advance(self%sim, limits_t(turns=1_int64), error, self%log)
     self%turns = self%turns + 1
     self%done = .not. allocated(error)
   end subroutine follow_event
-
-  !> Switches the list of collisions on or off.
-  subroutine keep_log(self, on)
-    type(domain_t), intent(inout) :: self
-    logical, intent(in) :: on
-
-    if (on .eqv. self%engine%log%is_on()) return
-    if (on) then
-      self%engine%log = event_log_t(log_capacity)
-      self%log = event_log_t(log_capacity)
-    else
-      deallocate (self%engine%log%record, self%log%record)
-    end if
-  end subroutine keep_log
-
-  !> Keeps the collisions that the engine has listed.
-  subroutine take_log(self)
-    type(domain_t), intent(inout) :: self
-    integer :: k
-
-    do k = 1, self%engine%log%n
-      call self%log%append_record(self%engine%log%record(:, k))
-    end do
-    call self%engine%log%clear()
-  end subroutine take_log
 
   !> Writes the states of the own disks back into the whole simulation.
   subroutine gather(self, sim)
@@ -314,17 +285,17 @@ contains
     end do
   end subroutine gather
 
-  !> Merges the logs of all domains in the order of time. Of simultaneous collisions in different domains nobody knows
-  !> which comes first.
-  subroutine merge_logs(domain, merged, good)
+  !> Moves what all domains have logged to the log of the whole, in the order of time. Of simultaneous collisions in
+  !> different domains nobody knows which comes first: then it is not good.
+  subroutine merge_logs(domain, epoch, log, good)
     type(domain_t), intent(inout) :: domain(:)
-    type(event_log_t), intent(out) :: merged       !! with times since the epoch
+    real(real64), intent(in) :: epoch              !! of the whole [time]
+    type(event_log_t), intent(inout) :: log
     logical, intent(out) :: good
     integer :: next(size(domain)), k, m
     real(real64) :: head(size(domain))
 
     good = .true.
-    merged = event_log_t(1024)
     next = 1
     do
       head = huge(head)
@@ -334,11 +305,13 @@ contains
       m = minloc(head, dim=1)
       if (.not. head(m) < huge(head)) exit
       good = good .and. count(head <= head(m)) == 1
-      call merged%append_record(domain(m)%log%record(:, next(m)))
+      associate (record => domain(m)%log%record(:, next(m)))
+        call log%append([epoch + record(1), record(2:)])
+      end associate
       next(m) = next(m) + 1
     end do
     do k = 1, size(domain)
-      call domain(k)%log%clear()
+      domain(k)%log%n = 0
     end do
   end subroutine merge_logs
 

@@ -9,7 +9,7 @@ module parallel_events
   use epochs, only: begin_first_epoch, most_events, move_epoch, stands_still
   use errors, only: error_t
   use event_driven, only: event_driven_t
-  use event_log, only: event_log_t
+  use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
   use partition, only: partition_t
   use simulation_state, only: simulation_t
@@ -99,17 +99,18 @@ contains
   end function most_domains
 
   !> Goes on to a limit, or for as long as the caller can wait.
-  subroutine advance(self, sim, limits, error)
+  subroutine advance(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
     type(limits_t) :: goal
     logical :: at_end
     integer :: outcome
 
     self%arrived = .false.
-    if (limits%reached(sim%tally) .or. self%log%is_full()) return
+    if (limits%reached(sim%tally) .or. is_full(log)) return
     outcome = left_alone
     if (worthwhile(self, sim, limits)) then
       at_end = sim%now >= sim%epoch_end .and. limits%time - sim%epoch > sim%epoch_end
@@ -121,11 +122,11 @@ contains
       goal = limits
       goal%time = min(limits%time - sim%epoch, sim%epoch_end)
       goal%events = min(limits%events, most_events(sim))
-      if (goal%time > sim%now .and. .not. at_end) call self%visit(sim, goal, outcome)
+      if (goal%time > sim%now .and. .not. at_end) call self%visit(sim, goal, outcome, log)
       if (outcome == kept .and. sim%now >= limits%time - sim%epoch) self%arrived = self%parts%is_past(sim%now)
     end if
     if (outcome == left_alone) then
-      call self%advance_plainly(sim, limits, error)
+      call self%advance_plainly(sim, limits, error, log)
     else if (outcome == kept .and. sim%tally%events >= most_events(sim)) then
       call self%end_epoch(sim)
     end if
@@ -144,11 +145,12 @@ contains
   end subroutine end_epoch
 
   !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
-  subroutine advance_plainly(self, sim, limits, error)
+  subroutine advance_plainly(self, sim, limits, error, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
     type(limits_t) :: goal
     integer(int64) :: events
     real(real64) :: time
@@ -161,9 +163,7 @@ contains
     if (sim%tally%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
     events = sim%tally%events
     time = sim%time()
-    call self%engine%log%take(self%log)
-    call self%engine%advance(sim, goal, error)
-    call self%log%take(self%engine%log)
+    call self%engine%advance(sim, goal, error, log)
     self%idle = self%engine%idle
     self%arrived = self%engine%arrived
     if (sim%tally%events - events >= sim%n_disks()) &
@@ -184,21 +184,22 @@ contains
   end function worthwhile
 
   !> Lets the domains move on by some windows of time.
-  subroutine visit(self, sim, goal, outcome)
+  subroutine visit(self, sim, goal, outcome, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(limits_t), intent(in) :: goal             !! its time counts since the epoch
     integer, intent(out) :: outcome
-    type(event_log_t) :: merged
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
-    integer :: windows
+    integer :: windows, listed
     logical :: good
 
     outcome = left_alone
+    listed = 0
     if (self%holder /= all_domains) then
       if (allocated(self%engine)) deallocate (self%engine)
       self%holder = nobody
-      call self%parts%fill(sim, self%log%is_on(), good)
+      call self%parts%fill(sim, present(log), good)
       if (.not. good) then
         self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
         return
@@ -208,7 +209,10 @@ contains
     t = sim%now
     call self%parts%run_windows(sim, goal, self%patience, t, windows, good)
     self%windows_done = self%windows_done + windows
-    if (good .and. self%log%is_on()) call merge_logs(self%parts%domain, merged, good)
+    if (present(log)) then
+      listed = log%n
+      if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
+    end if
     call self%conclude(sim, good, outcome)
     if (good .and. (goal%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
       ! the plain engine finds the very event, or a collapse
@@ -217,7 +221,6 @@ contains
     end if
     if (outcome == kept) then
       call self%parts%gather_all(sim, t)
-      if (self%log%is_on()) call append_log(self%log, sim%epoch, merged)
       if (self%parts%threads > 1) call self%heed_cores(sim)
       if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
         outcome = left_alone
@@ -225,6 +228,7 @@ contains
       end if
     else
       self%holder = nobody
+      if (present(log)) log%n = listed
     end if
   end subroutine visit
 
@@ -270,17 +274,5 @@ contains
       self%spell = min(2*self%spell, longest_spell)
     end associate
   end subroutine conclude
-
-  !> Adds collisions to a log.
-  pure subroutine append_log(log, epoch, more)
-    type(event_log_t), intent(inout) :: log
-    real(real64), intent(in) :: epoch              !! [time]
-    type(event_log_t), intent(in) :: more          !! with times since the epoch
-    integer :: k
-
-    do k = 1, more%n
-      call log%append_record([epoch + more%record(1, k), more%record(2:, k)])
-    end do
-  end subroutine append_log
 
 end module parallel_events

@@ -7,7 +7,7 @@ module partition
   use cell_grid, only: whole_box
   use domain_borders, only: refresh, verify
   use domain_cuts, only: domain_cuts_t
-  use domains, only: domain_t, due_t, follow_event, gather, keep_log, load, move_on, next_due
+  use domains, only: domain_t, due_t, follow_event, gather, load, move_on, next_due
   use evolution, only: limits_t
   use pace, only: pace_t
   use signals, only: stop_requested
@@ -69,10 +69,10 @@ module partition
 contains
 
   !> Cuts a simulation and fills the domains. `cut`: it could be cut into several.
-  subroutine fill(self, sim, log, cut)
+  subroutine fill(self, sim, listing, cut)
     class(partition_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: log                     !! collisions are to be listed
+    logical, intent(in) :: listing                 !! collisions are to be listed
     logical, intent(out) :: cut
     integer(int16), allocatable :: cell(:, :)
     integer(int32) :: i, k
@@ -105,7 +105,7 @@ contains
         domain%low = self%cuts%low(:, k)
         domain%high = self%cuts%high(:, k)
         domain%neighbour = self%cuts%neighbours_of(k, domain%patch)
-        call keep_log(domain, log)
+        if (listing .and. .not. allocated(domain%log)) allocate (domain%log)
         call load(domain, sim, pack([(i, i=1, sim%n_disks())], domain%patch%covers(cell)))
       end associate
     end do

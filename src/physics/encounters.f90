@@ -19,17 +19,17 @@ module encounters
 
 contains
 
-  !> Collides disk i at the time t with what `code` names, unless they are together already, and logs the collision if the
-  !> log is on: the same entry whichever of two disks expected it.
+  !> Collides disk i at the time t with what `code` names, unless they are together already, and logs the collision if there
+  !> is a log: the same entry whichever of two disks expected it.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     integer(int32), intent(in) :: code           !! a disk (> 0), a side or an obstacle: see `partners`
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally and the log
-    type(event_log_t), intent(inout) :: log
+    type(event_log_t), intent(inout), optional :: log
     real(real64) :: v(2), change(2)
-    integer(int32) :: first, second, partner
+    integer(int32) :: first, second, ids(2)
 
     first = i
     second = min(code, 0)
@@ -54,10 +54,10 @@ contains
     if (.not. counts) return
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
     if (code > 0 .and. sim%law%detailed) call book_pair(sim, first, second, change)
-    if (.not. log%is_on()) return
-    partner = code
-    if (code > 0) partner = sim%tag(second)%id
-    call log%append(sim%epoch + t, sim%tag(first)%id, partner, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), change)
+    if (.not. present(log)) return
+    ids = [sim%tag(first)%id, code]
+    if (code > 0) ids(2) = sim%tag(second)%id
+    call log%append([sim%epoch + t, real(ids, real64), sim%mass_of(first)*magnitude(sim%disk(first)%v - v), change])
   end subroutine collide
 
   !> Turns disk i, whose clock is still to be set, to where it is at the time t.
