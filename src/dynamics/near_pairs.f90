@@ -1,15 +1,16 @@
 !> Which disks are near each other, or an obstacle, at the positions of a time step. Others cannot touch before a disk has
-!> moved by half the `skin`, so one list serves many steps (Verlet, Phys. Rev. 159, 98 (1967)).
+!> moved by half the `skin`, so one list serves many steps (Verlet, Phys. Rev. 159, 98 (1967)). What is done in every step
+!> is done in vector registers, for which the directives ask: loops without a branch.
 module near_pairs
   use kinds, only: int32, pi, real64
-  use box_geometry, only: obstacle_gap
+  use box_geometry, only: box_t, obstacle_gap
   use partners, only: n_sides
   use shapes, only: spare
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
   implicit none
   private
-  public :: gap_between, near_pairs_t
+  public :: near_pairs_t
 
   integer, parameter :: steps_per_list = 16                !! that a list should serve
   real(real64), parameter :: pairs_per_disk = 4.0_real64   !! in a list, at most, at the mean density
@@ -22,12 +23,15 @@ module near_pairs
     integer(int32) :: n = 0
     integer(int32), allocatable :: i(:)        !! (n, and room for more) a disk
     integer(int32), allocatable :: partner(:)  !! (n, and room for more) a disk > i, or the code of an obstacle
+    integer(int32), allocatable :: hit(:)      !! (n, and room for more) 1: they overlap
+    integer(int32), private :: n_obstacles = 0 !! those that are with obstacles
     logical, private :: known = .false.
     real(real64), private :: skin = 0.0_real64 !! gap up to which they are listed [length]
-    real(real64), allocatable, private :: from(:, :)   !! (2,disks) where they were when listed [length]
+    real(real64), allocatable, private :: from(:, :)   !! (disks,2) where they were when listed [length]
   contains
     procedure :: forget
     procedure :: update
+    procedure :: mark_overlaps
     procedure :: shift
   end type near_pairs_t
 
@@ -46,49 +50,70 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: dx(2)          !! [length]
 
-    if (self%known) self%from(:, i) = self%from(:, i) + dx
+    if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
   !> Lists the pairs anew unless no disk has moved by half the skin since. `all_pairs`: without skin or bins, every time.
   subroutine update(self, sim, x, step, all_pairs)
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: x(:, :)        !! (2,disks) where they are [length]
+    real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) where they are [length]
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
     integer(int32) :: bins(2), i, k
 
     if (self%known) then
-      if (farthest2(x, self%from, size(x, 2)) < (0.5_real64*self%skin*(1 - spare))**2) return
+      if (n_farther(size(x, 1), x, self%from, 0.5_real64*self%skin*(1 - spare)) == 0) return
     end if
     self%known = .not. all_pairs
     self%from = x
     self%skin = merge(0.0_real64, wanted_skin(sim, step), all_pairs)
     self%n = 0
-    if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100))
+    if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100), self%hit(100))
     do k = n_sides + 1, size(sim%box%surface)
       do i = 1, sim%n_disks()
-        if (obstacle_gap(sim%box, k, x(:, i), sim%disk(i)%radius) <= self%skin) call append(self, i, 1 - k)
+        if (obstacle_gap(sim%box, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) call append(self, i, 1 - k)
       end do
     end do
+    self%n_obstacles = self%n
     bins = 1
     if (.not. all_pairs) bins = int(min(sim%box%edges()/bin_width(sim, self%skin), cells_per_disk*sim%n_disks()), int32)
     call list_disks(self, sim, x, max(bins, 1))
   end subroutine update
 
-  !> The square of the way of the disk that has moved farthest; in vector registers.
-  pure function farthest2(x, from, n) result(way2)
+  !> How many disks have moved by some length or more.
+  pure function n_farther(n, x, from, length) result(n_far)
     integer, intent(in) :: n
-    real(real64), intent(in) :: x(2, n), from(2, n)       !! [length]
-    real(real64) :: way2
-    integer :: i
+    real(real64), intent(in) :: x(n, 2), from(n, 2), length    !! [length]
+    integer :: n_far, i
 
-    way2 = 0
+    n_far = 0
     !GCC$ VECTOR
     do i = 1, n
-      way2 = max(way2, (x(1, i) - from(1, i))**2 + (x(2, i) - from(2, i))**2)
+      n_far = n_far + merge(0, 1, (x(i, 1) - from(i, 1))**2 + (x(i, 2) - from(i, 2))**2 < length**2)
     end do
-  end function farthest2
+  end function n_farther
+
+  !> Marks with 1 those in the list that overlap, with 0 the others.
+  pure subroutine mark_overlaps(self, box, x, radius)
+    class(near_pairs_t), intent(inout) :: self
+    type(box_t), intent(in) :: box
+    real(real64), contiguous, intent(in) :: x(:, :)     !! (disks,2) where they are [length]
+    real(real64), contiguous, intent(in) :: radius(:)   !! (disks) [length]
+    real(real64) :: period(2)
+    integer :: k
+
+    period = box%periods()
+    associate (i => self%i, j => self%partner)
+      do k = 1, self%n_obstacles
+        self%hit(k) = merge(1, 0, obstacle_gap(box, 1 - j(k), [x(i(k), 1), x(i(k), 2)], radius(i(k))) < 0)
+      end do
+      !GCC$ VECTOR
+      do k = self%n_obstacles + 1, self%n
+        self%hit(k) = near(x(j(k), 1) - x(i(k), 1), x(j(k), 2) - x(i(k), 2), radius(i(k)) + radius(j(k)), period(1), period(2))
+      end do
+    end associate
+  end subroutine mark_overlaps
 
   !> Wide enough to serve many steps, not so wide that most pairs are far apart. Affects the cost only.
   pure function wanted_skin(sim, step) result(skin)
@@ -122,34 +147,32 @@ contains
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: x(:, :)
     integer(int32), intent(in) :: bins(2)      !! columns, rows
-    integer(int32) :: bin(size(x, 2)), place(size(x, 2)), member(size(x, 2)), low(2), high(2), i, j, k, ix, iy, first_pair
+    integer(int32) :: bin(size(x, 1)), place(size(x, 1)), member(size(x, 1)), low(2), high(2), i, iy, row, from, to, first_pair
     integer(int32), allocatable :: first(:)
-    real(real64) :: period(2), reach
+    real(real64) :: period(2), centre(2), reach
 
     period = sim%box%periods()
-    do i = 1, size(x, 2, kind=int32)
-      bin(i) = 1 + dot_product(modulo(bin_at(x(:, i)), bins), [1, bins(1)])
+    do i = 1, size(x, 1, kind=int32)
+      low = modulo(bin_at([x(i, 1), x(i, 2)]), bins)
+      bin(i) = 1 + low(1) + bins(1)*low(2)
     end do
     call sort_by_count(bin, product(bins), first, place)
-    member(place) = [(i, i=1, size(x, 2, kind=int32))]
+    member(place) = [(i, i=1, size(x, 1, kind=int32))]
     first_pair = self%n + 1
-    do i = 1, size(x, 2, kind=int32)
+    do i = 1, size(x, 1, kind=int32)
+      centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
-      low = bin_at(x(:, i) - reach)
-      high = min(bin_at(x(:, i) + reach), low + bins - 1)   ! each once
+      low = bin_at(centre - reach)
+      high = min(bin_at(centre + reach), low + bins - 1)    ! each once
+      from = 1 + modulo(low(1), bins(1))
+      to = from + high(1) - low(1)
       do iy = low(2), high(2)
-        do ix = low(1), high(1)
-          bin(1) = 1 + dot_product(modulo([ix, iy], bins), [1, bins(1)])
-          do k = first(bin(1)), first(bin(1) + 1) - 1
-            j = member(k)
-            if (sim%disk(j)%radius > sim%disk(i)%radius .or. (j <= i .and. .not. sim%disk(j)%radius < sim%disk(i)%radius)) cycle
-            if (gap_between(x(:, i), x(:, j), sim%disk(i)%radius + sim%disk(j)%radius + self%skin, period)) &
-              call append(self, min(i, j), max(i, j))
-          end do
-        end do
+        row = bins(1)*modulo(iy, bins(2))
+        call add_run(row + from, row + min(to, bins(1)))
+        call add_run(row + 1, row + to - bins(1))           ! what goes on at the other end
       end do
     end do
-    call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 2, kind=int32))
+    call sort_pairs(self%i(first_pair:self%n), self%partner(first_pair:self%n), size(x, 1, kind=int32))
 
   contains
 
@@ -160,20 +183,32 @@ contains
 
       c = floor((point - sim%box%lower)/sim%box%edges()*bins, int32)
     end function bin_at
+
+    !> Adds the pairs of disk i with those in bins c to d of a row, if any.
+    subroutine add_run(c, d)
+      integer(int32), intent(in) :: c, d
+      integer(int32) :: k, j
+
+      if (d < c) return
+      do k = first(c), first(d + 1) - 1
+        j = member(k)
+        if (sim%disk(j)%radius > sim%disk(i)%radius .or. (j <= i .and. .not. sim%disk(j)%radius < sim%disk(i)%radius)) cycle
+        if (near(x(j, 1) - centre(1), x(j, 2) - centre(2), sim%disk(i)%radius + sim%disk(j)%radius + self%skin, &
+          period(1), period(2)) > 0) call append(self, min(i, j), max(i, j))
+      end do
+    end subroutine add_run
   end subroutine list_disks
 
-  !> Whether the nearest images of two points are nearer to each other than sigma.
-  pure function gap_between(x, y, sigma, period) result(near)
-    real(real64), intent(in) :: x(2), y(2), sigma, period(2)    !! [length]
-    logical :: near
+  !> 1 if the nearest images of two points in the box are nearer to each other than sigma, else 0.
+  elemental function near(dx, dy, sigma, period_x, period_y) result(yes)
+    real(real64), intent(in) :: dx, dy, sigma, period_x, period_y    !! [length]
+    integer(int32) :: yes
     real(real64) :: a, b
 
-    a = abs(y(1) - x(1))
-    b = abs(y(2) - x(2))
-    a = min(a, abs(period(1) - a))
-    b = min(b, abs(period(2) - b))
-    near = a*a + b*b < sigma*sigma
-  end function gap_between
+    a = min(abs(dx), abs(period_x - abs(dx)))
+    b = min(abs(dy), abs(period_y - abs(dy)))
+    yes = merge(1, 0, a*a + b*b < sigma*sigma)
+  end function near
 
   !> Appends a pair.
   pure subroutine append(self, i, partner)
@@ -183,6 +218,7 @@ contains
     if (self%n == size(self%i)) then
       self%i = [self%i, self%i]
       self%partner = [self%partner, self%partner]
+      self%hit = self%i
     end if
     self%n = self%n + 1
     self%i(self%n) = i

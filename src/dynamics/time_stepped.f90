@@ -6,14 +6,14 @@
 module time_stepped
   use images, only: images_t
   use kinds, only: int32, int64, most_exact, never, real64
-  use box_geometry, only: obstacle_gap, strike_velocity, wall_normal
+  use box_geometry, only: strike_velocity, wall_normal
   use box_sides, only: bounds
   use encounters, only: collide, encounter_text, pass_side, passes
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
   use free_flight, only: flight, slowest
-  use near_pairs, only: gap_between, near_pairs_t
+  use near_pairs, only: near_pairs_t
   use partners, only: axis_of, n_sides, nothing, sense_of
   use simulation_state, only: simulation_t
   use texts, only: written
@@ -29,7 +29,10 @@ module time_stepped
     real(real64) :: dt = 0.0_real64                 !! [time]
     logical :: every_pair = .false.                 !! test all pairs at every step, not only near ones
     type(near_pairs_t), private :: near
-    real(real64), allocatable, private :: x(:, :)    !! (2,disks) where they are in this step [length]
+    ! Coordinate by coordinate, for vector registers.
+    real(real64), allocatable, private :: x(:, :)    !! (disks,2) where they are in this step [length]
+    real(real64), allocatable, private :: radius(:)  !! (disks) [length]
+    integer(int32), allocatable, private :: outside(:)   !! (disks) 1: beyond a side
   contains
     procedure :: warning
     procedure :: pause_at
@@ -45,8 +48,10 @@ contains
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
 
-    if (allocated(self%x)) deallocate (self%x)
-    allocate (self%x(2, sim%n_disks()))
+    if (allocated(self%x)) deallocate (self%x, self%outside)
+    allocate (self%x(sim%n_disks(), 2))
+    self%radius = sim%disk%radius
+    allocate (self%outside(sim%n_disks()))
     call self%near%forget()
     call sim%start_sums()
     self%idle = .false.
@@ -130,39 +135,76 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(inout) :: error
     type(event_log_t), intent(inout), optional :: log
-    real(real64) :: low(2), high(2), inset(2), period(2)
     integer(int32) :: i, k
 
-    call bounds(sim%box, sim%now, low, high)
-    period = sim%box%periods()
-    inset = merge(0.0_real64, 1.0_real64, sim%box%periodic)
     do i = 1, sim%n_disks()
-      associate (d => sim%disk(i), x => self%x(1, i), y => self%x(2, i))
-        x = flight(d%x(1), d%v(1), sim%box%gravity(1), sim%now - d%clock)
-        y = flight(d%x(2), d%v(2), sim%box%gravity(2), sim%now - d%clock)
-        if (x >= low(1) + inset(1)*d%radius .and. x <= high(1) - inset(1)*d%radius .and. &
-          y >= low(2) + inset(2)*d%radius .and. y <= high(2) - inset(2)*d%radius) cycle
+      associate (d => sim%disk(i), g => sim%box%gravity)
+        self%x(i, 1) = flight(d%x(1), d%v(1), g(1), sim%now - d%clock)
+        self%x(i, 2) = flight(d%x(2), d%v(2), g(2), sim%now - d%clock)
       end associate
-      if (any(self%x(:, i) /= self%x(:, i))) then
+    end do
+    call mark_outside(self, sim)
+    i = next_marked(self%outside, 0)
+    do while (i > 0)
+      if (any(self%x(i, :) /= self%x(i, :))) then
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
       call meet_sides(self, sim, i, log)
+      i = next_marked(self%outside, i)
     end do
     call self%near%update(sim, self%x, self%dt, self%every_pair)
-    do k = 1, self%near%n
-      i = self%near%i(k)
-      associate (partner => self%near%partner(k))
+    call self%near%mark_overlaps(sim%box, self%x, self%radius)
+    k = next_marked(self%near%hit(:self%near%n), 0)
+    do while (k > 0)
+      associate (i => self%near%i(k), partner => self%near%partner(k))
         if (partner > 0) then
-          if (gap_between(self%x(:, i), self%x(:, partner), sim%disk(i)%radius + sim%disk(partner)%radius, period)) &
-            call meet_disk(self, sim, i, partner, log)
+          call meet_disk(self, sim, i, partner, log)
         else
-          if (obstacle_gap(sim%box, 1 - partner, self%x(:, i), sim%disk(i)%radius) < 0) &
-            call meet_wall(self, sim, i, partner, log)
+          call meet_wall(self, sim, i, partner, log)
         end if
       end associate
+      k = next_marked(self%near%hit(:self%near%n), k)
     end do
   end subroutine take_step
+
+  !> The next place with a mark; 0: there is none.
+  pure function next_marked(mark, after) result(k)
+    integer(int32), contiguous, intent(in) :: mark(:)
+    integer(int32), intent(in) :: after
+    integer(int32) :: k
+
+    do k = after + 1, size(mark, kind=int32)
+      if (mark(k) > 0) return
+    end do
+    k = 0
+  end function next_marked
+
+  !> Marks with 1 the disks that are not between the sides (or nowhere: NaN), with 0 the others.
+  pure subroutine mark_outside(self, sim)
+    class(time_stepped_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: low(2), high(2), inset(2)
+    integer :: i
+
+    call bounds(sim%box, sim%now, low, high)
+    inset = merge(0.0_real64, 1.0_real64, sim%box%periodic)
+    associate (x => self%x, radius => self%radius)
+      !GCC$ VECTOR
+      do i = 1, size(radius)
+        self%outside(i) = 1 - iand(between(x(i, 1), low(1) + inset(1)*radius(i), high(1) - inset(1)*radius(i)), &
+          between(x(i, 2), low(2) + inset(2)*radius(i), high(2) - inset(2)*radius(i)))
+      end do
+    end associate
+  end subroutine mark_outside
+
+  !> 1 if x is between two limits, else (or if it is NaN) 0.
+  elemental function between(x, low, high) result(inside)
+    real(real64), intent(in) :: x, low, high
+    integer(int32) :: inside
+
+    inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
+  end function between
 
   !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
   subroutine meet_sides(self, sim, i, log)
@@ -179,16 +221,16 @@ contains
       axis = axis_of(side)
       inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
       if (sense_of(side) < 0) then
-        beyond = (low(axis) + inset) - self%x(axis, i)
+        beyond = (low(axis) + inset) - self%x(i, axis)
       else
-        beyond = self%x(axis, i) - (high(axis) - inset)
+        beyond = self%x(i, axis) - (high(axis) - inset)
       end if
       if (.not. beyond > 0) cycle
       if (passes(sim, side)) then
-        before = self%x(:, i)
+        before = self%x(i, :)
         call pass_side(sim, i, side, sim%now)
-        self%x(:, i) = sim%position(i)
-        call self%near%shift(i, self%x(:, i) - before)
+        self%x(i, :) = sim%position(i)
+        call self%near%shift(i, self%x(i, :) - before)
       else
         call meet_wall(self, sim, i, side, log)
       end if
@@ -204,7 +246,7 @@ contains
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: normal(2)
 
-    normal = wall_normal(sim%box, code, self%x(:, i), sim%velocity(i))
+    normal = wall_normal(sim%box, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
     if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
       call collide(sim, i, code, sim%now, .true., log)
   end subroutine meet_wall
@@ -219,7 +261,7 @@ contains
     real(real64) :: dx(2)
 
     images = sim%box%images()
-    dx = self%x(:, j) - self%x(:, i)
+    dx = self%x(j, :) - self%x(i, :)
     dx = dx + images%shift(images%nearest_image(dx))
     if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., log)
   end subroutine meet_disk
