@@ -9,7 +9,6 @@ module run
   use initial_state, only: describe_system
   use kicks, only: kick
   use kinds, only: int32, int64, never, real64
-  use memory, only: check_memory
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
   use partners, only: n_sides
@@ -64,7 +63,6 @@ contains
     call end_at_signals("stopped before the run began; nothing is lost: repeat the command", exit_stopped)
     if (command%resume) call recall_overrides(command%output, run%command%overrides)
     call read_input(command%input, run%command%overrides, run%input, error)
-    if (.not. allocated(error)) call check_memory(run%input%settings, error)
     if (allocated(error)) return
     call start_threads(run%input%settings, warning)
     call choose_evolution(run%input%settings, run%evolution)
@@ -98,7 +96,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: folder_is_new, over_broken
 
-    call new_simulation(run%input%settings, run%line, run%sim, error)
+    call new_simulation(run%input, run%line, run%sim, error)
     call run%line%clear()
     if (allocated(error)) return
     associate (command => run%command)

@@ -1,11 +1,11 @@
 !> From the command line's file to a run: reads and checks the input, builds the state, and turns words of the
 !> input into types. The only place that knows every search and every dynamics.
 module run_setup
-  use errors, only: error_t, exit_files, exit_usage
+  use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
-  use input_fit, only: check_fit
+  use input_fit, only: fit_together
   use input_json, only: groups_text
   use input_problems, only: problem_list_t
   use input_text, only: read_text
@@ -22,7 +22,7 @@ module run_setup
   use time_stepped, only: time_stepped_t
   implicit none
   private
-  public :: print_input, read_input, settings_from_text, new_simulation, choose_evolution
+  public :: print_input, read_input, input_from_text, new_simulation, choose_evolution
 
 contains
 
@@ -32,12 +32,28 @@ contains
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
 
-    input%overrides = overrides
-    call read_text(path, input%text, error)
-    if (.not. allocated(error)) &
-      call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
+    call read_text(path, text, error)
+    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error)
   end subroutine read_input
+
+  !> The same for a text; `path` only names it in messages. All problems become one error.
+  subroutine input_from_text(text, path, overrides, input, error)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: path
+    type(text_t), intent(in) :: overrides(:)
+    type(run_input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t) :: problems
+
+    input%path = path
+    input%text = text
+    input%overrides = overrides
+    call read_settings(text, overrides, input%settings, input%groups, problems)
+    call fit_together(input%settings, input%groups, problems)
+    call problems%report(path, overrides, error)
+  end subroutine input_from_text
 
   !> Prints what the file and the overrides give, as far as it could be understood; an error holds all problems.
   subroutine print_input(path, overrides, error)
@@ -45,43 +61,26 @@ contains
     type(text_t), intent(in) :: overrides(:)
     type(error_t), allocatable, intent(out) :: error
     type(run_input_t) :: input
+    type(group_t), allocatable :: groups(:)
     type(problem_list_t) :: problems
+    character(len=:), allocatable :: text
     logical :: complete
 
-    call read_text(path, input%text, error)
+    call read_text(path, text, error)
     if (allocated(error)) return
-    call read_groups(input%text, overrides, input%groups, problems, complete)
-    call print_text(groups_text(input%groups), error)
-    if (.not. allocated(error)) &
-      call settings_from_text(input%text, path, overrides, input%settings, input%groups, error)
+    call read_groups(text, overrides, groups, problems, complete)
+    call print_text(groups_text(groups), error)
+    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error)
   end subroutine print_input
 
-  !> The same for a text; `path` only names it in messages. All problems become one error.
-  subroutine settings_from_text(text, path, overrides, settings, groups, error)
-    character(len=*), intent(in) :: text
-    character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)
-    type(settings_t), intent(out) :: settings
-    type(group_t), allocatable, intent(out) :: groups(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(problem_list_t) :: problems
-
-    call read_settings(text, overrides, settings, groups, problems)
-    call check_fit(settings, groups, problems)
-    if (problems%count == 0) return
-    allocate (error)
-    error%message = problems%report(path, overrides)
-    error%code = merge(exit_files, exit_usage, problems%unreadable == problems%count)
-  end subroutine settings_from_text
-
   !> The state at the start of a run, the disks in an order that suits the memory.
-  subroutine new_simulation(settings, line, sim, error)
-    type(settings_t), intent(in) :: settings
+  subroutine new_simulation(input, line, sim, error)
+    type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
 
-    call create_simulation(settings, line, sim, error)
+    call create_simulation(input, line, sim, error)
     if (.not. allocated(error)) call renumber(sim)
   end subroutine new_simulation
 

@@ -1,5 +1,6 @@
 !> Everything that is wrong with an input, collected to be reported at once.
 module input_problems
+  use errors, only: error_t, exit_files, exit_usage
   use texts, only: legible, text_t, written
   implicit none
   private
@@ -69,28 +70,29 @@ contains
     rank = merge(line, whole_file - line, line > 0)
   end function rank
 
-  !> One line per problem: `path:line: group.variable: what is wrong, what is allowed`.
-  pure function report(self, path, overrides) result(text)
+  !> Makes all problems one error, a line for each: `path:line: group.variable: what is wrong, what is allowed`.
+  subroutine report(self, path, overrides, error)
     class(problem_list_t), intent(in) :: self
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)
-    character(len=:), allocatable :: text
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text, place
     integer :: k
 
+    if (self%count == 0) return
     text = ""
     do k = 1, self%count
       associate (problem => self%items(k))
-        if (k > 1) text = text//new_line("a")
-        if (problem%line > 0) then
-          text = text//legible(path//":"//written(problem%line)//": "//problem%text)
-        else if (problem%line == 0) then
-          text = text//legible(path//": "//problem%text)
-        else
-          text = text//legible("--set "//overrides(-problem%line)%text//": "//problem%text)
-        end if
+        place = path
+        if (problem%line > 0) place = path//":"//written(problem%line)
+        if (problem%line < 0) place = "--set "//overrides(-problem%line)%text
+        text = text//new_line("a")//legible(place//": "//problem%text)
       end associate
     end do
     if (self%cut_short) text = text//new_line("a")//legible(path)//": more problems than these "//written(capacity)
-  end function report
+    allocate (error)                            ! not by `fail`: there are several lines
+    error%message = text(2:)
+    error%code = merge(exit_files, exit_usage, self%unreadable == self%count)
+  end subroutine report
 
 end module input_problems

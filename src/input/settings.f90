@@ -6,12 +6,13 @@ module settings
   use collisions, only: contact_law_t
   use disks, only: species_t
   use drive, only: drive_t
+  use errors, only: error_t
   use input_groups, only: group_t
   use stop_rules, only: stop_settings_t
   use texts, only: text_t
   implicit none
   private
-  public :: run_input_t, settings_t, run_settings_t, species_settings_t, output_settings_t
+  public :: run_input_t, settings_t, run_settings_t, species_settings_t, output_settings_t, disks_in_file_t
 
   integer, parameter :: many_disks = 500000           !! from here on parts of the box that fit into caches pay
 
@@ -24,6 +25,14 @@ module settings
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
     integer :: threads                                !! 0: as the environment says; then those of the run
   end type run_settings_t
+
+  !> Disks as a file has them.
+  type :: disks_in_file_t
+    real(real64), allocatable :: table(:, :)          !! (`position_file: column_names`,n), until they are placed
+    logical, allocatable :: there(:)                  !! (column_names) whether the file has these columns
+    integer, allocatable :: rows(:)                   !! (n) lines of a text, or rows in the last frame of a run
+    type(error_t), allocatable :: error               !! why they cannot be had
+  end type disks_in_file_t
 
   !> A species, and how its disks start.
   type, extends(species_t) :: species_settings_t
@@ -38,6 +47,7 @@ module settings
     integer :: grid(2)                                !! nx, ny; 0, 0 when not given
     character(len=:), allocatable :: file             !! of placement 'file', 'grown': text columns, or a run's HDF5 file
     logical :: scale_positions = .false.              !! from the box of that run to this one
+    type(disks_in_file_t) :: in_file
     real(real64), allocatable :: position(:, :)       !! (2,count) of 'explicit' [length]; else (2,0)
     character(len=:), allocatable :: velocities       !! 'rest', 'equal_speed', 'uniform', 'maxwell', 'explicit', 'file'
     real(real64) :: speed                             !! of 'equal_speed' and 'uniform' (half width) [length/time]
@@ -79,6 +89,7 @@ module settings
 
   !> What a run was asked for, in all its forms.
   type :: run_input_t
+    character(len=:), allocatable :: path                !! of the input file, for messages
     character(len=:), allocatable :: text                !! the input file as it is
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
     type(group_t), allocatable :: groups(:)    !! every value as used

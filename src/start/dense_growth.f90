@@ -90,8 +90,8 @@ contains
     wanted = pi*sum(full**2)/product(sim%box%edges())
     advice = "use fewer or smaller disks"
     if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
-    call fail(error, exit_usage, "species."//sim%species(1)%name//".placement: dense placement "// &
-      "reached "//written(reached)//" of the wanted packing "//written(wanted)//"; "//advice)
+    call fail(error, exit_usage, "dense placement reached "//written(reached)//" of the wanted packing "//written(wanted) &
+      //"; "//advice)
   end subroutine fail_to_grow
 
   !> Elastic disks in their box, species by species, at no place yet.

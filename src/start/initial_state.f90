@@ -5,11 +5,13 @@ module initial_state
   use kinds, only: int32, real64
   use box_geometry, only: box_t
   use disks, only: spin_column
-  use errors, only: error_t, exit_usage, fail
+  use errors, only: error_t
+  use input_groups, only: group_t, range_of
+  use input_problems, only: problem_list_t
   use kicks, only: orient
   use placement, only: place_disks
   use random_stream, only: random_stream_t
-  use settings, only: settings_t
+  use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
@@ -23,42 +25,46 @@ module initial_state
 
 contains
 
-  !> Builds the simulation that the settings describe.
-  subroutine create_simulation(settings, line, sim, error)
-    type(settings_t), intent(in) :: settings
+  !> Builds the simulation that the input describes. What files had of the disks is gone afterwards.
+  subroutine create_simulation(input, line, sim, error)
+    type(run_input_t), intent(inout) :: input
     class(status_line_t), intent(inout) :: line             !! shows how far the placement is
     type(simulation_t), intent(out) :: sim
     type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t) :: problems
+    integer :: s(2)
 
-    call describe_system(settings, sim)
-    call sim%list_disks()
-    call check_lengths(sim%box, settings%species%radius, error)
-    if (allocated(error)) return
-    if (sim%law%orientation) call orient(sim)
-    call place_disks(settings%species, settings%run%seed, line, sim, error)
-    if (allocated(error)) return
-    call set_in_motion(settings, sim, error)
-    if (.not. allocated(error)) call check_speeds(sim, error)
-    if (.not. allocated(error)) call sim%start_sums()
+    s = range_of(input%groups, ["species"])
+    associate (settings => input%settings, groups => input%groups(s(1):s(2)))
+      call describe_system(settings, sim)
+      call sim%list_disks()
+      call check_lengths(sim%box, settings%species%radius, problems)
+      if (sim%law%orientation) call orient(sim)
+      if (problems%count == 0) call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
+      if (problems%count == 0) call set_in_motion(settings, groups, sim, problems)
+      if (problems%count == 0) call check_speeds(sim, problems)
+      if (problems%count == 0) call sim%start_sums()
+    end associate
+    call problems%report(input%path, input%overrides, error)
   end subroutine create_simulation
 
   !> Refuses lengths whose squares cannot be represented.
-  subroutine check_lengths(box, radius, error)
+  subroutine check_lengths(box, radius, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: radius(:)                   !! [length]
-    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t), intent(inout) :: problems
 
     associate (longest => maxval(abs([box%lower, box%upper])), shortest => minval(radius, mask=radius > 0))
-      if (longest > most .or. shortest < 1/most) call fail(error, exit_usage, "lengths from "//written(shortest)//" to " &
-        //written(longest)//": their squares are out of range; take another unit of length")
+      if (longest > most .or. shortest < 1/most) call problems%add(0, "species.radius", "lengths from "//written(shortest) &
+        //" to "//written(longest)//": their squares are out of range; take another unit of length")
     end associate
   end subroutine check_lengths
 
   !> Refuses a simulation in which a product of lengths, speeds and masses, of those that decide when and how disks collide,
   !> cannot be represented: disks would fly through each other.
-  subroutine check_speeds(sim, error)
+  subroutine check_speeds(sim, problems)
     type(simulation_t), intent(in) :: sim
-    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t), intent(inout) :: problems
     real(real64) :: speed, longest, shortest, mass(2)
     integer(int32) :: i
 
@@ -74,10 +80,10 @@ contains
     speed = speed + sqrt(2*maxval(abs(sim%box%gravity)))*sqrt(longest)
     if (.not. speed > 0) return
     if (longest*speed > most .or. shortest*speed < 1/most .or. longest/speed > most .or. shortest/speed < 1/most) then
-      call fail(error, exit_usage, "lengths from "//written(shortest)//" to "//written(longest)//" with speeds up to " &
+      call problems%add(0, "species.radius", "lengths from "//written(shortest)//" to "//written(longest)//" with speeds up to " &
         //written(speed)//": their products are out of range; take other units of length and time")
     else if (mass(2)*speed > most/speed/sim%n_disks() .or. mass(1)*speed < 1/most/speed) then
-      call fail(error, exit_usage, "masses from "//written(mass(1))//" to "//written(mass(2))//" with speeds up to " &
+      call problems%add(0, "species.mass", "masses from "//written(mass(1))//" to "//written(mass(2))//" with speeds up to " &
         //written(speed)//": their energies are out of range; take other units of mass and time")
     end if
   end subroutine check_speeds
@@ -101,10 +107,11 @@ contains
 
   !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero. In a sheared box rules
   !> and temperatures are relative to its velocity profile; given velocities are not.
-  subroutine set_in_motion(settings, sim, error)
+  subroutine set_in_motion(settings, groups, sim, problems)
     type(settings_t), intent(in) :: settings
+    type(group_t), intent(in) :: groups(:)                  !! of the species
     type(simulation_t), intent(inout) :: sim
-    type(error_t), allocatable, intent(inout) :: error
+    type(problem_list_t), intent(inout) :: problems
     type(random_stream_t) :: stream
     real(real64) :: mass(size(sim%disk))
     logical :: balanced, given
@@ -126,9 +133,9 @@ contains
     do s = 1, size(settings%species)
       associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
         given = species%velocities == "explicit" .or. species%velocities == "file"
-        if (species%exact_temperature >= 0 .and. .not. allocated(error)) then
+        if (species%exact_temperature >= 0) then
           if (given) call add_stream(sim%box, -1.0_real64, sim%disk(first:last))
-          call scale_to_temperature(species, mass(first:last), sim%disk(first:last), error)
+          call scale_to_temperature(species, groups(s), mass(first:last), sim%disk(first:last), problems)
           given = .false.
         end if
         if (.not. given) call add_stream(sim%box, 1.0_real64, sim%disk(first:last))

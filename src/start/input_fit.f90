@@ -4,103 +4,114 @@ module input_fit
   use kinds, only: pi, real64
   use box_geometry, only: box_t, surface_t
   use box_sides, only: bounds
-  use errors, only: error_t, exit_files
-  use input_problems, only: problem_list_t
-  use known_places, only: add_known, misfit_t, misfit_text, rounding
-  use packing, only: packing_t
-  use variables, only: obstacle_groups
+  use errors, only: exit_files
   use input_groups, only: group_t, range_of
+  use input_problems, only: problem_list_t
+  use known_places, only: add_known, rounding
+  use memory, only: check_memory
+  use packing, only: packing_t
   use partners, only: n_sides
-  use position_file, only: angle_row, column_names, radius_row, spin_row
+  use position_file, only: angle_row, radius_row, spin_row
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use starting_disks, only: read_disks, resolution
   use texts, only: written
+  use variables, only: most_disks, obstacle_groups
   implicit none
   private
-  public :: check_fit
+  public :: complain_of_file, fit_together
 
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 
 contains
 
-  !> Checks every species that is known well enough; the others have been reported already.
-  subroutine check_fit(settings, groups, problems)
+  !> Takes what the settings leave to starting files from these, and checks every species that is known well enough; the
+  !> others have been reported already.
+  subroutine fit_together(settings, groups, problems)
     type(settings_t), intent(inout) :: settings               !! empty if the text could not be understood
     type(group_t), intent(inout) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    type(species_settings_t), allocatable :: species(:)
-    logical :: sound, alone
+    type(packing_t) :: packing
+    logical, allocatable :: sound(:)
     integer :: o(2), s(2), k
 
     if (.not. allocated(settings%species)) return
     if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
-    associate (box => settings%box, law => settings%law)
+    associate (box => settings%box, law => settings%law, species => settings%species)
       do k = n_sides + 1, size(box%surface)
         call check_obstacle(groups(o(1) + k - n_sides - 1), box%surface(k), box, problems)
       end do
-      call survey_files(groups(s(1):s(2)), settings%species, box, problems)
-      law%rotation = law%rotation .or. any(settings%species%spin_in_file)
-      law%orientation = law%orientation .or. any(settings%species%angle_in_file)
-      law%detailed = law%detailed .or. law%rotation
-      species = settings%species
-      alone = sum(species%count) == 1
       do k = 1, size(species)
-        call check_species(groups(s(1) + k - 1), species(k), box, alone, problems, sound)
-        sound = sound .and. species(k)%placement == "explicit" .and. size(species(k)%position, 2) == species(k)%count
-        if (sound) cycle
-        species(k)%count = 0
-        species(k)%radius = 0
+        call survey_file(species, k, box, groups(s(1) + k - 1), problems)
       end do
-      call check_positions(groups(s(1):s(2)), species, box, problems)
+      law%rotation = law%rotation .or. any(species%spin_in_file)
+      law%orientation = law%orientation .or. any(species%angle_in_file)
+      law%detailed = law%detailed .or. law%rotation
+      if (settings%n_disks() > most_disks) return             ! told already
+      k = problems%count
+      call check_memory(settings, problems)
+      if (problems%count > k) return
+      allocate (sound(size(species)))
+      do k = 1, size(species)
+        call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems, sound(k))
+        sound(k) = sound(k) .and. species(k)%placement == "explicit" .and. size(species(k)%position, 2) == species(k)%count
+      end do
+      if (any(sound)) packing = packing_t(box, sum(species%count), size(species))
+      do k = 1, size(species)
+        if (sound(k)) call add_known(packing, species, k, species(k)%position, spread(species(k)%radius, 1, species(k)%count), &
+          groups(s(1) + k - 1), problems)
+      end do
     end associate
-  end subroutine check_fit
+  end subroutine fit_together
 
-  !> Takes from their files whether disks turn, how many disks species have, and how large they are, where the input leaves
-  !> that to the file.
-  subroutine survey_files(groups, species, box, problems)
-    type(group_t), intent(inout) :: groups(:)       !! the species
+  !> Takes from its file whether disks turn, how many disks a species has, and how large they are, where the input leaves
+  !> that to the file. Of a file from which neither number nor sizes are taken it is told later that it cannot be read, when
+  !> the disks are placed: a run that goes on needs it no more.
+  subroutine survey_file(species, k, box, group, problems)
     type(species_settings_t), intent(inout) :: species(:)
+    integer, intent(in) :: k                                  !! number of the species
     type(box_t), intent(in) :: box
+    type(group_t), intent(inout) :: group
     type(problem_list_t), intent(inout) :: problems
-    type(error_t), allocatable :: error
-    real(real64), allocatable :: table(:, :)
-    integer, allocatable :: rows(:)
-    logical :: there(size(column_names)), in_file
-    integer :: k
+    logical :: decides
 
-    do k = 1, size(species)
-      associate (s => species(k), group => groups(k))
-        if (s%file == "" .or. group%faulty("file")) cycle
-        in_file = s%radius_in_file .or. (s%count == 0 .and. .not. (group%given("count") .or. group%given("packing_fraction")))
-        if (.not. in_file .and. (s%count == 0 .or. s%radius <= 0)) cycle
-        call read_disks(species, k, box, table, there, rows, error)
-        if (allocated(error) .and. .not. in_file) then          ! told when the disks are placed, if they are
-          deallocate (error)
-          s%spin_in_file = .false.
-          cycle
-        else if (allocated(error)) then
-          call group%complain("file", error%message, problems)
-          if (error%code == exit_files) problems%unreadable = problems%unreadable + 1
-          cycle
-        else if (size(rows) == 0) then
-          call group%complain("file", s%file//" holds no disks of species """//s%name//'"', problems)
-          cycle
-        end if
-        s%spin_in_file = s%spin_in_file .and. there(spin_row)
-        s%angle_in_file = there(angle_row)
-        if (.not. in_file) cycle
-        s%count = size(rows)
+    associate (s => species(k))
+      if (s%file == "" .or. group%faulty("file")) return
+      decides = s%radius_in_file .or. (s%count == 0 .and. .not. (group%given("count") .or. group%given("packing_fraction")))
+      if (.not. decides .and. (s%count == 0 .or. s%radius <= 0)) return
+      call read_disks(species, k, box)
+      if (allocated(s%in_file%error)) then
+        s%spin_in_file = .false.
+        if (decides) call complain_of_file(s, group, problems)
+        return
+      end if
+      if (size(s%in_file%rows) == 0) call group%complain("file", s%file//" holds no disks of species """//s%name//'"', problems)
+      if (size(s%in_file%rows) == 0) return
+      s%spin_in_file = s%spin_in_file .and. s%in_file%there(spin_row)
+      s%angle_in_file = s%in_file%there(angle_row)
+      if (.not. decides) return
+      associate (radius => s%in_file%table(radius_row, :))
+        s%count = size(radius)
         call group%put_text("count", written(s%count))
-        if (s%radius_in_file) s%radius = maxval(table(radius_row, :))
+        if (s%radius_in_file) s%radius = maxval(radius)
         if (all(s%region([1, 3]) < s%region([2, 4]))) call group%put_reals("packing_fraction", &
-          [pi*sum(table(radius_row, :)**2)/product(s%region([2, 4]) - s%region([1, 3]))])
+          [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
       end associate
-    end do
-  end subroutine survey_files
+    end associate
+  end subroutine survey_file
+
+  !> Reports why the disks of a file cannot be had.
+  subroutine complain_of_file(s, group, problems)
+    type(species_settings_t), intent(in) :: s
+    type(group_t), intent(in) :: group
+    type(problem_list_t), intent(inout) :: problems
+
+    call group%complain("file", s%in_file%error%message, problems)
+    if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
+  end subroutine complain_of_file
 
   !> What an obstacle itself finds wrong with its place in the box.
   subroutine check_obstacle(group, obstacle, box, problems)
@@ -207,25 +218,5 @@ contains
         ", placement = 'dense' more", problems)
     end if
   end subroutine check_fraction
-
-  !> Explicit disks must be in their regions, clear of obstacles and of each other.
-  subroutine check_positions(groups, species, box, problems)
-    type(group_t), intent(in) :: groups(:)          !! the species
-    type(species_settings_t), intent(in) :: species(:)        !! those without count are left out
-    type(box_t), intent(in) :: box
-    type(problem_list_t), intent(inout) :: problems
-    type(packing_t) :: packing
-    type(misfit_t), allocatable :: misfits(:)
-    integer :: s, k
-
-    packing = packing_t(box, sum(species%count), size(species))
-    do s = 1, size(species)
-      if (species(s)%count == 0) cycle
-      call add_known(packing, species, s, species(s)%position, spread(species(s)%radius, 1, species(s)%count), misfits)
-      do k = 1, size(misfits)
-        call groups(s)%complain("position", misfit_text(packing, species, species(s)%position, misfits(k)), problems)
-      end do
-    end do
-  end subroutine check_positions
 
 end module input_fit

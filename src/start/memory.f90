@@ -1,13 +1,13 @@
-!> Whether a run fits into the memory that the machine has free: one that does not is refused before it starts, and one that
-!> is short of it goes without domains. On Linux; elsewhere no limit is known.
+!> Whether a run fits into the memory that the machine, or a batch system, has for it: one that does not is refused before it
+!> starts, and one that is short of it goes without domains. On Linux; elsewhere no limit is known.
 module memory
   use kinds, only: int64
-  use errors, only: error_t, exit_usage, fail
+  use input_problems, only: problem_list_t
   use settings, only: settings_t
   use texts, only: size_text, written
   implicit none
   private
-  public :: check_memory, room_for_domains
+  public :: check_memory, free_memory, room_for_domains
 
   ! Measured with 100 000 to a million disks. [bytes]
   integer(int64), parameter :: per_disk = 410, per_shared_disk = 540, besides = 25000000
@@ -15,14 +15,15 @@ module memory
 contains
 
   !> Refuses more disks than fit in memory.
-  subroutine check_memory(settings, error)
+  subroutine check_memory(settings, problems)
     type(settings_t), intent(in) :: settings
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: needed
+    type(problem_list_t), intent(inout) :: problems
+    integer(int64) :: needed, free
 
     needed = settings%n_disks()*per_disk + besides
-    if (needed > free_memory()) call fail(error, exit_usage, "species.count: "//written(settings%n_disks()) &
-      //" disks need about "//size_text(needed)//" of memory, and "//size_text(free_memory())//" are free; use fewer disks")
+    free = free_memory("")
+    if (needed > free) call problems%add(0, "species.count", written(settings%n_disks())//" disks need about " &
+      //size_text(needed)//" of memory, and "//size_text(free)//" are free; use fewer disks")
   end subroutine check_memory
 
   !> Whether there is memory to cut the box into domains.
@@ -30,25 +31,56 @@ contains
     type(settings_t), intent(in) :: settings
     logical :: yes
 
-    yes = settings%n_disks()*per_shared_disk + besides <= free_memory()
+    yes = settings%n_disks()*per_shared_disk + besides <= free_memory("")
   end function room_for_domains
 
-  !> What the machine can give; huge if nobody says. [bytes]
-  function free_memory() result(bytes)
+  !> What the machine can give, or the limit of the control group if that is less: a batch job would be killed without a
+  !> word. Huge if nobody says. [bytes]
+  function free_memory(root) result(bytes)
+    character(len=*), intent(in) :: root                  !! of the file system; empty but for tests
     integer(int64) :: bytes
+    character(len=:), allocatable :: folder
+    character(len=1024) :: line                           ! number:controllers:group; version 2 has no controllers
+    integer :: unit, status, top, colon
+
+    bytes = number_after("MemAvailable:", root//"/proc/meminfo")
+    if (bytes < huge(bytes)) bytes = 1024*bytes
+    open (newunit=unit, file=root//"/proc/self/cgroup", status="old", action="read", iostat=status)
+    if (status /= 0) return
+    do while (status == 0)
+      read (unit, "(a)", iostat=status) line
+      colon = index(line, ":", back=.true.)
+      folder = root//"/sys/fs/cgroup"
+      if (index(line(:colon), "memory") > 0) folder = folder//"/memory"
+      top = len(folder)
+      if (status /= 0 .or. index(line(:colon), "memory") + index(line, "::") == 0) cycle
+      folder = folder//trim(line(colon + 1:))
+      do while (len(folder) >= top)                       ! the group, and those around it
+        bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
+        folder = folder(:index(folder, "/", back=.true.) - 1)
+      end do
+    end do
+    close (unit)
+  end function free_memory
+
+  !> The number that follows a label at the beginning of a line of a file; huge if there is none.
+  function number_after(label, path) result(number)
+    character(len=*), intent(in) :: label, path
+    integer(int64) :: number
     character(len=80) :: line
     integer :: unit, status
 
-    bytes = huge(bytes)
-    open (newunit=unit, file="/proc/meminfo", status="old", action="read", iostat=status)
+    number = huge(number)
+    open (newunit=unit, file=path, status="old", action="read", iostat=status)
+    if (status /= 0) return
     do while (status == 0)
       read (unit, "(a)", iostat=status) line
-      if (index(line, "MemAvailable:") /= 1) cycle
-      read (line(14:), *, iostat=status) bytes
-      if (status == 0) bytes = 1024*bytes
+      if (status /= 0 .or. index(line, label) /= 1) cycle
+      read (line(len(label) + 1:), *, iostat=status) number
+      if (status /= 0) number = huge(number)
       exit
     end do
-    close (unit, iostat=status)
-  end function free_memory
+    close (unit)
+  end function number_after
 
 end module memory

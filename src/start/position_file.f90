@@ -2,9 +2,10 @@
 !> there are others, in small letters or capitals. Empty lines, and text from a # to the end of its line, are comments.
 module position_file
   use kinds, only: int64, real64
-  use errors, only: error_t, exit_files, exit_usage, fail
+  use errors, only: exit_files, exit_usage, fail
   use input_text, only: byte_order_mark
   use input_words, only: read_real
+  use settings, only: disks_in_file_t
   use system, only: opening_problem
   use texts, only: counted, joined, lower_case, place_of, shown, suggestion, written
   implicit none
@@ -22,19 +23,19 @@ module position_file
 contains
 
   !> Reads the disks of one species: all if no column says of which species they are.
-  subroutine read_positions(path, names, s, table, there, lines, error)
+  subroutine read_positions(path, names, s, disks)
     character(len=*), intent(in) :: path
     character(len=*), intent(in) :: names(:)                !! of all species
     integer, intent(in) :: s                                !! number of the species
-    real(real64), allocatable, intent(out) :: table(:, :)   !! (column_names,n)
-    logical, intent(out) :: there(:)                        !! (column_names) the columns of the file
-    integer, allocatable, intent(out) :: lines(:)           !! (n) in which the disks stand
-    type(error_t), allocatable, intent(out) :: error
+    type(disks_in_file_t), intent(inout) :: disks
     character(len=longest_line) :: line
     character(len=256) :: reason
     character(len=:), allocatable :: problem
-    integer, allocatable :: column(:)
-    integer :: unit, status, number, n
+    real(real64), allocatable :: table(:, :)                ! (column_names,n)
+    integer, allocatable :: lines(:)                        ! (n) in which the disks stand
+    integer, allocatable :: column(:)                       ! of the file, as places in `known_names`; none: not known yet
+    integer :: first(longest_line), last(longest_line)      ! of each word of the line
+    integer :: unit, status, number, n, n_words
 
     allocate (table(size(column_names), 64), lines(64), column(0))
     n = 0
@@ -44,7 +45,7 @@ contains
       if (status /= 0) problem = trim(reason)
     end if
     if (problem /= "") then
-      call fail(error, exit_files, path//": cannot be read: "//problem)
+      call fail(disks%error, exit_files, path//": cannot be read: "//problem)
       return
     end if
     number = 0
@@ -53,165 +54,134 @@ contains
       if (status /= 0) exit
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
-      if (number == 1 .and. (index(line, numpy_mark) == 1 .or. index(line, zip_mark) == 1)) then
-        call fail(error, exit_usage, path//": arrays of NumPy; write_start of the Python package makes a starting file of them")
-        exit
+      if (n == size(lines)) then
+        table = reshape(table, [size(table, 1), 2*n], pad=[0.0_real64])
+        lines = [lines, lines]
       end if
-      if (n == size(lines)) call enlarge(table, lines)
       lines(n + 1) = number
-      call read_line(line, names, s, column, n, table, problem)
-      if (problem == "") cycle
-      call fail(error, exit_usage, path//":"//written(number)//": "//problem)
-      exit
+      call read_line()
+      if (problem /= "") exit
     end do
     close (unit)
-    there = [(any(column == number), number=1, size(there))]
-    table = table(:, :n)
-    lines = lines(:n)
-    if (allocated(error)) return
-    if (.not. is_iostat_end(status)) call fail(error, exit_files, path//": "//trim(reason))
-  end subroutine read_positions
+    disks%there = [(any(column == number), number=1, size(column_names))]
+    disks%table = table(:, :n)
+    disks%rows = lines(:n)
+    if (problem /= "") then
+      call fail(disks%error, exit_usage, path//":"//written(number)//": "//problem)
+    else if (.not. is_iostat_end(status)) then
+      call fail(disks%error, exit_files, path//": "//trim(reason))
+    end if
 
-  !> Doubles the room for disks.
-  pure subroutine enlarge(table, lines)
-    real(real64), allocatable, intent(inout) :: table(:, :)
-    integer, allocatable, intent(inout) :: lines(:)
-    real(real64), allocatable :: more(:, :)
-    integer :: n
+  contains
 
-    n = size(lines)
-    allocate (more(size(table, 1), 2*n))
-    more(:, :n) = table
-    call move_alloc(more, table)
-    lines = [lines, lines]
-  end subroutine enlarge
+    !> Takes in a line: the names of the columns, which the first numbers stand for if nobody has named them, or a disk,
+    !> which goes into the table if it is of the species.
+    subroutine read_line()
+      real(real64) :: value(size(column_names))
+      integer :: k, its_species
 
-  !> Takes in a line: the names of the columns, which the first numbers stand for if nobody has named them, or a disk,
-  !> which goes into the table if it is of the species.
-  subroutine read_line(line, names, s, column, n, table, problem)
-    character(len=*), intent(in) :: line
-    character(len=*), intent(in) :: names(:)
-    integer, intent(in) :: s
-    integer, allocatable, intent(inout) :: column(:)        !! of the file, as places in `known_names`; none: not known yet
-    integer, intent(inout) :: n                             !! disks so far
-    real(real64), intent(inout) :: table(:, :)
-    character(len=:), allocatable, intent(out) :: problem
-    real(real64) :: value(size(column_names))
-    integer :: first(longest_line), last(longest_line), n_words, k, its_species
-
-    problem = ""
-    if (len_trim(line) == longest_line) problem = "the line is too long"
-    call find_words(line, first, last, n_words)
-    if (n_words == 0 .or. problem /= "") return
-    if (size(column) == 0) then
-      if (are_names(line, first(:n_words), last(:n_words))) then
-        call read_names(line, first(:n_words), last(:n_words), column, problem)
-        return
+      if (len_trim(line) == longest_line) problem = "the line is too long"
+      if (number == 1 .and. (index(line, numpy_mark) == 1 .or. index(line, zip_mark) == 1)) &
+        problem = "arrays of NumPy; write_start of the Python package makes a starting file of them"
+      call find_words()
+      if (n_words == 0 .or. problem /= "") return
+      if (size(column) == 0) then
+        if (are_names()) then
+          call read_names()
+          return
+        end if
+        if (n_words == 2 .or. n_words == 4) column = [(k, k=1, n_words)]
       end if
-      if (n_words == 2 .or. n_words == 4) column = [(k, k=1, n_words)]
-    end if
-    if (n_words /= size(column)) then
-      problem = counted(int(n_words, int64), "number")//"; allowed: x y, or x y vx vy, or what a first line names: " &
-        //joined(known_names, " ")
-      if (size(column) > 0) problem = counted(int(n_words, int64), "value")//"; expected: " &
-        //joined(known_names(column), " ")
-      return
-    end if
-    value = 0
-    its_species = s
-    do k = 1, n_words
-      associate (word => line(first(k):last(k)))
-        if (column(k) == species_column) then
-          its_species = species_named(word, names)
-          if (its_species == 0) problem = "there is no species "//shown(word)//"; known: 1 to "//written(size(names)) &
-            //", "//joined(names, ", ")
-        else
-          call read_real(word, value(column(k)), problem)
-          if (problem /= "") problem = shown(word)//" "//problem
-        end if
-      end associate
-      if (problem /= "") return
-    end do
-    if (its_species /= s) return
-    n = n + 1
-    table(:, n) = value
-  end subroutine read_line
-
-  !> Where the words of a line begin and end.
-  pure subroutine find_words(line, first, last, n)
-    character(len=*), intent(in) :: line
-    integer, intent(out) :: first(:), last(:)
-    integer, intent(out) :: n
-    character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
-    integer :: begin, past, comment
-
-    comment = index(line//"#", "#")
-    n = 0
-    past = 1
-    do
-      begin = past - 1 + verify(line(past:comment - 1)//"x", blanks)
-      if (begin >= comment) exit
-      past = begin - 1 + scan(line(begin:comment - 1)//" ", blanks)
+      if (size(column) == 0) then
+        problem = counted(int(n_words, int64), "number")//"; allowed: x y, or x y vx vy, or what a first line names: " &
+          //joined(known_names, " ")
+      else if (n_words /= size(column)) then
+        problem = counted(int(n_words, int64), "value")//"; expected: "//joined(known_names(column), " ")
+      end if
+      value = 0
+      its_species = s
+      do k = 1, n_words
+        if (problem /= "") return
+        associate (word => line(first(k):last(k)))
+          if (column(k) == species_column) then
+            its_species = species_named(word, names)
+            if (its_species == 0) problem = "there is no species "//shown(word)//"; known: 1 to "//written(size(names)) &
+              //", "//joined(names, ", ")
+          else
+            call read_real(word, value(column(k)), problem)
+            if (problem /= "") problem = shown(word)//" "//problem
+          end if
+        end associate
+      end do
+      if (its_species /= s .or. problem /= "") return
       n = n + 1
-      first(n) = begin
-      last(n) = past - 1
-    end do
-  end subroutine find_words
+      table(:, n) = value
+    end subroutine read_line
 
-  !> Whether the words of a line name columns: one of them is the name of a column, or none is a number.
-  pure function are_names(line, first, last) result(yes)
-    character(len=*), intent(in) :: line
-    integer, intent(in) :: first(:), last(:)                !! of each word
-    logical :: yes
-    character(len=:), allocatable :: problem
-    real(real64) :: number
-    logical :: some_number
-    integer :: k
+    !> Where the words of the line begin and end.
+    subroutine find_words()
+      character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
+      integer :: begin, past, comment
 
-    some_number = .false.
-    do k = 1, size(first)
-      yes = place_of(lower_case(line(first(k):last(k))), known_names) > 0
-      if (yes) return
-      call read_real(line(first(k):last(k)), number, problem)
-      some_number = some_number .or. problem == ""
-    end do
-    yes = .not. some_number
-  end function are_names
+      comment = index(line//"#", "#")
+      n_words = 0
+      past = 1
+      do
+        begin = past - 1 + verify(line(past:comment - 1)//"x", blanks)
+        if (begin >= comment) exit
+        past = begin - 1 + scan(line(begin:comment - 1)//" ", blanks)
+        n_words = n_words + 1
+        first(n_words) = begin
+        last(n_words) = past - 1
+      end do
+    end subroutine find_words
 
-  !> Reads the names of the columns.
-  subroutine read_names(line, first, last, column, problem)
-    character(len=*), intent(in) :: line
-    integer, intent(in) :: first(:), last(:)                !! of each name
-    integer, allocatable, intent(inout) :: column(:)
-    character(len=:), allocatable, intent(inout) :: problem
-    character(len=:), allocatable :: unknown, advice
-    integer :: k, place
+    !> Whether the words of the line name columns: one of them is the name of a column, or none is a number.
+    function are_names() result(yes)
+      logical :: yes, some_number
+      character(len=:), allocatable :: what
+      real(real64) :: value
+      integer :: k
 
-    unknown = ""
-    advice = ""
-    do k = 1, size(first)
-      associate (word => line(first(k):last(k)))
-        place = place_of(lower_case(word), known_names)
-        if (place > 0) then
-          if (any(column == place)) problem = "the column "//trim(known_names(place))//" is named twice"
-          column = [column, place]
-        else if (unknown == "") then
-          unknown = shown(word)
-          advice = suggestion(word, known_names)
-        else
-          unknown = unknown//", "//shown(word)
-          advice = "known: "//joined(known_names, ", ")
-        end if
-      end associate
-    end do
-    if (unknown /= "") problem = "no column is called "//unknown//"; "//advice
-    if (problem /= "") return
-    if (.not. (any(column == 1) .and. any(column == 2))) then
-      problem = "columns x and y are needed"
-    else if (any(column == 3) .neqv. any(column == 4)) then
-      problem = "columns vx and vy go together"
-    end if
-  end subroutine read_names
+      some_number = .false.
+      do k = 1, n_words
+        yes = place_of(lower_case(line(first(k):last(k))), known_names) > 0
+        if (yes) return
+        call read_real(line(first(k):last(k)), value, what)
+        some_number = some_number .or. what == ""
+      end do
+      yes = .not. some_number
+    end function are_names
+
+    !> Reads the names of the columns.
+    subroutine read_names()
+      character(len=:), allocatable :: unknown, advice
+      integer :: k, place
+
+      unknown = ""
+      advice = ""
+      do k = 1, n_words
+        associate (word => line(first(k):last(k)))
+          place = place_of(lower_case(word), known_names)
+          if (place > 0) then
+            if (any(column == place)) problem = "the column "//trim(known_names(place))//" is named twice"
+            column = [column, place]
+          else
+            advice = suggestion(word, known_names)
+            if (unknown /= "") advice = "known: "//joined(known_names, ", ")
+            unknown = unknown//", "//shown(word)
+          end if
+        end associate
+      end do
+      if (unknown /= "") then
+        problem = "no column is called "//unknown(3:)//"; "//advice
+      else if (problem == "" .and. .not. (any(column == 1) .and. any(column == 2))) then
+        problem = "columns x and y are needed"
+      else if (problem == "" .and. (any(column == 3) .neqv. any(column == 4))) then
+        problem = "columns vx and vy go together"
+      end if
+    end subroutine read_names
+  end subroutine read_positions
 
   !> The number of the species that a word says: its number or name; 0 if there is none.
   pure function species_named(word, names) result(s)

@@ -3,7 +3,8 @@ module regular_places
   use kinds, only: real64
   use box_geometry, only: box_t
   use box_sides, only: bounds
-  use errors, only: error_t, exit_usage, fail
+  use input_groups, only: group_t
+  use input_problems, only: problem_list_t
   use settings, only: species_settings_t
   use shapes, only: magnitude
   use texts, only: written
@@ -38,38 +39,34 @@ contains
   end subroutine centre_range
 
   !> A disk in the middle of each of nx x ny equal cells of the region, row by row from the bottom.
-  subroutine grid_positions(species, x, error)
+  subroutine grid_positions(species, group, x, problems)
     type(species_settings_t), intent(in) :: species
+    type(group_t), intent(in) :: group
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
-    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t), intent(inout) :: problems
     real(real64) :: side(2)
     integer :: k
 
     associate (n => species%grid, region => species%region)
-      if (product(n) /= species%count) then
-        call fail(error, exit_usage, "species."//species%name//".grid: "//written(n(1))//" x "// &
-          written(n(2))//" places for "//written(species%count)//" disks")
-        return
-      end if
       side = (region([2, 4]) - region([1, 3]))/n
       allocate (x(2, species%count))
       do k = 1, species%count
         x(:, k) = region([1, 3]) + ([modulo(k - 1, n(1)), (k - 1)/n(1)] + 0.5_real64)*side
       end do
-      if (any(side < 2*species%radius)) call fail(error, exit_usage, "species."//species%name// &
-        ".grid: disks of diameter "//written(2*species%radius)//" do not fit into cells of "// &
-        written(side(1))//" x "//written(side(2)))
+      if (any(side < 2*species%radius)) call group%complain("grid", "disks of diameter "//written(2*species%radius) &
+        //" do not fit into cells of "//written(side(1))//" x "//written(side(2)), problems)
     end associate
   end subroutine grid_positions
 
   !> Places on a triangular lattice that fills the region, stretched to its shape, row by row from
   !> the bottom. Of all numbers of rows it takes the one that keeps neighbours farthest apart. The
   !> last places stay empty if the rows hold more than `count`.
-  subroutine lattice_positions(species, box, x, error)
+  subroutine lattice_positions(species, group, box, x, problems)
     type(species_settings_t), intent(in) :: species
+    type(group_t), intent(in) :: group
     type(box_t), intent(in) :: box
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
-    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t), intent(inout) :: problems
     real(real64) :: lower(2), upper(2), step(2), distance, closest
     logical :: periodic(2)
     integer :: columns
@@ -79,10 +76,9 @@ contains
     call choose_lattice(species%count, upper - lower, periodic, columns, step, distance)
     x = lattice(species%count, columns, lower, step, periodic)
     closest = 2*species%radius*(1 - 2*epsilon(closest))
-    if (distance < closest) call fail(error, exit_usage, "species."//species%name//".placement: "// &
-      written(species%count)//" disks of diameter "//written(2*species%radius)// &
-      " do not fit; on the lattice their centres are "//written(distance)//" apart; up to "// &
-      written(lattice_capacity(species%count, closest, upper - lower, periodic))//" fit")
+    if (distance < closest) call group%complain("placement", written(species%count)//" disks of diameter " &
+      //written(2*species%radius)//" do not fit; on the lattice their centres are "//written(distance)//" apart; up to " &
+      //written(lattice_capacity(species%count, closest, upper - lower, periodic))//" fit", problems)
   end subroutine lattice_positions
 
   !> How many disks, less than `too_many`, the lattice holds no closer than `closest`.

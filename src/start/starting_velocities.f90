@@ -2,7 +2,8 @@
 module starting_velocities
   use kinds, only: int32, real64
   use box_geometry, only: box_t
-  use errors, only: error_t, exit_usage, fail
+  use input_groups, only: group_t
+  use input_problems, only: problem_list_t
   use disks, only: disk_t
   use random_stream, only: random_stream_t
   use settings, only: species_settings_t
@@ -101,11 +102,12 @@ contains
   end subroutine remove_drift
 
   !> Scales the velocities of the disks of one species, relative to their mean, to an exact temperature: the momentum stays.
-  subroutine scale_to_temperature(species, mass, disk, error)
+  subroutine scale_to_temperature(species, group, mass, disk, problems)
     type(species_settings_t), intent(in) :: species
+    type(group_t), intent(in) :: group
     real(real64), intent(in) :: mass(:)             !! (count) [mass]
     type(disk_t), intent(inout) :: disk(:)          !! (count)
-    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t), intent(inout) :: problems
     real(real64) :: mean(2), temperature
     integer :: i, axis
 
@@ -115,12 +117,12 @@ contains
       temperature = temperature + 0.5_real64*mass(i)*sum((disk(i)%v - mean)**2)/size(disk)
     end do
     if (size(disk) == 1) then
-      call fail(error, exit_usage, "species."//species%name//".exact_temperature: one disk does not move relative to the mean " &
-        //"of its species; leave it out, or take more disks")
+      call group%complain("exact_temperature", "one disk does not move relative to the mean of its species; leave it out, or " &
+        //"take more disks", problems)
       return
     else if (.not. temperature > 0) then
-      call fail(error, exit_usage, "species."//species%name//".exact_temperature: the disks do not move relative to each " &
-        //"other, which no factor changes; let them start with velocities = 'maxwell'")
+      call group%complain("exact_temperature", "the disks do not move relative to each other, which no factor changes; let " &
+        //"them start with velocities = 'maxwell'", problems)
       return
     end if
     do i = 1, size(disk)
