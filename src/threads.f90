@@ -30,9 +30,11 @@ contains
         //counted(int(cores, int64), "core")//" that the run may use, and slower"
       threads = min(threads, usual%most_domains(int(settings%n_disks()), settings%box%periodic))
       if (.not. settings%wants_domains()) threads = 1
-      if (threads > 1 .and. .not. room_for_domains(settings)) then
-        warning = name//": there is not enough memory for "//written(threads)//" threads; the run goes on with one"
-        threads = 1
+      if (threads > 1) then
+        if (.not. room_for_domains(settings)) then
+          warning = name//": there is not enough memory for "//written(threads)//" threads; the run goes on with one"
+          threads = 1
+        end if
       end if
       threads = max(threads, 1)
     end associate

@@ -41,64 +41,11 @@ contains
     class(status_line_t), intent(inout) :: line         !! shows how far it is
     real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) species by species; in: where to start, or none [length]
     type(error_t), allocatable, intent(out) :: error
-    type(simulation_t) :: sim
+    type(simulation_t) :: sim                           ! elastic disks
     type(event_driven_t), allocatable :: evolution
     real(real64) :: lack, lack_before
     integer(int32) :: i
     integer :: jump
-
-    call describe(box, species, sim)
-    if (size(x, 2) == 0) call scatter(full, stream, line, sim, error)
-    if (size(x, 2) > 0) call begin_at(x, full, stream, sim, error)
-    if (allocated(error)) return
-    allocate (evolution)
-    allocate (evolution%search)
-    lack_before = 1
-    jump = 0
-    do
-      call move(evolution, sim, run_length, error)
-      if (allocated(error)) return
-      lack = 1 - minval(sim%disk%radius/full(sim%tag%id))
-      if (lack <= 0) exit
-      call line%show_share("growing disks to their full size", 1 - lack)
-      jump = jump + 1
-      if (modulo(jump, jumps_per_check) == 0) then
-        if (lack > 0.9_real64*lack_before) then
-          call fail_to_grow(sim, full, error)
-          return
-        end if
-        lack_before = lack
-      end if
-      call grow(sim, full, min(1.0_real64, lead*(1 - lack)))
-    end do
-    call move(evolution, sim, mixing_length, error)
-    if (size(x, 2) == 0) x = reshape(x, [2, size(sim%disk)], pad=[0.0_real64])
-    do i = 1, sim%n_disks()
-      x(:, sim%tag(i)%id) = sim%disk(i)%x
-    end do
-  end subroutine grow_disks
-
-  !> Reports the packing that was reached.
-  subroutine fail_to_grow(sim, full, error)
-    type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
-    type(error_t), allocatable, intent(out) :: error
-    real(real64) :: reached, wanted
-    character(len=:), allocatable :: advice
-
-    reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
-    wanted = pi*sum(full**2)/product(sim%box%edges())
-    advice = "use fewer or smaller disks"
-    if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
-    call fail(error, exit_usage, "dense placement reached "//written(reached)//" of the wanted packing "//written(wanted) &
-      //"; "//advice)
-  end subroutine fail_to_grow
-
-  !> Elastic disks in their box, species by species, at no place yet.
-  subroutine describe(box, species, sim)
-    type(box_t), intent(in) :: box
-    type(species_t), intent(in) :: species(:)
-    type(simulation_t), intent(inout) :: sim
 
     sim%box = box
     sim%box%gravity = 0
@@ -106,172 +53,179 @@ contains
     sim%species = species
     allocate (sim%law%restitution(size(species), size(species)), source=1.0_real64)
     call sim%list_disks()
-  end subroutine describe
-
-  !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
-  subroutine begin_at(x, full, stream, sim, error)
-    real(real64), intent(in) :: x(:, :)                 !! (2,n) [length]
-    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
-    type(random_stream_t), intent(inout) :: stream
-    type(simulation_t), intent(inout) :: sim
-    type(error_t), allocatable, intent(out) :: error
-    real(real64) :: scale
-    integer :: k
-
-    do k = 1, size(x, 2)
-      sim%disk(k)%x = x(:, k)
-      call stream%draw_direction(sim%disk(k)%v)
-    end do
-    sim%disk%radius = smallest_scale*full
-    do k = 1, approaches
-      call grow(sim, full, 1.0_real64)
-    end do
-    scale = minval(sim%disk%radius/full)
-    sim%disk%radius = scale*full
-    if (scale <= smallest_scale) call fail_to_grow(sim, full, error)
-  end subroutine begin_at
-
-  !> Small disks at random places, with random velocities.
-  subroutine scatter(full, stream, line, sim, error)
-    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
-    type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line
-    type(simulation_t), intent(inout) :: sim
-    type(error_t), allocatable, intent(out) :: error
-    type(packing_t) :: packing
-    real(real64) :: scale, wanted
-    integer :: k
-    logical :: complete
-
-    wanted = pi*sum(sim%species%count*full([(1 + disks_before(sim%species, k), k=1, size(sim%species))])**2) &
-      /product(sim%box%edges())
-    scale = sqrt(min(1.0_real64, loose/wanted))
+    if (size(x, 2) == 0) call scatter()
+    if (size(x, 2) > 0) call begin_at_places()
+    if (allocated(error)) return
+    allocate (evolution)
+    allocate (evolution%search)
+    lack_before = 1
+    jump = 0
     do
-      packing = packing_t(sim%box, size(sim%disk), size(sim%species))
-      call fill(packing, sim%species, scale*full, stream, line, complete)
-      if (complete) exit
-      scale = caution*scale
-      if (scale < smallest_scale) then
-        call fail_to_grow(sim, full, error)
-        return
-      end if
-    end do
-    do k = 1, size(sim%disk)
-      sim%disk(k)%x = packing%disk(k)%x
-      call stream%draw_direction(sim%disk(k)%v)
-      sim%disk(k)%radius = scale*full(k)
-    end do
-  end subroutine scatter
-
-  !> Inserts all disks at random places, the largest first.
-  subroutine fill(packing, species, radius, stream, line, complete)
-    type(packing_t), intent(inout) :: packing
-    type(species_t), intent(in) :: species(:)
-    real(real64), intent(in) :: radius(:)               !! (n) of each disk [length]
-    type(random_stream_t), intent(inout) :: stream
-    class(status_line_t), intent(inout) :: line
-    logical, intent(out) :: complete
-    logical :: waiting(size(species))
-    real(real64) :: inset(2)
-    integer(int32) :: first(size(species)), s, placed
-    integer :: k
-
-    waiting = .true.
-    first = [(1 + disks_before(species, k), k=1, size(species))]
-    do k = 1, size(species)
-      s = maxloc(radius(first), dim=1, mask=waiting)
-      waiting(s) = .false.
-      inset = merge(0.0_real64, radius(first(s)), packing%box%periodic)
-      call packing%open_species(s, radius(first(s)), species(s)%count, packing%box%lower + inset, &
-        packing%box%upper - inset)
-      call insert_at_random(packing, s, first(s), stream, line, placed)
-      complete = placed == species(s)%count
-      if (.not. complete) return
-    end do
-  end subroutine fill
-
-  !> Moves the disks for some collisions per disk and brings all of them to the present.
-  subroutine move(evolution, sim, length, error)
-    type(event_driven_t), intent(inout) :: evolution
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: length                       !! collisions per disk
-    type(error_t), allocatable, intent(out) :: error
-    type(limits_t) :: limits
-    integer(int64) :: to_come                           ! collisions per disk, times disks
-    integer(int32) :: i
-
-    call evolution%start(sim)
-    to_come = int(length, int64)*sim%n_disks()
-    limits%collisions = sim%tally%collisions + (to_come + 1)/2
-    limits%events = sim%tally%events + 4*to_come              ! one may rattle in a hole between obstacles
-    limits%time = sim%time() + maxval(sim%box%edges())  ! few disks may never collide
-    call evolution%advance(sim, limits, error)
-    do i = 1, sim%n_disks()
-      sim%disk(i)%x = sim%position(i)
-      sim%disk(i)%clock = sim%now
-      sim%tag(i)%met = 0                                ! neighbours grow towards each other
-    end do
-  end subroutine move
-
-  !> Grows every disk into the gap around it, up to the scale `cap`. Neighbours share a gap so that both reach the same
-  !> scale, unless one is larger already.
-  subroutine grow(sim, full, cap)
-    type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
-    real(real64), intent(in) :: cap                     !! part of the full size
-    type(packing_t) :: packing
-    real(real64), allocatable :: scale(:)
-    real(real64) :: room
-    integer(int32), allocatable :: list(:)
-    integer(int32) :: i, n, s
-
-    packing = packing_t(sim%box, size(sim%disk), size(sim%species))
-    do s = 1, size(sim%species, kind=int32)
-      call packing%open_species(s, maxval(full(sim%tag%id), mask=sim%tag%species == s), sim%species(s)%count, &
-        sim%box%lower, sim%box%upper)
-    end do
-    do i = 1, sim%n_disks()
-      call packing%add(i, sim%tag(i)%species, sim%disk(i)%x)
-    end do
-    allocate (list(64))
-    scale = sim%disk%radius/full(sim%tag%id)
-    do i = 1, sim%n_disks()
-      if (scale(i) >= cap) cycle
-      associate (own => full(sim%tag(i)%id))
-        call packing%list_neighbours(sim%disk(i)%x, own, list, n)
-        room = min(wall_distance(sim%box, sim%disk(i)%x)/own, room_between(packing, sim, full, scale, i, list(:n)))
-        if (room >= 1) then
-          sim%disk(i)%radius = cap*own
-        else if (room > scale(i)) then
-          sim%disk(i)%radius = own*min(cap, scale(i) + caution*(room - scale(i)))
+      call move(run_length)
+      if (allocated(error)) return
+      lack = 1 - minval(sim%disk%radius/full(sim%tag%id))
+      if (lack <= 0) exit
+      call line%show_share("growing disks to their full size", 1 - lack)
+      jump = jump + 1
+      if (modulo(jump, jumps_per_check) == 0) then
+        if (lack > 0.9_real64*lack_before) then
+          call fail_to_grow()
+          return
         end if
-      end associate
+        lack_before = lack
+      end if
+      call grow(min(1.0_real64, lead*(1 - lack)))
     end do
-  end subroutine grow
-
-  !> The scale that disk i can reach beside the disks listed.
-  pure function room_between(packing, sim, full, scale, i, list) result(room)
-    type(packing_t), intent(in) :: packing
-    type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: full(:)                 !! (n) as for `grow_disks`
-    real(real64), intent(in) :: scale(:)
-    integer(int32), intent(in) :: i, list(:)
-    real(real64) :: room, distance, shared, full_i, full_j
-    integer :: k
-
-    room = 1
-    full_i = full(sim%tag(i)%id)
-    do k = 1, size(list)
-      associate (j => list(k))
-        if (j == i) cycle
-        full_j = full(sim%tag(j)%id)
-        distance = magnitude(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
-        shared = distance/(full_i + full_j)
-        if (scale(j) > shared) shared = (distance - scale(j)*full_j)/full_i
-        room = min(room, shared)
-      end associate
+    call move(mixing_length)
+    if (size(x, 2) == 0) x = reshape(x, [2, size(sim%disk)], pad=[0.0_real64])
+    do i = 1, sim%n_disks()
+      x(:, sim%tag(i)%id) = sim%disk(i)%x
     end do
-  end function room_between
+
+  contains
+
+    !> Reports the packing that was reached.
+    subroutine fail_to_grow()
+      real(real64) :: reached, wanted
+      character(len=:), allocatable :: advice
+
+      reached = pi*sum(sim%disk%radius**2)/product(sim%box%edges())
+      wanted = pi*sum(full**2)/product(sim%box%edges())
+      advice = "use fewer or smaller disks"
+      if (maxval(full) <= minval(full)) advice = "placement = 'lattice' may pack equal disks more densely; or "//advice
+      call fail(error, exit_usage, "dense placement reached "//written(reached)//" of the wanted packing "//written(wanted) &
+        //"; "//advice)
+    end subroutine fail_to_grow
+
+    !> Starts at given places, all disks at the largest scale for which there is room, with random velocities.
+    subroutine begin_at_places()
+      real(real64) :: scale
+      integer :: k
+
+      do k = 1, size(x, 2)
+        sim%disk(k)%x = x(:, k)
+        call stream%draw_direction(sim%disk(k)%v)
+      end do
+      sim%disk%radius = smallest_scale*full
+      do k = 1, approaches
+        call grow(1.0_real64)
+      end do
+      scale = minval(sim%disk%radius/full)
+      sim%disk%radius = scale*full
+      if (scale <= smallest_scale) call fail_to_grow()
+    end subroutine begin_at_places
+
+    !> Starts with small disks at random places, with random velocities.
+    subroutine scatter()
+      type(packing_t) :: packing
+      real(real64) :: scale, wanted
+      logical :: complete
+      integer :: k
+
+      wanted = pi*sum(species%count*full([(1 + disks_before(species, k), k=1, size(species))])**2)/product(sim%box%edges())
+      scale = sqrt(min(1.0_real64, loose/wanted))
+      do
+        call fill(packing, scale*full, complete)
+        if (complete) exit
+        scale = caution*scale
+        if (scale < smallest_scale) then
+          call fail_to_grow()
+          return
+        end if
+      end do
+      do k = 1, size(sim%disk)
+        sim%disk(k)%x = packing%disk(k)%x
+        call stream%draw_direction(sim%disk(k)%v)
+        sim%disk(k)%radius = scale*full(k)
+      end do
+    end subroutine scatter
+
+    !> Inserts all disks at random places, the largest first.
+    subroutine fill(packing, radius, complete)
+      type(packing_t), intent(out) :: packing
+      real(real64), intent(in) :: radius(:)             !! (n) of each disk [length]
+      logical, intent(out) :: complete
+      logical :: waiting(size(species))
+      real(real64) :: inset(2)
+      integer(int32) :: first(size(species)), s, placed
+      integer :: k
+
+      packing = packing_t(sim%box, size(sim%disk), size(species))
+      waiting = .true.
+      first = [(1 + disks_before(species, k), k=1, size(species))]
+      do k = 1, size(species)
+        s = maxloc(radius(first), dim=1, mask=waiting)
+        waiting(s) = .false.
+        inset = merge(0.0_real64, radius(first(s)), sim%box%periodic)
+        call packing%open_species(s, radius(first(s)), species(s)%count, sim%box%lower + inset, sim%box%upper - inset)
+        call insert_at_random(packing, s, first(s), stream, line, placed)
+        complete = placed == species(s)%count
+        if (.not. complete) return
+      end do
+    end subroutine fill
+
+    !> Moves the disks for some collisions per disk and brings all of them to the present.
+    subroutine move(length)
+      integer, intent(in) :: length                     !! collisions per disk
+      type(limits_t) :: limits
+      integer(int64) :: to_come                         ! collisions per disk, times disks
+
+      call evolution%start(sim)
+      to_come = int(length, int64)*sim%n_disks()
+      limits%collisions = sim%tally%collisions + (to_come + 1)/2
+      limits%events = sim%tally%events + 4*to_come            ! one may rattle in a hole between obstacles
+      limits%time = sim%time() + maxval(sim%box%edges())      ! few disks may never collide
+      call evolution%advance(sim, limits, error)
+      do i = 1, sim%n_disks()
+        sim%disk(i)%x = sim%position(i)
+        sim%disk(i)%clock = sim%now
+        sim%tag(i)%met = 0                              ! neighbours grow towards each other
+      end do
+    end subroutine move
+
+    !> Grows every disk into the gap around it, up to the scale `cap`. Neighbours share a gap so that both reach the same
+    !> scale, unless one is larger already.
+    subroutine grow(cap)
+      real(real64), intent(in) :: cap                   !! part of the full size
+      type(packing_t) :: packing
+      real(real64), allocatable :: scale(:)
+      real(real64) :: room, distance, shared
+      integer(int32), allocatable :: list(:)
+      integer(int32) :: k, n, s
+
+      packing = packing_t(sim%box, size(sim%disk), size(species))
+      do s = 1, size(species, kind=int32)
+        call packing%open_species(s, maxval(full(sim%tag%id), mask=sim%tag%species == s), species(s)%count, &
+          sim%box%lower, sim%box%upper)
+      end do
+      do i = 1, sim%n_disks()
+        call packing%add(i, sim%tag(i)%species, sim%disk(i)%x, sim%disk(i)%radius)
+      end do
+      allocate (list(64))
+      scale = sim%disk%radius/full(sim%tag%id)
+      do i = 1, sim%n_disks()
+        if (scale(i) >= cap) cycle
+        associate (own => full(sim%tag(i)%id))
+          call packing%list_neighbours(sim%disk(i)%x, own, list, n)
+          room = min(1.0_real64, wall_distance(sim%box, sim%disk(i)%x)/own)
+          do k = 1, n
+            associate (j => list(k), other => full(sim%tag(list(k))%id))
+              if (j == i) cycle
+              distance = magnitude(packing%separation(sim%disk(i)%x, sim%disk(j)%x))
+              shared = distance/(own + other)
+              if (scale(j) > shared) shared = (distance - scale(j)*other)/own
+              room = min(room, shared)
+            end associate
+          end do
+          if (room >= 1) then
+            sim%disk(i)%radius = cap*own
+          else if (room > scale(i)) then
+            sim%disk(i)%radius = own*min(cap, scale(i) + caution*(room - scale(i)))
+          end if
+        end associate
+      end do
+    end subroutine grow
+  end subroutine grow_disks
 
   !> Distance from a point to the nearest wall or obstacle, `never` if there is none.
   pure function wall_distance(box, x) result(distance)

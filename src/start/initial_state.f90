@@ -1,27 +1,22 @@
 !> The state at the start: the system of the input, with every disk placed and its velocity drawn.
-!> Positions and velocities of each species have random streams of their own, so that a change of one
-!> does not change what the others draw.
 module initial_state
   use kinds, only: int32, real64
   use box_geometry, only: box_t
-  use disks, only: spin_column
   use errors, only: error_t
-  use input_groups, only: group_t, range_of
+  use input_groups, only: range_of
   use input_problems, only: problem_list_t
   use kicks, only: orient
   use placement, only: place_disks
-  use random_stream, only: random_stream_t
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
-  use starting_velocities, only: add_stream, draw_velocities, remove_drift, scale_to_temperature
+  use starting_velocities, only: set_in_motion
   implicit none
   private
   public :: create_simulation, describe_system
 
   real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
-  integer, parameter :: purpose = 2, purpose_of_spins = 6   !! of this module's random streams
 
 contains
 
@@ -104,69 +99,5 @@ contains
       sim%species(s) = settings%species(s)%species_t
     end do
   end subroutine describe_system
-
-  !> Velocities by the rules of the species. Where nothing takes up momentum, the total is zero. In a sheared box rules
-  !> and temperatures are relative to its velocity profile; given velocities are not.
-  subroutine set_in_motion(settings, groups, sim, problems)
-    type(settings_t), intent(in) :: settings
-    type(group_t), intent(in) :: groups(:)                  !! of the species
-    type(simulation_t), intent(inout) :: sim
-    type(problem_list_t), intent(inout) :: problems
-    type(random_stream_t) :: stream
-    real(real64) :: mass(size(sim%disk))
-    logical :: balanced, given
-    integer :: s, first
-
-    mass = sim%masses()
-    balanced = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. .not. sim%box%falling()
-    first = 1
-    do s = 1, size(settings%species)
-      associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
-        call stream%seed(settings%run%seed, [s, purpose])
-        call draw_velocities(species, mass(first:last), stream, balanced, sim%disk(first:last))
-        first = last + 1
-      end associate
-    end do
-    if (balanced) call remove_drift(settings%species, sim)
-    if (sim%law%rotation) call draw_spins(settings, sim)
-    first = 1
-    do s = 1, size(settings%species)
-      associate (species => settings%species(s), last => first + settings%species(s)%count - 1)
-        given = species%velocities == "explicit" .or. species%velocities == "file"
-        if (species%exact_temperature >= 0) then
-          if (given) call add_stream(sim%box, -1.0_real64, sim%disk(first:last))
-          call scale_to_temperature(species, groups(s), mass(first:last), sim%disk(first:last), problems)
-          given = .false.
-        end if
-        if (.not. given) call add_stream(sim%box, 1.0_real64, sim%disk(first:last))
-        first = last + 1
-      end associate
-    end do
-  end subroutine set_in_motion
-
-  !> Angular velocities by the rules of the species; 'file' has brought them with the places.
-  subroutine draw_spins(settings, sim)
-    type(settings_t), intent(in) :: settings
-    type(simulation_t), intent(inout) :: sim
-    type(random_stream_t) :: stream
-    real(real64) :: normals(2)
-    integer(int32) :: i, s
-
-    s = 0
-    do i = 1, sim%n_disks()
-      if (sim%tag(i)%species /= s) then
-        s = sim%tag(i)%species
-        call stream%seed(settings%run%seed, [int(s), purpose_of_spins])
-      end if
-      associate (species => settings%species(s), omega => sim%extra(sim%extra_row(spin_column), i))
-        if (species%rotational_temperature >= 0) then
-          call stream%draw_normals(normals)
-          omega = sqrt(species%rotational_temperature/sim%inertia_of(i))*normals(1)
-        else if (abs(species%angular_velocity) > 0) then
-          omega = species%angular_velocity
-        end if
-      end associate
-    end do
-  end subroutine draw_spins
 
 end module initial_state

@@ -2,7 +2,7 @@
 !> and explicit disks beside each other. What is wrong is reported with the line of the input.
 module input_fit
   use kinds, only: pi, real64
-  use box_geometry, only: box_t, surface_t
+  use box_geometry, only: box_t
   use box_sides, only: bounds
   use errors, only: exit_files
   use input_groups, only: group_t, range_of
@@ -34,15 +34,20 @@ contains
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
     logical, allocatable :: sound(:)
-    integer :: o(2), s(2), k
+    character(len=:), allocatable :: misfit                   ! variable: what
+    real(real64) :: beyond(2, 2)
+    integer :: o(2), s(2), k, colon
 
     if (.not. allocated(settings%species)) return
     if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, law => settings%law, species => settings%species)
-      do k = n_sides + 1, size(box%surface)
-        call check_obstacle(groups(o(1) + k - n_sides - 1), box%surface(k), box, problems)
+      beyond = box%reach()                                    ! of sides that move
+      do k = n_sides + 1, size(box%surface)                   ! obstacles say themselves what is wrong with their places
+        misfit = box%surface(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
+        colon = index(misfit, ": ")
+        if (colon > 0) call groups(o(1) + k - n_sides - 1)%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
       end do
       do k = 1, size(species)
         call survey_file(species, k, box, groups(s(1) + k - 1), problems)
@@ -113,22 +118,6 @@ contains
     if (s%in_file%error%code == exit_files) problems%unreadable = problems%unreadable + 1
   end subroutine complain_of_file
 
-  !> What an obstacle itself finds wrong with its place in the box.
-  subroutine check_obstacle(group, obstacle, box, problems)
-    type(group_t), intent(in) :: group
-    type(surface_t), intent(in) :: obstacle
-    type(box_t), intent(in) :: box
-    type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: misfit              ! variable: what
-    integer :: colon
-
-    associate (beyond => box%reach())                     ! of sides that move
-      misfit = obstacle%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
-    end associate
-    colon = index(misfit, ": ")
-    if (colon > 0) call group%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
-  end subroutine check_obstacle
-
   !> A species must have room: in its region, in a period, and in every container.
   subroutine check_species(group, s, box, alone, problems, sound)
     type(group_t), intent(in) :: group
@@ -142,81 +131,72 @@ contains
     sound = .false.
     if (s%radius <= 0 .or. s%count < 1 .or. group%faulty("region")) return
     do axis = 1, 2
-      call check_axis(group, s, box, axis, alone, problems, sound)
+      call check_axis()
       if (.not. sound) return
     end do
-    if (.not. s%radius_in_file) call check_fraction(group, s, problems)
+    if (.not. s%radius_in_file) call check_fraction()
     do k = n_sides + 1, size(box%surface)
       associate (shape => box%surface(k)%shape)
         if (shape%encloses .and. any(shape%extent() <= s%radius)) call group%complain("radius", "a disk of radius "// &
           written(s%radius)//" does not fit in obstacle """//box%surface(k)%name//'"', problems)
       end associate
     end do
-  end subroutine check_species
 
-  !> Along each axis the region must lie in the box and hold a disk; a period must be longer than two, so that no disk
-  !> touches two images of another at once.
-  subroutine check_axis(group, s, box, axis, alone, problems, sound)
-    type(group_t), intent(in) :: group
-    type(species_settings_t), intent(in) :: s
-    type(box_t), intent(in) :: box
-    integer, intent(in) :: axis
-    logical, intent(in) :: alone                              !! there is one disk in all
-    type(problem_list_t), intent(inout) :: problems
-    logical, intent(out) :: sound
-    logical :: endless(2)
-    real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
-
-    call bounds(box, 0.0_real64, low, high)
-    sound = .false.
-    endless = spans(s%region, box)
-    lower = s%region(2*axis - 1)
-    upper = s%region(2*axis)
-    room = min(upper, high(axis)) - max(lower, low(axis))     ! less what sides out of their places take
-    farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
-    least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
-    if (lower >= upper) then
-      call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
-    else if (lower < min(box%lower(axis), low(axis)) .or. upper > max(box%upper(axis), high(axis))) then
-      call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
-    else if (.not. endless(axis) .and. 2*s%radius > room*(1 + rounding)) then
-      call complain("radius", "a disk of diameter "//written(2*s%radius)// &
-        " does not fit in its region of width "//written(room))
-    else if (box%periodic(axis) .and. least > box%upper(axis) - box%lower(axis)) then
-      call complain("radius", "a periodic box must be "//trim(merge("at least one diameter wide", "wider than two diameters  ", &
-        alone))//", "//written(merge(2, 4, alone)*s%radius)//"; it is "//written(box%upper(axis) - box%lower(axis)))
-    else if (s%radius < resolution*farthest) then
-      call complain("radius", written(s%radius)//" is too small to be resolved at coordinates of "//written(farthest))
-    else
-      sound = .true.
-    end if
   contains
+
+    !> Along the axis the region must lie in the box and hold a disk; a period must be longer than two, so that no disk
+    !> touches two images of another at once.
+    subroutine check_axis()
+      logical :: endless(2)
+      real(real64) :: lower, upper, room, farthest, least, low(2), high(2)
+
+      call bounds(box, 0.0_real64, low, high)
+      sound = .false.
+      endless = spans(s%region, box)
+      lower = s%region(2*axis - 1)
+      upper = s%region(2*axis)
+      room = min(upper, high(axis)) - max(lower, low(axis))   ! less what sides out of their places take
+      farthest = max(abs(box%lower(axis)), abs(box%upper(axis)))
+      least = merge(2*s%radius, 4*s%radius + rounding*farthest, alone)
+      if (lower >= upper) then
+        call complain("region", "its lower end "//written(lower)//" is not below its upper end "//written(upper))
+      else if (lower < min(box%lower(axis), low(axis)) .or. upper > max(box%upper(axis), high(axis))) then
+        call complain("region", "it extends beyond the box, "//written(box%lower(axis))//" to "//written(box%upper(axis)))
+      else if (.not. endless(axis) .and. 2*s%radius > room*(1 + rounding)) then
+        call complain("radius", "a disk of diameter "//written(2*s%radius)//" does not fit in its region of width "//written(room))
+      else if (box%periodic(axis) .and. least > box%upper(axis) - box%lower(axis)) then
+        call complain("radius", "a periodic box must be "//trim(merge("at least one diameter wide", "wider than two diameters  ", &
+          alone))//", "//written(merge(2, 4, alone)*s%radius)//"; it is "//written(box%upper(axis) - box%lower(axis)))
+      else if (s%radius < resolution*farthest) then
+        call complain("radius", written(s%radius)//" is too small to be resolved at coordinates of "//written(farthest))
+      else
+        sound = .true.
+      end if
+    end subroutine check_axis
+
     !> Reports the axis, too.
     subroutine complain(variable, what)
       character(len=*), intent(in) :: variable, what
 
       call group%complain(variable, what//", along "//merge("x", "y", axis == 1), problems)
     end subroutine complain
-  end subroutine check_axis
 
-  !> No placement of equal disks can exceed its densest packing.
-  subroutine check_fraction(group, s, problems)
-    type(group_t), intent(in) :: group
-    type(species_settings_t), intent(in) :: s
-    type(problem_list_t), intent(inout) :: problems
-    real(real64) :: packing
-    character(len=:), allocatable :: variable, filled
+    !> No placement of equal disks can exceed its densest packing.
+    subroutine check_fraction()
+      real(real64) :: packing
+      character(len=:), allocatable :: variable, filled
 
-    packing = s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))
-    variable = "radius"
-    if (group%given("packing_fraction")) variable = "packing_fraction"
-    filled = "the disks would fill "//written(packing)//" of their region; "
-    if (packing > closest_packing*(1 + rounding)) then
-      call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
-    else if (packing > random_limit .and. s%placement == "random") then
-      call group%complain(variable, filled//"random placement reaches "//written(random_limit)// &
-        ", placement = 'dense' more", problems)
-    end if
-  end subroutine check_fraction
+      packing = s%count*pi*s%radius**2/product(s%region([2, 4]) - s%region([1, 3]))
+      variable = "radius"
+      if (group%given("packing_fraction")) variable = "packing_fraction"
+      filled = "the disks would fill "//written(packing)//" of their region; "
+      if (packing > closest_packing*(1 + rounding)) then
+        call group%complain(variable, filled//"the closest packing is "//written(closest_packing), problems)
+      else if (packing > random_limit .and. s%placement == "random") then
+        call group%complain(variable, filled//"random placement reaches "//written(random_limit)// &
+          ", placement = 'dense' more", problems)
+      end if
+    end subroutine check_fraction
+  end subroutine check_species
 
 end module input_fit

@@ -87,13 +87,12 @@ contains
     class(packing_t), intent(inout) :: self
     integer(int32), intent(in) :: k, s
     real(real64), intent(in) :: p(2)                !! [length]
-    real(real64), intent(in), optional :: radius    !! default: that of the largest [length]
+    real(real64), intent(in) :: radius              !! [length]
     integer :: c(2)
 
     c = cell(self%layer(s), p)
     self%disk(k)%x = p
-    self%disk(k)%radius = self%layer(s)%radius
-    if (present(radius)) self%disk(k)%radius = radius
+    self%disk(k)%radius = radius
     self%disk(k)%species = s
     self%disk(k)%next = self%layer(s)%head(c(1), c(2))
     self%layer(s)%head(c(1), c(2)) = k
@@ -171,54 +170,50 @@ contains
   end function blocker_in
 
   !> All disks whose rim comes within `reach` of a point, and some others from the same cells.
-  pure subroutine list_neighbours(self, p, reach, list, n)
+  subroutine list_neighbours(self, p, reach, list, n)
     class(packing_t), intent(in) :: self
     real(real64), intent(in) :: p(2), reach         !! [length]
     integer(int32), allocatable, intent(inout) :: list(:)   !! grows when needed
     integer(int32), intent(out) :: n                !! how many of its elements are meant
-    real(real64) :: rho
     integer :: s, kx, ky, first(2), last(2)
 
     n = 0
     do s = 1, size(self%layer)
       if (.not. allocated(self%layer(s)%head)) cycle
-      rho = reach + self%layer(s)%radius
-      call range_images(self%box, p, rho, first, last)
+      call range_images(self%box, p, reach + self%layer(s)%radius, first, last)
       do ky = first(2), last(2)
         do kx = first(1), last(1)
-          call append_cells(self, s, p + [kx, ky]*self%box%edges(), rho, list, n)
+          call append_cells(p + [kx, ky]*self%box%edges(), reach + self%layer(s)%radius)
         end do
       end do
     end do
-  end subroutine list_neighbours
 
-  !> Appends the disks of species s in the cells within rho of a point.
-  pure subroutine append_cells(packing, s, p, rho, list, n)
-    type(packing_t), intent(in) :: packing
-    integer, intent(in) :: s
-    real(real64), intent(in) :: p(2), rho
-    integer(int32), allocatable, intent(inout) :: list(:)
-    integer(int32), intent(inout) :: n
-    integer :: low(2), high(2), i, j
-    integer(int32) :: k
+  contains
 
-    associate (layer => packing%layer(s))
-      if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
-      low = cell(layer, p - rho)
-      high = cell(layer, p + rho)
-      do j = low(2), high(2)
-        do i = low(1), high(1)
-          k = layer%head(i, j)
-          do while (k > 0)
-            if (n == size(list)) list = [list, list]
-            n = n + 1
-            list(n) = k
-            k = packing%disk(k)%next
+    !> Appends the disks of species s in the cells within rho of a point.
+    subroutine append_cells(p, rho)
+      real(real64), intent(in) :: p(2), rho
+      integer :: low(2), high(2), i, j
+      integer(int32) :: k
+
+      associate (layer => self%layer(s))
+        if (any(p + rho < layer%lower .or. p - rho > layer%upper)) return
+        low = cell(layer, p - rho)
+        high = cell(layer, p + rho)
+        do j = low(2), high(2)
+          do i = low(1), high(1)
+            k = layer%head(i, j)
+            do while (k > 0)
+              if (n == size(list)) list = [list, list]
+              n = n + 1
+              list(n) = k
+              k = self%disk(k)%next
+            end do
           end do
         end do
-      end do
-    end associate
-  end subroutine append_cells
+      end associate
+    end subroutine append_cells
+  end subroutine list_neighbours
 
   !> Whether one disk, or one obstacle, keeps disks of this radius out of the whole rectangle
   !> `centre` +- `half`.

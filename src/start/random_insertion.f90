@@ -33,29 +33,38 @@ contains
     class(status_line_t), intent(inout) :: line     !! shows how far it is
     integer(int32), intent(out) :: placed           !! how many
     type(voxels_t) :: voxels
-    integer(int32) :: k, blocker, failures, count
+    integer(int32) :: i, j, k, n(2), blocker, failures, count
     real(real64) :: p(2), radius, lower(2), upper(2)
 
     radius = packing%layer(s)%radius
     count = packing%layer(s)%count
     lower = packing%layer(s)%lower
     upper = packing%layer(s)%upper
-    call tile(voxels, lower, upper, shape(packing%layer(s)%head))
+    n = shape(packing%layer(s)%head)
+    voxels%origin = lower
+    voxels%side = (upper - lower)/n
+    voxels%n = product(n)
+    allocate (voxels%column_row(2, voxels%n), source=reshape([((i, j, i=0, n(1) - 1), j=0, n(2) - 1)], [2, voxels%n]))
     placed = 0
     failures = 0
     do while (placed < count .and. voxels%n > 0)
-      call draw_point(stream, voxels, k, p)
-      p = min(max(p, lower), upper)
+      call stream%draw_index(voxels%n, k)
+      call stream%draw_uniform(p(1))
+      call stream%draw_uniform(p(2))
+      p = min(max(voxels%origin + (voxels%column_row(:, k) + p)*voxels%side, lower), upper)
       call packing%find_blocker(p, [0.0_real64, 0.0_real64], radius, blocker)
       if (blocker == 0) then
         blocker = first + placed
-        call packing%add(blocker, s, p)
+        call packing%add(blocker, s, p, radius)
         placed = placed + 1
         if (modulo(placed, disks_per_look) == 0) call line%show_share("placing disks", real(placed, real64)/count)
       else
         failures = failures + 1
       end if
-      if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) call drop_voxel(voxels, k)
+      if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
+        voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last one takes its number
+        voxels%n = voxels%n - 1
+      end if
       ! Halving costs four searches per voxel; it pays when half as many attempts have failed.
       if (failures > 2*voxels%n) then
         call halve(voxels, packing, radius)
@@ -65,37 +74,6 @@ contains
     end do
   end subroutine insert_at_random
 
-  !> Covers the rectangle with voxels.
-  pure subroutine tile(voxels, lower, upper, n)
-    type(voxels_t), intent(out) :: voxels
-    real(real64), intent(in) :: lower(2), upper(2)
-    integer, intent(in) :: n(2)                     !! columns, rows
-    integer(int32) :: i, j
-
-    voxels%origin = lower
-    voxels%side = (upper - lower)/n
-    allocate (voxels%column_row(2, n(1)*n(2)))
-    do j = 0, n(2) - 1
-      do i = 0, n(1) - 1
-        voxels%n = voxels%n + 1
-        voxels%column_row(:, voxels%n) = [i, j]
-      end do
-    end do
-  end subroutine tile
-
-  !> A point uniform in the voxels, and the voxel it is in.
-  pure subroutine draw_point(stream, voxels, k, p)
-    type(random_stream_t), intent(inout) :: stream
-    type(voxels_t), intent(in) :: voxels
-    integer(int32), intent(out) :: k
-    real(real64), intent(out) :: p(2)
-
-    call stream%draw_index(voxels%n, k)
-    call stream%draw_uniform(p(1))
-    call stream%draw_uniform(p(2))
-    p = voxels%origin + (voxels%column_row(:, k) + p)*voxels%side
-  end subroutine draw_point
-
   !> The centre of voxel k.
   pure function middle(voxels, k) result(p)
     type(voxels_t), intent(in) :: voxels
@@ -104,15 +82,6 @@ contains
 
     p = voxels%origin + (voxels%column_row(:, k) + 0.5_real64)*voxels%side
   end function middle
-
-  !> Removes voxel k; the last one takes its number.
-  pure subroutine drop_voxel(voxels, k)
-    type(voxels_t), intent(inout) :: voxels
-    integer(int32), intent(in) :: k
-
-    voxels%column_row(:, k) = voxels%column_row(:, voxels%n)
-    voxels%n = voxels%n - 1
-  end subroutine drop_voxel
 
   !> Cuts every voxel in four and keeps the quarters that nothing covers.
   pure subroutine halve(voxels, packing, radius)

@@ -58,111 +58,81 @@ contains
     end associate
   end subroutine grid_positions
 
-  !> Places on a triangular lattice that fills the region, stretched to its shape, row by row from
-  !> the bottom. Of all numbers of rows it takes the one that keeps neighbours farthest apart. The
-  !> last places stay empty if the rows hold more than `count`.
+  !> Places on a triangular lattice that fills the region, stretched to its shape, row by row from the bottom. Of all
+  !> numbers of rows it takes the one that keeps neighbours farthest apart. The last places stay empty if the rows hold more
+  !> than `count`.
   subroutine lattice_positions(species, group, box, x, problems)
     type(species_settings_t), intent(in) :: species
     type(group_t), intent(in) :: group
     type(box_t), intent(in) :: box
     real(real64), allocatable, intent(out) :: x(:, :)       !! (2,count) [length]
     type(problem_list_t), intent(inout) :: problems
-    real(real64) :: lower(2), upper(2), step(2), distance, closest
+    real(real64) :: lower(2), upper(2), first(2), step(2), distance, found, closest
     logical :: periodic(2)
-    integer :: columns
+    integer :: columns, k, row, fits, more
 
     periodic = spans(species%region, box)
     call centre_range(species%region, box, species%radius, lower, upper)
-    call choose_lattice(species%count, upper - lower, periodic, columns, step, distance)
-    x = lattice(species%count, columns, lower, step, periodic)
-    closest = 2*species%radius*(1 - 2*epsilon(closest))
-    if (distance < closest) call group%complain("placement", written(species%count)//" disks of diameter " &
-      //written(2*species%radius)//" do not fit; on the lattice their centres are "//written(distance)//" apart; up to " &
-      //written(lattice_capacity(species%count, closest, upper - lower, periodic))//" fit", problems)
-  end subroutine lattice_positions
-
-  !> How many disks, less than `too_many`, the lattice holds no closer than `closest`.
-  pure function lattice_capacity(too_many, closest, extent, periodic) result(n)
-    integer, intent(in) :: too_many
-    real(real64), intent(in) :: closest             !! [length]
-    real(real64), intent(in) :: extent(2)           !! for the centres [length]
-    logical, intent(in) :: periodic(2)
-    real(real64) :: step(2), distance
-    integer :: n, more, middle, columns
-
-    n = 0
-    more = too_many
-    do while (more - n > 1)                         ! the more disks, the closer they are
-      middle = n + (more - n)/2
-      call choose_lattice(middle, extent, periodic, columns, step, distance)
-      if (distance < closest) then
-        more = middle
-      else
-        n = middle
-      end if
-    end do
-  end function lattice_capacity
-
-  !> The lattice for n disks that keeps neighbours farthest apart.
-  pure subroutine choose_lattice(n, extent, periodic, columns, step, distance)
-    integer, intent(in) :: n
-    real(real64), intent(in) :: extent(2)           !! for the centres [length]
-    logical, intent(in) :: periodic(2)
-    integer, intent(out) :: columns
-    real(real64), intent(out) :: step(2), distance  !! [length]
-    real(real64) :: its_step(2), its_distance
-    integer :: rows
-
-    distance = -1
-    columns = 0
-    step = 0
-    do rows = 1, n
-      if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
-      call measure_lattice(1 + (n - 1)/rows, rows, extent, periodic, its_step, its_distance)
-      if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows are only closer
-      if (its_distance <= distance) cycle
-      distance = its_distance
-      columns = 1 + (n - 1)/rows
-      step = its_step
-    end do
-  end subroutine choose_lattice
-
-  !> Steps of a lattice from column to column and from row to row, and its shortest distance.
-  pure subroutine measure_lattice(columns, rows, extent, periodic, step, distance)
-    integer, intent(in) :: columns, rows
-    real(real64), intent(in) :: extent(2)           !! for the centres [length]
-    logical, intent(in) :: periodic(2)
-    real(real64), intent(out) :: step(2), distance  !! [length]
-    real(real64) :: gaps(2)
-
-    gaps = [columns - 1, rows - 1]
-    if (rows > 1) gaps(1) = gaps(1) + 0.5_real64    ! every other row begins half a step later
-    gaps = merge(real([columns, rows], real64), gaps, periodic)
-    distance = huge(distance)
-    step = extent
-    where (gaps > 0) step = extent/gaps
-    if (columns > 1 .or. periodic(1)) distance = step(1)
-    if (rows > 1) then
-      distance = min(distance, magnitude([0.5_real64*step(1), step(2)]))
-      if (rows > 2) distance = min(distance, 2*step(2))
-    else if (periodic(2)) then
-      distance = min(distance, step(2))
-    end if
-  end subroutine measure_lattice
-
-  !> Places 1 to n of the lattice.
-  pure function lattice(n, columns, lower, step, periodic) result(x)
-    integer, intent(in) :: n, columns
-    real(real64), intent(in) :: lower(2), step(2)
-    logical, intent(in) :: periodic(2)
-    real(real64) :: x(2, n), first(2)
-    integer :: k, row
-
+    call choose_lattice(species%count)
+    allocate (x(2, species%count))
     first = lower + merge([0.25_real64, 0.5_real64]*step, [0.0_real64, 0.0_real64], periodic)
-    do k = 1, n
+    do k = 1, species%count
       row = (k - 1)/columns
       x(:, k) = first + [modulo(k - 1, columns) + 0.5_real64*modulo(row, 2), real(row, real64)]*step
     end do
-  end function lattice
+    closest = 2*species%radius*(1 - 2*epsilon(closest))
+    if (distance >= closest) return
+    found = distance
+    fits = 0
+    more = species%count
+    do while (more - fits > 1)                              ! the more disks, the closer they are
+      call choose_lattice(fits + (more - fits)/2)
+      if (distance < closest) more = fits + (more - fits)/2
+      if (distance >= closest) fits = fits + (more - fits)/2
+    end do
+    call group%complain("placement", written(species%count)//" disks of diameter "//written(2*species%radius) &
+      //" do not fit; on the lattice their centres are "//written(found)//" apart; up to "//written(fits)//" fit", problems)
+
+  contains
+
+    !> Finds the lattice for n disks that keeps neighbours farthest apart.
+    subroutine choose_lattice(n)
+      integer, intent(in) :: n
+      real(real64) :: its_step(2), its_distance
+      integer :: rows
+
+      distance = -1
+      do rows = 1, n
+        if (periodic(2) .and. modulo(rows, 2) == 1 .and. rows > 1) cycle   ! rows are shifted in turn
+        call measure_lattice(1 + (n - 1)/rows, rows, its_step, its_distance)
+        if (rows > 2 .and. 2*its_step(2) <= distance) exit                 ! more rows are only closer
+        if (its_distance <= distance) cycle
+        distance = its_distance
+        columns = 1 + (n - 1)/rows
+        step = its_step
+      end do
+    end subroutine choose_lattice
+
+    !> Steps of a lattice from column to column and from row to row, and its shortest distance.
+    subroutine measure_lattice(columns, rows, step, distance)
+      integer, intent(in) :: columns, rows
+      real(real64), intent(out) :: step(2), distance        !! [length]
+      real(real64) :: gaps(2)
+
+      gaps = [columns - 1, rows - 1]
+      if (rows > 1) gaps(1) = gaps(1) + 0.5_real64          ! every other row begins half a step later
+      gaps = merge(real([columns, rows], real64), gaps, periodic)
+      distance = huge(distance)
+      step = upper - lower
+      where (gaps > 0) step = step/gaps
+      if (columns > 1 .or. periodic(1)) distance = step(1)
+      if (rows > 1) then
+        distance = min(distance, magnitude([0.5_real64*step(1), step(2)]))
+        if (rows > 2) distance = min(distance, 2*step(2))
+      else if (periodic(2)) then
+        distance = min(distance, step(2))
+      end if
+    end subroutine measure_lattice
+  end subroutine lattice_positions
 
 end module regular_places
