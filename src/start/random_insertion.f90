@@ -43,8 +43,13 @@ contains
     n = shape(packing%layer(s)%head)
     voxels%origin = lower
     voxels%side = (upper - lower)/n
-    voxels%n = product(n)
-    allocate (voxels%column_row(2, voxels%n), source=reshape([((i, j, i=0, n(1) - 1), j=0, n(2) - 1)], [2, voxels%n]))
+    allocate (voxels%column_row(2, product(n)))
+    do j = 0, n(2) - 1
+      do i = 0, n(1) - 1
+        voxels%n = voxels%n + 1
+        voxels%column_row(:, voxels%n) = [i, j]
+      end do
+    end do
     placed = 0
     failures = 0
     do while (placed < count .and. voxels%n > 0)
