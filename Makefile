@@ -220,7 +220,7 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
-	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/runs/fuzz_systems.py --count $(SYSTEMS) --seed $(SEED)
+	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
 bench: all  ## measures collisions per second; FULL=1: and more

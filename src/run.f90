@@ -191,7 +191,11 @@ contains
     first_time = run%sim%time()
     next_checkpoint = seconds() + run%input%settings%output%checkpoint_every
     call run%line%start(run%sim, run%stop_rule, run%started)
-    do while (.not. is_over(run))
+    limits%time = run%sim%time()
+    call run%output%tighten(limits)
+    ! Where nothing can happen any more a run ends with a sample; one that was stopped right after it has to know.
+    if (run%sim%settled .and. limits%sampled >= run%sim%time()) call run%evolution%advance(run%sim, limits, error)
+    do while (.not. (is_over(run) .or. allocated(error)))
       limits = run%stop_rule%limits
       limits%turns = turns
       call run%output%tighten(limits)

@@ -28,21 +28,33 @@ def contents(path) -> dict[str, np.ndarray]:
     found = {}
 
     def visit(name, item):
-        found.update({f"{name}@{key}": value for key, value in item.attrs.items()})
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-        else:  # not visititems: it leaves out second names
+        for k in range(h5py.h5a.get_num_attrs(item)):
+            attribute = h5py.h5a.open(item, index=k)
+            found[f"{name}@{attribute.name.decode()}"] = read(attribute)
+        if isinstance(item, h5py.h5d.DatasetID):
+            found[name] = read(item, h5py.h5s.ALL, h5py.h5s.ALL)
+        else:  # also by second names
             for key in item:
-                visit(f"{name}/{key}", item[key])
+                visit(f"{name}/{key.decode()}", h5py.h5o.open(item, key))
+
+    def read(item, *spaces):
+        value = np.empty(item.shape, item.dtype)
+        if value.size:
+            item.read(*spaces, value)
+        return value[()]
 
     with h5py.File(path, "r", locking=False) as file:
-        visit("", file)
+        visit("", h5py.h5o.open(file.id, b"/"))
     return found
 
 
 def differences(one, other) -> list[str]:
     """Names of what is not the same, bit for bit, in two output files; their origin aside."""
-    a, b = contents(one), contents(other)
+    return unlike(contents(one), contents(other))
+
+
+def unlike(a: dict, b: dict) -> list[str]:
+    """The same for what two files contain."""
     return [
         name
         for name in sorted(a.keys() | b.keys())
@@ -55,37 +67,6 @@ def same(a, b) -> bool:
     """Equal in type, shape and every bit."""
     a, b = np.asarray(a), np.asarray(b)
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-
-
-def imbalance(path: Path) -> float:
-    """How far the energy is from what was given and lost, in parts of the greatest of them.
-
-    What cancels counts in full: kinetic and potential energy, kicks of noise whose momentum is
-    taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
-    """
-    with h5py.File(path) as file:
-        found = {
-            name: file[f"observables/{name}/value"][:]
-            for name in ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
-            if f"observables/{name}" in file
-        }
-        drive = file["parameters/drive"].attrs if "parameters/drive" in file else {}
-        kick = drive.get("strength", 0) * drive.get("interval", 0)
-        hottest = max(
-            (
-                np.nanmax([0, *file[f"parameters/{kind}/temperature"][:]])
-                for kind in ("side", "wall", "obstacle")
-                if f"parameters/{kind}/temperature" in file
-            ),
-            default=0.0,
-        )
-        mass = file["particles/disks/mass"][:]
-        kinetic = len(mass) * file["observables/all/kinetic_energy/value"][:]  # a mean in the file
-    signs = {"total_energy": 1, "dissipated_energy": 1}
-    balance = sum(signs.get(name, -1) * values for name, values in found.items())
-    parts = [kinetic, found["total_energy"] - kinetic, *found.values()]
-    most = max([kick * mass.max(), hottest, *(abs(values).max(initial=0) for values in parts)])
-    return np.ptp(balance) / most if most else 0.0
 
 
 def committed(path) -> dict[str, np.ndarray]:

@@ -3,7 +3,7 @@
 Each feature is a variable of walls, rough disks, kicks or shear with what it needs, or something
 that it may meet: periodic sides, gravity, time steps, stop rules.  Alone each of them is accepted,
 so what is refused of a pair is the two together.  All pairs are checked, some of them run; random
-systems (fuzz_systems.py) run many features at a time.
+systems (test_random_systems.py) run many features at a time.
 """
 
 import random
@@ -11,7 +11,8 @@ import re
 
 import pytest
 
-from whole_runs import FINISHED, USAGE, imbalance, write_input
+from run_laws import imbalance
+from whole_runs import FINISHED, USAGE, contents, write_input
 
 Settings = dict[str, dict[str, str]]  # by group, or group and name of the repeated ones
 
@@ -152,7 +153,7 @@ def fault(ricochet, folder, settings: Settings, *features: Settings, runs: bool)
     notes = [line for line in done.stderr.splitlines() if not line.startswith("warning:")]
     if done.returncode != FINISHED or notes:
         return f"ends with {done.returncode}: {done.stderr}"
-    part = imbalance(folder / "gas.h5") if runs else 0
+    part = imbalance(contents(folder / "gas.h5")) if runs else 0
     return "" if part < 1e-12 else f"is out of balance by {part:g}"
 
 

@@ -7,11 +7,16 @@ clusters, strips, great ratios of size and mass. A system is a text and the file
 
 import math
 import random
+import re
 from typing import NamedTuple
 
 import numpy as np
 
-MOST_EVENTS = 40_000
+MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: of many disks these are an epoch or two
+SIDES = ("left", "right", "bottom", "top")
+CADENCES = ("time", "collisions", "events", "collisions_per_disk")
+#: Variables that hold a word which is a feature of its own.
+KINDS = r"(dynamics|motion|rule|placement|velocities|kind|side|precision) = '(\w+)'"
 
 
 class System(NamedTuple):
@@ -22,35 +27,55 @@ class System(NamedTuple):
     disks: int
     events: int
 
+    def features(self) -> set[str]:
+        """What it draws: variables, kinds, and how the box is closed."""
+        found = {"many disks"} if self.disks > 2500 else set()
+        for group, words in re.findall(r"^&(\w+)(.*)/$", self.text, re.MULTILINE):
+            found |= {f"{group}.{name}" for name in re.findall(r"(\w+) =", words)}
+            found |= {f"{group}.{name} = {kind}" for name, kind in re.findall(KINDS, words)}
+            if group == "box":
+                kinds = re.search(r"boundary = '(\w+)', '(\w+)'", words)
+                found |= {f"{kind} {axis}" for kind, axis in zip(kinds.groups(), "xy", strict=True)}
+        return found
+
 
 def numbers(*values: float) -> str:
     """Values as a namelist has them, with all digits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
-def chance(rng: random.Random, share: float) -> bool:
-    return rng.random() < share
-
-
 class Draw:
     """One system in the making: what earlier choices mean for later ones."""
 
     def __init__(self, rng: random.Random):
-        """The scales."""
+        """The scales, and what others depend on."""
         self.rng = rng
-        self.disks = rng.choice([rng.randint(1, 12), rng.randint(20, 400), rng.randint(2600, 9000)])
+        self.disks = rng.choice([rng.randint(1, 12), rng.randint(20, 400), rng.randint(2600, 6000)])
         self.length = 10.0 ** rng.choice([0, 0, 0, rng.randint(-6, 6)])
         self.speed = 10.0 ** rng.choice([0, 0, 0, rng.randint(-6, 6)])
         aspect = rng.choice([1, 1, 2, 10, 100, 1000]) ** rng.choice([-0.5, 0.5])
         self.edges = [self.length * aspect, self.length / aspect]
         self.lower = [0.0, 0.0]
-        if chance(rng, 0.3):
+        if self.chance(0.3):
             self.lower = [rng.uniform(-1, 1) * edge for edge in self.edges]
-        self.periodic = [chance(rng, 0.4), chance(rng, 0.4)]
-        self.steps = chance(rng, 0.1)
+        self.periodic = [self.chance(0.4), self.chance(0.4)]
+        self.steps = self.chance(0.1)
         self.packing = rng.choice([0.01, 0.1, 0.2, 0.3, 0.4, 0.5])
+        self.turns = self.chance(0.3)
+        self.driven = self.chance(0.3)
+        self.falls = self.chance(0.3) and not all(self.periodic)
+        self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
+        self.worked = False  # by walls: the energy that is left says nothing
         self.start: list[str] = []
-        self.turns = chance(rng, 0.3)
+        self.kinds = 1
+        if self.disks < 3 and (self.driven or all(self.periodic)):
+            self.disks = 3  # one might meet nothing for ever
+
+    def chance(self, share: float) -> bool:
+        return self.rng.random() < share
+
+    def maybe(self, share: float, words: str) -> str:
+        return f" {words}" if self.chance(share) else ""
 
     def place(self, x: float, y: float) -> list[float]:
         """A point of the box by its fractions of the edges."""
@@ -59,22 +84,8 @@ class Draw:
             for low, part, edge in zip(self.lower, (x, y), self.edges, strict=True)
         ]
 
-    def region(self) -> tuple[float, float]:
-        """Widths of a part of the box, and its line in `self.where`."""
-        self.where = ""
-        if chance(self.rng, 0.7):
-            return tuple(self.edges)
-        parts = [self.rng.choice([1, 0.5, 0.2]) for _ in "xy"]
-        begin = [self.rng.uniform(0, 1 - part) for part in parts]
-        low = self.place(*begin)
-        high = self.place(*(b + p for b, p in zip(begin, parts, strict=True)))
-        high = [min(h, lo + e) for h, lo, e in zip(high, self.lower, self.edges, strict=True)]
-        self.where = f"region = {numbers(low[0], high[0], low[1], high[1])} "
-        return high[0] - low[0], high[1] - low[1]
-
     def run(self) -> str:
-        rng = self.rng
-        words = f"&run seed = {rng.randint(0, 10**6)}"
+        words = f"&run seed = {self.rng.randint(0, 10**6)}"
         if self.steps:
             width = math.sqrt(math.prod(self.edges) * self.packing / self.disks)
             words += f" dynamics = 'steps' dt = {0.1 * width / self.speed!r}"
@@ -85,255 +96,284 @@ class Draw:
         words += "upper = " + numbers(*(a + b for a, b in zip(self.lower, self.edges, strict=True)))
         sides = ["'periodic'" if yes else "'wall'" for yes in self.periodic]
         words += f" boundary = {', '.join(sides)}"
-        self.falls = chance(self.rng, 0.3)
         if self.falls:
             unit = self.speed**2 / max(self.edges)
             pull = self.rng.choice([(0, -1), (0, -10), (1, 0), (0.3, -0.7)])
-            words += " gravity = " + numbers(
-                *(0 if ends else unit * g for g, ends in zip(pull, self.periodic, strict=True))
-            )
-        self.sheared = all(self.periodic) and not self.steps and chance(self.rng, 0.5)
+            pull = [0 if ends else g for g, ends in zip(pull, self.periodic, strict=True)]
+            words += " gravity = " + numbers(*(unit * g for g in pull))
         if self.sheared:
-            rate = self.rng.choice([-1, 1]) * 10.0 ** self.rng.uniform(-2, 1)
+            rate = self.rng.choice([-1, 1]) * 10.0 ** self.rng.uniform(-2, 2)
             words += f" shear_rate = {rate * self.speed / self.edges[1]!r}"
         return words + " /"
 
-    def motion(self) -> str:
-        """How the disks of a species start."""
-        v = self.speed
-        turning = ""
-        if self.turns and chance(self.rng, 0.4):
-            rate = v / min(self.edges) * 10.0 ** self.rng.uniform(-1, 2)
-            turning = f" angular_velocity = {rate!r}"
-            if chance(self.rng, 0.5):
-                turning = f" rotational_temperature = {v * v!r}"
-        return turning + " " + self.rng.choice(
-            [
-                f"temperature = {v * v!r}",
-                f"velocities = 'uniform' speed = {v!r}",
-                f"speed = {v!r}",
-                f"velocity = {numbers(v, 0)}",
-                f"velocity = {numbers(0, -v)}",
-                f"velocity = {numbers(v, v)}",
-                "velocities = 'rest'",
-            ]
-        )
-
-    def species(self) -> list[str]:
-        self.kinds = 1
-        if chance(self.rng, 0.15):
-            return [self.from_file()]
-        rng, groups, left = self.rng, [], self.disks
-        for k in range(rng.choice([1, 1, 1, 2, 3])):
-            count = left if k == 0 else rng.randint(1, max(left // 3, 1))
-            wide, high = self.region()
-            share = self.packing / (1 if k == 0 else 6)
-            radius = math.sqrt(share * wide * high / (count * math.pi))
-            radius = min(radius, 0.24 * wide, 0.24 * high) * rng.choice(
-                [1, 1, rng.uniform(0.05, 1)]
-            )
-            few = ["lattice", "dense", "dense"] if self.disks <= 400 else ["lattice"]
-            placement = rng.choice(["random", "random", *few]) if k == 0 else "random"
-            motion = self.motion() if k == 0 else rng.choice([self.motion(), "velocities = 'rest'"])
-            mass = 10.0 ** rng.choice([0, 0, 0, rng.randint(-4, 4)])
-            size = f"radius = {radius!r} mass = {mass!r}"
-            if k > 0 and chance(rng, 0.3):
-                size = f"relative_to = 's0' radius = {rng.uniform(0.2, 2)!r} mass = {mass!r}"
-            if "temperature" in motion and count > 1 and chance(rng, 0.3):
-                motion += f" exact_temperature = {self.speed**2!r}"
-            groups.append(
-                f"&species name = 's{k}' count = {count} {size} "
-                f"placement = '{placement}' {self.where}{motion} /"
-            )
-        self.kinds = len(groups)
-        return groups
-
-    def from_file(self) -> str:
-        """A species in a file: a square lattice, each disk with its own size and velocity."""
-        rng = self.rng
-        aspect = self.edges[0] / self.edges[1]
-        columns = max(round(math.sqrt(self.disks * aspect)), 1)
-        rows = max(self.disks // columns, 1)
-        self.disks = columns * rows
-        cell = min(self.edges[0] / columns, self.edges[1] / rows)
-        own = np.random.default_rng(rng.randint(0, 10**6))
-        same = chance(rng, 0.3)
-        self.start.append("x y vx vy radius mass" + (" omega angle" if self.turns else ""))
-        for k in range(self.disks):
-            x = self.lower[0] + (k % columns + 0.5) * self.edges[0] / columns
-            y = self.lower[1] + (k // columns + 0.5) * self.edges[1] / rows
-            if same:
-                row = (x, y, rng.choice([-1, 0, 1]) * self.speed, 0, 0.2 * cell, 1)
-            else:
-                row = (x, y, *own.normal(0, self.speed, 2), own.uniform(0.05, 0.45) * cell)
-                row += (own.uniform(0.5, 2),)
-            if self.turns:
-                row += (own.normal() * self.speed / cell, own.uniform(-9, 9))
-            self.start.append(numbers(*row))
-        return "&species name = 's0' file = 'start.txt' /"
-
-    def obstacles(self) -> list[str]:
-        rng, groups = self.rng, []
-        if self.start or self.sheared:
-            return groups  # they would stand on disks, or be refused
-        small = min(self.edges)
-        if chance(rng, 0.25):
-            for _ in range(rng.choice([1, 3, 10])):
-                centre = self.place(rng.random(), rng.random())
-                radius = rng.uniform(0.01, 0.15) * small
-                groups.append(
-                    f"&obstacle centre = {numbers(*centre)} radius = {radius!r}{self.law()} /"
-                )
-        if chance(rng, 0.25):
-            for _ in range(rng.choice([1, 3, 10])):
-                one, two = (self.place(rng.random(), rng.random()) for _ in "12")
-                if chance(rng, 0.5):
-                    axis = rng.randint(0, 1)
-                    two[axis] = one[axis]
-                groups.append(f"&wall from = {numbers(*one)} to = {numbers(*two)}{self.law()} /")
-        if chance(rng, 0.08) and not any(self.periodic):
-            size = f"centre = {numbers(*self.place(0.5, 0.5))} radius = {0.5 * small!r}"
-            groups.append(f"&obstacle name = 'bowl' side = 'inside' {size}{self.law()} /")
-        return groups
+    # --- walls ---
 
     def law(self) -> str:
         """What one side, wall or obstacle has of its own: often nothing."""
         rng = self.rng
-        if chance(rng, 0.6):
+        if self.chance(0.5):
             return ""
-        speed = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-1, 0.5)
-        sliding = rng.choice(["", f" speed = {speed!r}"])
-        if chance(rng, 0.4):
+        sliding = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-1, 0.5)
+        sliding = self.maybe(0.5, f"speed = {sliding!r}")
+        if self.chance(0.4):
+            self.worked = True
             return f" temperature = {self.speed**2 * 10.0 ** rng.uniform(-1, 1)!r}{sliding}"
         words = f" restitution = {rng.choice([0, 1, 0.9, rng.random()])}"
-        if self.turns and chance(rng, 0.7):
-            return f"{words} rule = 'normal'{self.grip()}{sliding}"
-        return words + rng.choice(["", " rule = 'velocity'", " rule = 'normal'"])
+        if self.chance(0.5):
+            return words + rng.choice(["", " rule = 'velocity'", " rule = 'normal'"])
+        self.worked = self.worked or bool(sliding)
+        return f"{words} rule = 'normal'{self.grip(least=-0.9)}{sliding}"
 
-    def grip(self, wall: str = "") -> str:
+    def grip(self, wall: str = "", least: float = -1) -> str:
         """Tangential restitution and friction, of disks or of walls."""
-        rng = self.rng
-        beta = rng.choice([-1, 0, 1, rng.uniform(-1, 1)])
+        beta = self.rng.choice([least, 0, 1, self.rng.uniform(least, 1)])
         words = f" {wall}tangential_restitution = {beta}"
-        if beta > -1 and chance(rng, 0.5):
-            words += f" {wall}friction = {rng.choice([0, 0.1, 0.5, 10])}"
+        if beta > -1:
+            words += self.maybe(0.5, f"{wall}friction = {self.rng.choice([0, 0.1, 0.5, 10])}")
         return words
 
     def sides(self) -> list[str]:
         """Laws and motions of the sides of the box."""
         rng, groups = self.rng, []
-        for k, name in enumerate(("left", "right", "bottom", "top")):
-            if self.periodic[k // 2] or chance(rng, 0.7):
+        for k, name in enumerate(SIDES):
+            if self.periodic[k // 2] or self.chance(0.65):
                 continue
             words = self.law()
-            if "temperature" not in words and chance(rng, 0.5):
-                period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
-                words += f" motion = '{rng.choice(['sine', 'parabolic'])}' period = {period!r}"
-                words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"
-                words += f" phase = {rng.choice([0, 0.5, rng.random()])}"
-            elif "temperature" not in words and chance(rng, 0.3):
-                velocity = self.speed * 10.0 ** rng.uniform(-2, 0.5)
-                words += f" motion = 'sawtooth' velocity = {velocity!r}"
+            if "temperature" not in words and "speed" not in words and self.chance(0.6):
+                self.worked = True
+                kind = rng.choice(["sine", "parabolic", "sawtooth"])
+                words += f" motion = '{kind}'"
+                if kind == "sawtooth":
+                    words += f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
+                else:
+                    period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
+                    words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"
+                    words += f" period = {period!r}"
+                    words += self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
             groups.append(f"&side name = '{name}'{words} /")
-        self.worked = bool(groups)
         return groups
+
+    def obstacles(self) -> list[str]:
+        """Circles and straight walls; disks find room among them if they are placed at random."""
+        rng, groups, small = self.rng, [], min(self.edges)
+        if self.sheared:
+            return groups
+        if self.chance(0.2):
+            for _ in range(rng.choice([1, 1, 3, 10])):
+                where = f"centre = {numbers(*self.place(rng.random(), rng.random()))}"
+                radius = rng.uniform(0.01, 0.15) * small
+                groups.append(f"&obstacle {where} radius = {radius!r}{self.law()} /")
+        if self.chance(0.2):
+            for k in range(rng.choice([1, 1, 3, 10])):
+                one, two = (self.place(rng.random(), rng.random()) for _ in "12")
+                if self.chance(0.5):
+                    axis = rng.randint(0, 1)
+                    two[axis] = one[axis]
+                name = self.maybe(0.3, f"name = 'w{k}'")
+                ends = f" from = {numbers(*one)} to = {numbers(*two)}"
+                groups.append(f"&wall{name}{ends}{self.law()} /")
+        if self.chance(0.15) and not any(self.periodic):
+            size = f"centre = {numbers(*self.place(0.5, 0.5))} radius = {0.5 * small!r}"
+            groups.append(f"&obstacle name = 'bowl' side = 'inside' {size}{self.law()} /")
+            self.packing *= small / max(self.edges)
+        if groups:
+            self.packing = min(self.packing, 0.2)
+        return groups
+
+    # --- disks ---
+
+    def region(self) -> tuple[float, float]:
+        """Widths of a part of the box, and its line in `self.where`."""
+        self.where = ""
+        if self.chance(0.9 if self.blocked else 0.7):
+            return tuple(self.edges)
+        parts = [self.rng.choice([1, 0.5, 0.2]) for _ in "xy"]
+        begin = [self.rng.uniform(0, 1 - part) for part in parts]
+        low = self.place(*begin)
+        high = self.place(*(b + p for b, p in zip(begin, parts, strict=True)))
+        high = [min(h, lo + e) for h, lo, e in zip(high, self.lower, self.edges, strict=True)]
+        self.where = f" region = {numbers(low[0], high[0], low[1], high[1])}"
+        return high[0] - low[0], high[1] - low[1]
+
+    def motion(self, count: int) -> str:
+        """How the disks of a species start."""
+        v, rng = self.speed, self.rng
+        words = rng.choice(
+            [
+                f" temperature = {v * v!r}",
+                f" velocities = 'uniform' speed = {v!r}",
+                f" speed = {v!r}",
+                f" velocity = {numbers(v, 0)}",
+                f" velocity = {numbers(v, v)}",
+                f" velocity = {numbers(*(v * rng.uniform(-1, 1) for _ in range(2 * count)))}"
+                if count < 50
+                else f" velocity = {numbers(0, -v)}",
+                " velocities = 'rest'",
+            ]
+        )
+        if words.split()[0] in ("temperature", "velocities", "speed") and "rest" not in words:
+            words += self.maybe(0.2 if count > 2 else 0, f"exact_temperature = {v**2!r}")
+        if self.turns and self.chance(0.4):
+            rate = v / min(self.edges) * 10.0 ** rng.uniform(-1, 2)
+            spins = [f" angular_velocity = {rate!r}", f" rotational_temperature = {v * v!r}"]
+            words += rng.choice(spins)
+        return words
+
+    def species(self, blocked: bool) -> list[str]:
+        """One to three kinds of disks, or one in a file; placed at random among obstacles."""
+        rng, groups, self.blocked = self.rng, [], blocked
+        if not blocked and self.chance(0.2):
+            return [rng.choice([self.from_file, self.from_file, self.by_position])()]
+        for k in range(rng.choice([1, 1, 1, 2, 3])):
+            count = self.disks if k == 0 else rng.randint(1, max(self.disks // 3, 1))
+            wide, high = self.region()
+            share = self.packing / (1 if k == 0 else 6)
+            radius = math.sqrt(share * wide * high / (count * math.pi))
+            radius = min(radius, 0.24 * min(wide, high)) * rng.choice([1, 1, rng.uniform(0.05, 1)])
+            mass = 10.0 ** rng.choice([0, 0, 0, rng.randint(-4, 4)])
+            placement = f" placement = '{self.placement(k)}'"
+            if "'grid'" in placement:
+                columns = max(round(math.sqrt(count * wide / high)), 1)
+                rows, radius = max(count // columns, 1), radius / 2
+                count, placement = columns * rows, f" grid = {columns}, {rows}"
+                radius = min(radius, 0.4 * min(wide / columns, high / rows))
+            size = f"radius = {radius!r} mass = {mass!r}"
+            if k == 0 and "grid" not in placement and self.chance(0.1):
+                share = count * math.pi * radius**2 / (wide * high)
+                size = f"packing_fraction = {share!r} mass = {mass!r}"
+            elif k > 0 and self.chance(0.3):
+                size = f"relative_to = 's0' radius = {rng.uniform(0.1, 1)!r} mass = {mass!r}"
+            groups.append(
+                f"&species name = 's{k}' count = {count} {size}"
+                f"{placement}{self.where}{self.motion(count)} /"
+            )
+        self.kinds = len(groups)
+        return groups
+
+    def placement(self, k: int) -> str:
+        if self.blocked or k > 0:
+            return "random"
+        few = ["dense", "dense"] if self.disks <= 400 else []
+        return self.rng.choice(["random", "random", "lattice", "grid", *few])
+
+    def by_position(self) -> str:
+        """A few disks one by one in a row, up to close to contact."""
+        self.disks = count = self.rng.randint(3, 8)
+        x = [self.place((k + 0.5) / count, self.rng.choice([0.5, 0.52])) for k in range(count)]
+        radius = 0.5 * min(self.edges[0] / count, 0.9 * self.edges[1])
+        radius *= self.rng.choice([0.99, 0.5, 0.1])
+        words = f"radius = {radius!r} position = {numbers(*np.ravel(x))}{self.motion(count)}"
+        return f"&species name = 's0' {words} /"
+
+    def from_file(self) -> str:
+        """A species in a file: a square lattice, each disk with its own size and velocity."""
+        rng = self.rng
+        columns = max(round(math.sqrt(self.disks * self.edges[0] / self.edges[1])), 1)
+        rows = max(self.disks // columns, 1)
+        self.disks = columns * rows
+        cell = min(self.edges[0] / columns, self.edges[1] / rows)
+        own = np.random.default_rng(rng.randint(0, 10**6))
+        k = np.arange(self.disks)
+        table = np.empty((self.disks, 8))
+        table[:, 0] = self.lower[0] + (k % columns + 0.5) * self.edges[0] / columns
+        table[:, 1] = self.lower[1] + (k // columns + 0.5) * self.edges[1] / rows
+        if self.chance(0.3):
+            table[:, 2:6] = [0, 0, 0.2 * cell, 1]
+            table[:, 2] = own.choice([-1, 0, 1], self.disks) * self.speed
+        else:
+            table[:, 2:4] = own.normal(0, self.speed, (self.disks, 2))
+            table[:, 4] = own.uniform(0.05, 0.45, self.disks) * cell
+            table[:, 5] = own.uniform(0.5, 2, self.disks)
+        table[:, 6] = own.normal(0, self.speed / cell, self.disks)
+        table[:, 7] = own.uniform(-9, 9, self.disks)
+        names = ["x", "y", "vx", "vy", "radius", "mass"]
+        names += ["omega", "angle"] if self.turns else []
+        self.start = [" ".join(names), *(numbers(*row) for row in table[:, : len(names)].tolist())]
+        return "&species name = 's0' file = 'start.txt' /"
+
+    # --- what they do ---
 
     def contact(self) -> str:
         rng = self.rng
-        words = "&contact"
         restitution = rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()])
-        words += f" restitution = {restitution}"
-        if self.kinds > 1 and chance(rng, 0.4):
-            table = [
-                [rng.choice([0, 1, 0.9, rng.random()]) for _ in range(self.kinds)]
-                for _ in range(self.kinds)
-            ]
-            pairs = [
-                table[min(a, b)][max(a, b)] for a in range(self.kinds) for b in range(self.kinds)
-            ]
+        words = f"&contact restitution = {restitution}"
+        if self.kinds > 1 and self.chance(0.4):
+            table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(3)] for _ in range(3)]
+            kinds = range(self.kinds)
+            pairs = [table[min(a, b)][max(a, b)] for a in kinds for b in kinds]
             words += f" pair_restitution = {numbers(*pairs)}"
-        if chance(rng, 0.5):
-            words += f" wall_restitution = {rng.choice([0, 1, 0.9, rng.random()])}"
-        if chance(rng, 0.5) or self.turns:
+        words += self.maybe(0.5, f"wall_restitution = {rng.choice([0, 1, 0.9, rng.random()])}")
+        if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
         if self.turns:
             words += self.grip() + rng.choice(["", self.grip("wall_")])
-            if chance(rng, 0.3):
-                words += f" inertia = {rng.choice([1, 0.01, rng.uniform(0.1, 1)])}"
-        if chance(rng, 0.6 if restitution < 1 else 0.1):
+            words += self.maybe(0.4, f"inertia = {rng.choice([1, 0.01, rng.uniform(0.1, 1)])}")
+        if self.chance(0.6 if restitution < 1 else 0.1):
             size = math.sqrt(math.prod(self.edges) / self.disks)
             words += f" contact_time = {size / self.speed * 10.0 ** -rng.randint(1, 5)!r}"
         return words + " /"
 
     def drive(self) -> str:
         """Kicks, from many in a free flight to one in many."""
-        rng = self.rng
-        self.driven = chance(rng, 0.25)
         if not self.driven:
             return ""
+        rng = self.rng
         flight = math.sqrt(math.prod(self.edges) / self.disks) / self.speed
         interval = flight * 10.0 ** rng.uniform(-1, 2)
         energy = self.speed**2 * 10.0 ** rng.uniform(-2, 1)
-        keep = rng.choice(["", " keep_momentum = .true."])
+        turn = self.maybe(0.7, f"rotational_diffusion = {rng.choice([0.1, 10]) / flight!r}")
         words = rng.choice(
             [
-                f"kind = 'noise' strength = {energy / flight!r}{keep}",
+                f"kind = 'noise' strength = {energy / flight!r}"
+                + self.maybe(0.7, "keep_momentum = .true."),
                 f"kind = 'andersen' temperature = {energy!r}"
                 f" fraction = {rng.choice([1, 0.1, 1e-3])}",
                 f"kind = 'brownian' temperature = {energy!r}",
-                f"kind = 'active' temperature = {energy!r} speed = {self.speed!r}"
-                f" rotational_diffusion = {rng.choice([0, 0.1, 10]) / flight!r}",
+                f"kind = 'active' temperature = {energy!r} speed = {self.speed!r}{turn}",
             ]
         )
-        if chance(rng, 0.3):
-            words += " species = 's0'"
+        words += self.maybe(0.3, "species = 's0'")
         return f"&drive interval = {interval!r} {words} /"
 
     def stop(self) -> str:
         rng = self.rng
-        self.events = rng.randint(1, MOST_EVENTS)
+        self.events = rng.randint(1, MOST_EVENTS if self.disks > 2500 else MOST_OF_FEW)
         words = f"&stop events = {self.events}"
-        if chance(rng, 0.3):
-            words += f" collisions = {rng.randint(1, self.events)}"
-        if chance(rng, 0.2):
-            words += f" collisions_per_disk = {rng.uniform(0, 2) * self.events / self.disks!r}"
-        if chance(rng, 0.2) and not (self.driven or self.sheared or self.worked):
-            words += f" energy_fraction = {rng.uniform(0.05, 0.95)!r}"
-        if chance(rng, 0.3) or self.steps or self.driven:
+        words += self.maybe(0.3, f"collisions = {rng.randint(1, self.events)}")
+        rate = rng.uniform(0, 2) * self.events / self.disks
+        words += self.maybe(0.2, f"collisions_per_disk = {rate!r}")
+        if not (self.driven or self.sheared or self.worked):
+            words += self.maybe(0.3, f"energy_fraction = {rng.uniform(0.05, 0.95)!r}")
+        if self.chance(0.3) or self.steps or self.driven or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
         return words + " /"
 
     def output(self) -> str:
-        rng, words = self.rng, "&output"
-        every = max(self.events // rng.randint(2, 40), 1)
-        if self.disks > 1000:
-            every = max(every, self.events // 5, 1)
+        rng = self.rng
+        words = "&output" + self.maybe(0.4, "event_log = .true.")
+        words += self.maybe(0.2, "precision = 'single'") + self.maybe(0.3, "virial_tensor = .true.")
+        words += self.maybe(0.1, "checkpoint_every = 1e-3")
         for track in "frames", "observables":
-            kinds = ["time", "collisions", "events", "collisions_per_disk"]
-            for kind in rng.sample(kinds, rng.choice([0, 1, 1, 1])):
-                step = every
-                if kind == "time":
-                    step = rng.uniform(0.02, 0.3) * min(self.edges) / self.speed
-                elif kind == "collisions_per_disk":
-                    step = 2 * every / self.disks * rng.uniform(0.7, 1.4)
-                words += f" {track}_every_{kind} = {step!r}"
-        if chance(rng, 0.4):
-            words += " event_log = .true."
-        if chance(rng, 0.2):
-            words += " precision = 'single'"
-        if chance(rng, 0.3):
-            words += " virial_tensor = .true."
-        if chance(rng, 0.1):
-            words += " checkpoint_every = 1e-3"
+            for kind in rng.sample(CADENCES, rng.choice([0, 1, 1, 1])):
+                words += f" {track}_every_{kind} = {self.cadence(kind)!r}"
         return words + " /"
+
+    def cadence(self, kind: str) -> float:
+        """How often a track has a sample."""
+        every = max(self.events // self.rng.randint(2, 5 if self.disks > 1000 else 40), 1)
+        if kind == "time":
+            return self.rng.uniform(0.02, 0.3) * min(self.edges) / self.speed
+        if kind == "collisions_per_disk":
+            return 2 * every / self.disks * self.rng.uniform(0.7, 1.4)
+        return every
 
 
 def random_system(rng: random.Random) -> System:
     """A system that may be refused, break off, or run."""
     draw = Draw(rng)
-    box = draw.box()
-    disks = draw.species()
-    parts = [draw.run(), box, *draw.sides(), *draw.obstacles(), *disks]
-    parts += [draw.contact(), draw.drive()]
+    walls = draw.sides()
+    obstacles = draw.obstacles()
+    disks = draw.species(bool(obstacles))
+    parts = [draw.run(), draw.box(), *walls, *obstacles, *disks, draw.contact(), draw.drive()]
     parts += [draw.stop(), draw.output()]
     return System("\n".join(parts) + "\n", "\n".join(draw.start), draw.disks, draw.events)

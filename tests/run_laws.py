@@ -1,0 +1,202 @@
+"""Laws that hold for every run, whatever its input: judged from all that its file says.
+
+`found` is what `whole_runs.contents` gives. Each law says how far a run is from it, in parts of
+what rounding leaves: below 1 it holds.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+BALANCE = 1e-12  #: of the energy, what was lost, and what was given
+MOMENTUM = 1e-12  #: of the sum over all disks of m |v|
+GAP = 1e-9  #: of the contact distance
+PLACE = 1e-12  #: of the largest coordinate, to which places are known
+SIDES = ("left", "right", "bottom", "top")
+
+Found = dict[str, np.ndarray]
+
+
+def laws_broken(found: Found) -> Iterator[str]:
+    """Each law that does not hold, with by how much."""
+    laws = {
+        "energy": imbalance(found) / BALANCE,
+        "momentum": momentum_drift(found) / MOMENTUM,
+        "disks and walls apart": depth(found),
+        "log": log_error(found),
+        "observables": observable_error(found),
+    }
+    for law, part in laws.items():
+        if not part < 1:
+            yield f"{law}: {part:g} times what is allowed"
+
+
+def series(found: Found, name: str) -> np.ndarray:
+    """All samples of an observable; none if there is no such thing."""
+    return found.get(f"/observables/{name}/value", np.empty(0))
+
+
+def of_box(found: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lower corner, edges, and which axes are periodic."""
+    box = "/particles/disks/box"
+    return found[f"{box}/lower"], found[f"{box}/edges"], found[f"{box}@boundary"] == b"periodic"
+
+
+def imbalance(found: Found) -> float:
+    """How far the energy is from what was given and lost, in parts of the greatest of them.
+
+    What cancels counts in full: kinetic and potential energy, kicks of noise whose momentum is
+    taken back, and the kT that a thermal wall gives at one hit and may take back at the next.
+    """
+    signs = {"total_energy": 1, "dissipated_energy": 1, "heat": -1, "work": -1, "drive_energy": -1}
+    terms = {name: series(found, name) for name in signs if f"/observables/{name}/value" in found}
+    balance = sum(signs[name] * values for name, values in terms.items())
+    mass = found["/particles/disks/mass"]
+    kick = [found.get(f"/parameters/drive@{name}", 0) for name in ("strength", "interval")]
+    bath = ("@temperature", "parameters/wall/temperature", "parameters/obstacle/temperature")
+    kinetic = len(mass) * series(found, "all/kinetic_energy")  # a mean in the file
+    parts = [kinetic, terms["total_energy"] - kinetic, *terms.values()]
+    parts += [mass.max() * np.prod(kick), *(x for name, x in found.items() if name.endswith(bath))]
+    most = max(np.nanmax(np.abs(part), initial=0) for part in parts)
+    return np.ptp(balance) / most if most else 0.0
+
+
+def momentum_drift(found: Found) -> float:
+    """Largest change of a component of the momentum over the sum of m |v|, where it is kept."""
+    drive = found["/parameters/drive@kind"] != b"none"
+    kept = of_box(found)[2].all() and not found.get("/parameters/box@shear_rate")
+    if not kept or "/parameters/wall/from" in found or "/parameters/obstacle/centre" in found:
+        return 0.0
+    if drive and not found.get("/parameters/drive@keep_momentum"):
+        return 0.0
+    mass, speed = found["/particles/disks/mass"], series(found, "all/mean_speed")
+    scale = mass.max() * len(mass) * speed.max()
+    return np.ptp(series(found, "momentum"), axis=0).max() / scale if scale else 0.0
+
+
+# --- places ---
+
+
+def depth(found: Found) -> float:
+    """How deep disks lie in each other and in walls in any frame; 0 where steps let them."""
+    if found["/parameters/run@dynamics"] == b"steps":
+        return 0.0
+    places = found["/particles/disks/position/value"]
+    lower, edges, _ = of_box(found)
+    known = (PLACE if places.dtype == np.float64 else 1e-6) * np.max(np.abs([lower, lower + edges]))
+    deepest = 0.0
+    for time, place in zip(found["/particles/disks/position/time"], places, strict=True):
+        for gap, width in (*pair_gaps(found, time, place), *wall_gaps(found, time, place)):
+            deepest = max(deepest, np.max(-gap / (GAP * width + known), initial=0))
+    return deepest
+
+
+def pair_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
+    """Gaps of close pairs, each found from its larger disk, and their contact distances."""
+    lower, edges, periodic = of_box(found)
+    radius = found["/particles/disks/radius"]
+    rows = [(0.0, 0.0)]
+    if periodic[1]:
+        slide = found.get("/parameters/box@shear_rate", 0) * edges[1] * time
+        rows = [(k * slide, k * edges[1]) for k in (-1, 0, 1)]
+    images = np.concatenate([place - lower + row for row in rows])
+    whose = np.tile(np.arange(len(place)), len(rows))
+    if periodic[0]:
+        images[:, 0] %= edges[0]
+        images[images[:, 0] >= edges[0], 0] = 0
+    tree = cKDTree(images, boxsize=[edges[0] if periodic[0] else 0, 0])
+    near = tree.query_ball_point(place - lower, 2 * radius * (1 + GAP))
+    one = np.repeat(np.arange(len(place)), [len(found) for found in near])
+    other = np.concatenate(near).astype(int)
+    pairs = one != whose[other]
+    one, other = one[pairs], other[pairs]
+    apart = images[other] - (place - lower)[one]
+    if periodic[0]:
+        apart[:, 0] -= edges[0] * np.round(apart[:, 0] / edges[0])
+    contact = radius[one] + radius[whose[other]]
+    yield np.hypot(*apart.T) - contact, contact
+
+
+def wall_gaps(found: Found, time: float, place: np.ndarray) -> Iterator[tuple]:
+    """Gaps of all disks to each wall, and their radii."""
+    lower, edges, periodic = of_box(found)
+    radius = found["/particles/disks/radius"]
+    for k, name in enumerate(SIDES):
+        if not periodic[k // 2]:
+            inwards = place[:, k // 2] - lower[k // 2]
+            if k % 2:
+                inwards = edges[k // 2] - inwards
+            yield inwards - shift_of(found, name, time) - radius, radius
+    images = [np.array([x, y]) * edges for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    images = [image for image in images if not image[~periodic].any()]
+    circles, walls = (
+        [found.get(f"/parameters/{kind}/{name}", ()) for name in names]
+        for kind, names in (("obstacle", ("centre", "radius", "inside")), ("wall", ("from", "to")))
+    )
+    for image in images:
+        for centre, size, inside in zip(*circles, strict=True):
+            away = np.linalg.norm(place - centre - image, axis=1) - size
+            yield (-away if inside else away) - radius, radius
+        for begin, end in zip(*walls, strict=True):
+            along, start = end - begin, place - begin - image
+            part = np.clip(start @ along / (along @ along), 0, 1)
+            yield np.linalg.norm(start - part[:, None] * along, axis=1) - radius, radius
+
+
+def shift_of(found: Found, side: str, time: float) -> float:
+    """How far a side is inwards of its place."""
+    kind, amplitude, period, phase = (
+        found.get(f"/parameters/side/{side}@{name}", 0)
+        for name in ("motion", "amplitude", "period", "phase")
+    )
+    if kind == b"sine":
+        return amplitude * np.sin(2 * np.pi * (time / period + phase))
+    if kind == b"parabolic":
+        s = (time / period + phase) % 1
+        return amplitude * (16 * s * (0.5 - s) if s < 0.5 else 16 * (s - 0.5) * (s - 1))
+    return 0.0
+
+
+# --- what is written twice ---
+
+
+def log_error(found: Found) -> float:
+    """How far the log is from the sums of the observables: counts, and what each wall got."""
+    if "/events/j" not in found:
+        return 0.0
+    j = found["/events/j"]
+    walls = [(-k, f"sides/{name}") for k, name in enumerate(SIDES)]
+    names = [*found.get("/parameters/obstacle/name", ()), *found.get("/parameters/wall/name", ())]
+    walls += [(-4 - k, f"walls/{name.decode()}") for k, name in enumerate(names)]
+    change = found.get("/events/momentum_change")
+    wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
+    wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
+    for code, name in walls:
+        count, last = series(found, f"{name}/collisions"), series(found, f"{name}/impulse")
+        if len(count):
+            wrong.append(np.sum(j == code) - count[-1])
+            if change is not None:
+                mine = change[j == code]
+                scale = 1e-12 * np.abs(mine).sum() + 1e-300
+                wrong += list((mine.sum(axis=0) + last[-1]) / scale)
+    return max(np.abs(wrong))
+
+
+def observable_error(found: Found) -> float:
+    """How far the observables of the last state are from what its frame says."""
+    v, mass = found["/particles/disks/velocity/value"][-1], found["/particles/disks/mass"]
+    if v.dtype != np.float64:
+        return 0.0
+    speed = np.hypot(*v.T)
+    pairs = [
+        (series(found, "all/kinetic_energy")[-1], mass * speed**2 / 2 / len(mass)),
+        (series(found, "all/mean_speed")[-1], speed / len(mass)),
+        *zip(series(found, "momentum")[-1], (mass[:, None] * v).T, strict=True),
+    ]
+    if "/particles/disks/angular_velocity/value" in found:
+        spin = found["/particles/disks/angular_velocity/value"][-1]
+        square = mass * found["/particles/disks/radius"] ** 2 * spin**2
+        energy = found["/parameters/contact@inertia"] * square / 2 / len(mass)
+        pairs.append((series(found, "all/rotational_energy")[-1], energy))
+    return max(abs(told - one.sum()) / (1e-12 * np.abs(one).sum() + 1e-300) for told, one in pairs)

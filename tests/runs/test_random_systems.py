@@ -1,0 +1,269 @@
+"""Random systems, each run in many ways: the same bits by all of them, and the laws of every run.
+
+Each runs plainly; on several threads; with another search and queue; in parts, that end by the
+clock, by TERM and by kill -9, each resumed in another way; to an earlier end, from which it is
+continued; and with other samples. All must end alike: with the same exit code, the same message
+and the same bytes; and what the plain run has written obeys `run_laws`.
+
+`SYSTEMS=200 SEED=20270131` takes other systems and more of them, as `make check` does each day.
+"""
+
+import itertools
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+import pytest
+
+from random_systems import CADENCES, System, random_system
+from run_laws import laws_broken
+from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED, contents, unlike, within
+
+SEEDS = [f"{os.environ.get('SEED', '1')} {k}" for k in range(int(os.environ.get("SYSTEMS", "60")))]
+SECONDS = 200  # of processor time: only something endless takes them
+PARTS = 5
+BYTES = 4_000_000_000
+LATEST = 1e100  # that an input can name
+KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
+NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
+#: What does not belong to the results: what says how they were computed.
+ASIDE = re.compile(r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every)$")
+
+
+class End(NamedTuple):
+    """Exit code and last message of a run; its processor time was over if it was `endless`."""
+
+    code: int
+    message: str
+
+
+class Case:
+    """One system in a folder of its own."""
+
+    def __init__(self, program: Path, folder: Path, seed: str):
+        """Draws until a system is not refused, and writes its input."""
+        self.program, self.folder, self.rng = program, folder, random.Random(seed)
+        self.system = accepted(program, folder, self.rng)
+
+    def begin(self, name: str, *options: str) -> subprocess.Popen:
+        command = [*within(SECONDS), f"--as={BYTES}", self.program, "case.nml", "-o", f"{name}.h5"]
+        pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
+        return subprocess.Popen([*command, "--quiet", *options], cwd=self.folder, **pipes)
+
+    def whole(self, name: str, *options: str) -> End:
+        return end_of(self.begin(name, *options))
+
+    def result(self, name: str) -> Path:
+        """What a run left: its finished file, or that of one that broke off."""
+        path = self.folder / f"{name}.h5"
+        return path if path.exists() else Path(f"{path}.part")
+
+    def way(self) -> list[str]:
+        """Random options that must not change a bit."""
+        searches = ["pairs"] if self.system.disks <= 300 else []
+        searches += ["rescan"] if self.system.disks <= 40 else []
+        search = f"--set=run.search={self.rng.choice(['cells', 'cells', *searches])}"
+        if "'steps'" in self.system.text:
+            return [search]
+        queue = f"--set=run.queue={self.rng.choice(['calendar', 'heap'])}"
+        return [search, queue, f"--set=run.threads={self.rng.choice([1, 2, 2, 3, 8])}"]
+
+    def on_threads(self, name: str, _seconds: float) -> End:
+        threads = f"--set=run.threads={self.rng.choice([2, 2, 3, 4, 6])}"
+        return self.whole(name, *([] if "'steps'" in self.system.text else [threads]))
+
+    def another_way(self, name: str, _seconds: float) -> End:
+        return self.whole(name, *self.way())
+
+    def in_parts(self, name: str, seconds: float) -> End:
+        """Stopped at its first look at the clock, then by signals at random moments."""
+        end, options = End(STOPPED, ""), ["--set=output.checkpoint_every=1e-3"]
+        for part in range(PARTS):
+            first = ["--set=stop.wall_clock=1e-9"] if part == 0 else ["--resume"]
+            process = self.begin(name, *self.way(), *options, *first)
+            if 0 < part < PARTS - 1:
+                time.sleep(self.rng.uniform(0, 1.2) * seconds)
+                process.send_signal(self.rng.choice([signal.SIGTERM, signal.SIGKILL]))
+            before, end = end, end_of(process)
+            if end.code not in KILLED or (self.folder / f"{name}.h5").exists():
+                break
+        if before.code == -signal.SIGKILL and "broke off" in end.message:
+            return end_of(self.begin(name, "--force"))  # killed when it had said so
+        return End(FINISHED, "") if end.code == -signal.SIGKILL else end
+
+    def continued(self, name: str, _seconds: float) -> End:
+        """Lets a run end early, and continues it."""
+        with h5py.File(self.result("plain")) as file:
+            last = float(file["particles/disks/position/time"][-1])
+        early = f"--set=stop.time={min(self.rng.uniform(0, 0.99) * last, LATEST)!r}"
+        end = self.whole(name, *self.way(), *([early] if last > 0 else []))
+        return self.whole(name, *self.way(), "--resume") if last > 0 and not end.code else end
+
+    def with_other_samples(self, name: str, _seconds: float) -> End:
+        tracks = ("frames_every", "observables_every")
+        names = [f"{track}_{kind}" for track in tracks for kind in CADENCES]
+        words = [f"{name}=" for name in names if name in self.system.text]
+        for track in tracks:
+            words.append(f"{track}_events={self.system.events // self.rng.randint(3, 20) + 1}")
+        return self.whole(name, *self.way(), *(f"--set=output.{word}" for word in words))
+
+
+def end_of(process: subprocess.Popen) -> End:
+    """How a process ends."""
+    try:
+        lines = process.communicate(timeout=PATIENCE)[1].splitlines()
+    except subprocess.TimeoutExpired:
+        process.kill()
+        lines = ["endless"]
+    lines = [line for line in lines if not line.startswith(NOT_THE_END)]
+    return End(process.returncode, lines[-1] if lines else "")
+
+
+def accepted(program: Path, folder: Path, rng: random.Random) -> System:
+    """The first system that the program does not refuse, with its files."""
+    for _ in range(20):
+        system = random_system(rng)
+        (folder / "start.txt").write_text(system.start + "\n")
+        (folder / "case.nml").write_text(system.text)
+        command = [*within(5), program, "case.nml", "--check"]
+        if subprocess.run(command, cwd=folder, capture_output=True).returncode == FINISHED:
+            return system
+    pytest.fail("20 systems were refused one after the other")
+
+
+def last_samples(found: dict) -> dict:
+    """All that the last samples say, but not how many came before."""
+    return {
+        name: value[-1:]
+        for name, value in found.items()
+        if name.startswith(("/particles", "/observables")) and name.endswith("/value")
+    }
+
+
+def faults(program: Path, folder: Path, seed: str) -> str:
+    """What is wrong with a random system; empty if nothing is."""
+    case = Case(program, folder, seed)
+    began = time.monotonic()
+    plain = case.whole("plain")
+    seconds = time.monotonic() - began
+    if plain.code not in (FINISHED, BROKEN):
+        return f"failed: {plain}"
+    found = contents(case.result("plain"))
+    said = [f"breaks a law: {law}" for law in laws_broken(found)]
+    ways = [case.on_threads, case.another_way, case.in_parts, case.with_other_samples]
+    if plain.code == FINISHED:
+        ways.append(case.continued)
+    for way in ways:
+        name = way.__name__
+        end = way(name, seconds)
+        if (end.code, end.message.replace(f"{name}.h5", "plain.h5")) != plain:
+            said.append(f"ends otherwise: {name} {end}, plain {plain}")
+            continue
+        own, other = found, contents(case.result(name))
+        if way == case.with_other_samples:
+            own, other = last_samples(own), last_samples(other)
+        different = [name for name in unlike(own, other) if not ASIDE.match(name)]
+        if different:
+            said.append(f"differs: {name}, {len(different)} {different[:6]}")
+    return "\n".join([*said, case.system.text]) if said else ""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_all_ways_end_alike_and_the_laws_hold(program, tmp_path, seed):
+    assert not (said := faults(program, tmp_path, seed)), said
+
+
+# --- what the harness itself promises ---
+
+#: Variables that say how a run is done, or need another run.
+NOT_DRAWN = {"run.title", "run.search", "run.queue", "run.threads", "stop.wall_clock"}
+NOT_DRAWN |= {"species.scale_positions"}
+#: Features that are refused together, or of which a system has only one.
+APART = [
+    ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
+    (r"stop\.energy", r"drive|box\.shear|(side|wall|obstacle)\.(temp|speed)|side\.[mapv]"),
+    (r"obstacle|wall\.", r"species\.(file|position|grid|placement = (lattice|dense))"),
+    (r"species\.(file|position)", r"species|contact\.pair|many"),
+    (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
+    ("drive", "drive"),
+    (r"obstacle\.(name|side)|wall (x|y)", "periodic"),
+    ("output.frames_every", "output.frames_every"),
+    ("output.observables_every", "output.observables_every"),
+]
+
+
+def test_the_systems_draw_every_variable(program, tmp_path):
+    """If chance leaves one out, another SEED has it."""
+    done = subprocess.run([program, "--print-variables"], capture_output=True, check=True)
+    table = json.loads(done.stdout)
+    known = {f"{group}.{name}" for group in table for name in table[group]}
+    rngs = (random.Random(seed) for seed in SEEDS)
+    drawn = set().union(*(accepted(program, tmp_path, rng).features() for rng in rngs))
+    assert known - NOT_DRAWN - drawn == set()
+
+
+def test_many_systems_draw_every_pair_of_features_that_goes_together():
+    pairs, features = set(), set()
+    for seed in range(4000):
+        drawn = sorted(random_system(random.Random(seed)).features())
+        features.update(drawn)
+        pairs.update(itertools.combinations(drawn, 2))
+    never = set(itertools.combinations(sorted(features), 2)) - pairs
+    apart = {
+        (one, other)
+        for one, other in never
+        for a, b in APART
+        if (re.match(a, one) and re.match(b, other)) or (re.match(a, other) and re.match(b, one))
+    }
+    assert never == apart
+
+
+@pytest.mark.parametrize("when", ["queue=heap", "resume", "threads=2", "output.frames"])
+def test_a_program_whose_result_depends_on_the_way_is_found_out(program, tmp_path, when):
+    liar = tmp_path / "liar"
+    liar.write_text(
+        f"""#!/bin/sh
+case "$*" in *{when}*) exec {program} "$@" --set stop.events=3 ;; esac
+exec {program} "$@"
+"""
+    )
+    liar.chmod(0o755)
+    for k in range(20):
+        (tmp_path / f"{k}").mkdir()
+        if said := faults(liar, tmp_path / f"{k}", f"1 {k}"):
+            break
+    assert "&species" in said
+
+
+@pytest.mark.parametrize(
+    ("law", "name", "change"),
+    [
+        ("energy", "/observables/dissipated_energy/value", lambda x: 1.000001 * x),
+        ("momentum", "/observables/momentum/value", lambda x: np.array([[0, 0], [1, 0]])),
+        ("disks and walls apart", "/particles/disks/position/value", lambda x: x.round(1)),
+        ("disks and walls apart", "/parameters/box@shear_rate", lambda x: -x),
+        ("log", "/events/j", lambda x: -x),
+        ("log", "/events/time", lambda x: x[::-1]),
+        ("observables", "/particles/disks/velocity/value", lambda x: 1.000001 * x),
+    ],
+)
+def test_a_file_that_breaks_a_law_is_found_out(ricochet, tmp_path, law, name, change):
+    rate = 0.0 if law == "momentum" else 0.7
+    (tmp_path / "gas.nml").write_text(
+        f"""&box upper = 3, 2 boundary = 'periodic', 'periodic' shear_rate = {rate} /
+        &species count = 60 radius = 0.12 temperature = 1 / &contact restitution = 0.9 /
+        &stop events = 300 / &output event_log = .true. frames_every_events = 50 /"""
+    )
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    found = contents(tmp_path / "gas.h5")
+    assert list(laws_broken(found)) == []
+    said = list(laws_broken(found | {name: change(found[name])}))
+    assert law in [line.split(":")[0] for line in said]
