@@ -149,13 +149,14 @@ contains
     call h5pclose_f(creation, closed)
     if (status >= 0) call h5dget_space_f(dataset, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
-    if (status >= 0) call h5sget_simple_extent_npoints_f(space, n, status)
+    call h5sget_simple_extent_npoints_f(space, n, closed)
+    if (closed < 0) n = 0                          ! of none it says, as of their bytes, that it fails
     if (status >= 0) call h5sget_simple_extent_dims_f(space, shape, most, status)
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
     if (status >= 0) call h5tget_size_f(type, bytes, status)
     stored = 0
-    if (status >= 0 .and. n > 0) call h5dget_storage_size_f(dataset, stored, status)      ! without values it fails
+    if (status >= 0 .and. n > 0) call h5dget_storage_size_f(dataset, stored, status)
     if (status >= 0 .and. layout /= h5d_chunked_f .and. stored /= n*int(bytes, hsize_t)) status = -1
     if (present(like)) then
       if (status >= 0) call h5tget_class_f(type, kinds(1), status)
