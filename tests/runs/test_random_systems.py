@@ -30,12 +30,14 @@ from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED, contents, unlike, wi
 SEEDS = [f"{os.environ.get('SEED', '1')} {k}" for k in range(int(os.environ.get("SYSTEMS", "60")))]
 SECONDS = 200  # of processor time: only something endless takes them
 PARTS = 5
-BYTES = 4_000_000_000
+BYTES = os.environ.get("BYTES", "4000000000")  # of address space
 LATEST = 1e100  # that an input can name
 KILLED = (STOPPED, -signal.SIGTERM, -signal.SIGKILL)
 NOT_THE_END = ("warning:", "note:", "stopped; the run is finished")
 #: What does not belong to the results: what says how they were computed.
-ASIDE = re.compile(r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every)$")
+ASIDE = re.compile(
+    r"^/parameters(/run@(search|queue)|/overrides|/output@checkpoint_every|/stop@wall_clock)$"
+)
 
 
 class End(NamedTuple):

@@ -35,6 +35,6 @@ expect() {
 expect 66 'mod(i*k, 7) + 1'
 expect 0 'mod(i + k, 100) + 1'
 watched "$build/unit_tests"
-RICOCHET=$build/ricochet watched .venv/bin/python -m pytest -q tests/runs/test_threads.py -m 'check or not check' \
-  -k 'change_no_bit or goes_on or every_input'
+BYTES=unlimited SYSTEMS=20 RICOCHET=$build/ricochet watched .venv/bin/python -m pytest -q \
+  tests/runs/test_random_systems.py -k all_ways
 echo 'races: none found'
