@@ -107,7 +107,7 @@ contains
     end associate
   end function reals_of
 
-  !> The first value of a variable of kind "real".
+  !> The first value of a variable of kind "real" or "integer".
   pure function real_of(self, name, otherwise) result(number)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -116,7 +116,11 @@ contains
 
     number = otherwise
     associate (slot => self%values(row_of(self%name, name)))
-      if (allocated(slot%reals)) number = slot%reals(1)
+      if (allocated(slot%reals)) then
+        number = slot%reals(1)
+      else if (slot%is_set()) then
+        read (slot%texts(1), *) number
+      end if
     end associate
   end function real_of
 

@@ -9,7 +9,7 @@ module input_settings
   use input_problems, only: problem_list_t
   use input_species, only: take_species
   use input_surfaces, only: take_grip, take_obstacles, take_wall_laws
-  use settings, only: settings_t
+  use settings, only: sampled_by, settings_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
   use variables, only: obstacle_groups, row_of, variables_of, words_of
   implicit none
@@ -164,16 +164,11 @@ contains
     !> What is written, and when.
     subroutine take_output(group)
       type(group_t), intent(in) :: group
+      integer :: k
 
       associate (output => settings%output)
-        output%frames_every_time = group%real_of("frames_every_time", never)
-        output%frames_every_collisions = group%integer_of("frames_every_collisions", unlimited)
-        output%frames_every_events = group%integer_of("frames_every_events", unlimited)
-        output%frames_every_collisions_per_disk = group%real_of("frames_every_collisions_per_disk", never)
-        output%observables_every_time = group%real_of("observables_every_time", never)
-        output%observables_every_collisions = group%integer_of("observables_every_collisions", unlimited)
-        output%observables_every_events = group%integer_of("observables_every_events", unlimited)
-        output%observables_every_collisions_per_disk = group%real_of("observables_every_collisions_per_disk", never)
+        output%frames_every = [(group%real_of("frames_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
+        output%observables_every = [(group%real_of("observables_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
         output%single_precision = group%text_of("precision") == "single"
         output%event_log = group%text_of("event_log") == ".true."
         output%virial_tensor = group%text_of("virial_tensor") == ".true."

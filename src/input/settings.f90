@@ -58,16 +58,13 @@ module settings
     real(real64) :: rotational_temperature = -1.0_real64  !! mean of I omega**2, instead; negative: not given [energy]
   end type species_settings_t
 
-  !> A cadence that is not set is `never` (time, wall clock) or `huge` (counts).
+  !> What the intervals of samples are of, in the names of variables.
+  character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
+    "collisions_per_disk"]
+
+  !> An interval that is not set is `never`.
   type :: output_settings_t
-    real(real64) :: frames_every_time
-    integer(int64) :: frames_every_collisions
-    integer(int64) :: frames_every_events
-    real(real64) :: frames_every_collisions_per_disk
-    real(real64) :: observables_every_time
-    integer(int64) :: observables_every_collisions
-    integer(int64) :: observables_every_events
-    real(real64) :: observables_every_collisions_per_disk
+    real(real64) :: frames_every(4), observables_every(4)     !! of `sampled_by`
     logical :: single_precision                       !! precision == 'single'
     logical :: event_log
     logical :: virial_tensor                          !! of smooth disks, too

@@ -26,12 +26,17 @@ contains
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
 
-    associate (s => settings%output, pairs => 0.5_real64*settings%n_disks())
-      progress%frames = cadence_t(s%frames_every_time, s%frames_every_collisions, s%frames_every_events, &
-        pairs*s%frames_every_collisions_per_disk)
-      progress%observables = cadence_t(s%observables_every_time, s%observables_every_collisions, &
-        s%observables_every_events, pairs*s%observables_every_collisions_per_disk)
-    end associate
+    progress%frames%every = intervals(settings%output%frames_every)
+    progress%observables%every = intervals(settings%output%observables_every)
+  contains
+
+    !> Of time, of collisions in all or per disk, and of events.
+    pure function intervals(every)
+      real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
+      real(real64) :: intervals(3)
+
+      intervals = [every(1), min(every(2), 0.5_real64*settings%n_disks()*every(4)), every(3)]
+    end function intervals
   end function new_progress
 
   !> Number of samples of frames, observables and events.
