@@ -1,8 +1,8 @@
 !> The disks of a species as its file has them, whatever its kind: checked number by number, and joined with what the input
 !> says.
 module starting_disks
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: int64, real64
-  use bounds, only: first_outside
   use box_geometry, only: box_t
   use disks, only: names_of
   use errors, only: exit_usage, fail
@@ -90,6 +90,19 @@ contains
         //trim(column_names(row))//", but species."//me%name//"."//variable//" is given, too; give only one of them")
     end subroutine refuse_both
   end subroutine join
+
+  !> The first number that is not between two others, which belong to the range; 0: there is none. NaN, which would slip
+  !> through most comparisons, never is.
+  pure function first_outside(values, range) result(place)
+    real(real64), intent(in) :: values(:), range(2)
+    integer :: place
+
+    do place = 1, size(values)
+      if (.not. ieee_is_finite(values(place))) return         ! comparing a NaN is trapped by debug builds
+      if (values(place) < range(1) .or. values(place) > range(2)) return
+    end do
+    place = 0
+  end function first_outside
 
   !> Refuses numbers that the input could not have either.
   subroutine check_numbers(me, farthest)
