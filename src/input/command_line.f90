@@ -50,126 +50,114 @@ contains
   end subroutine read_command_line
 
   !> Makes a command of the arguments, or an error of the first that is wrong. A question ends the reading.
-  pure subroutine parse_arguments(arguments, command, error)
+  subroutine parse_arguments(arguments, command, error)
     type(text_t), intent(in) :: arguments(:)
     type(command_t), intent(out) :: command
     type(error_t), allocatable, intent(out) :: error
     logical :: only_files
-    integer :: k, n
+    integer :: k
 
     command%question = ""
     command%input = ""
     command%output = ""
-    allocate (command%overrides(size(arguments)))   ! as many as there can be, for the time being
-    n = 0
+    allocate (command%overrides(0))
     only_files = .false.
-    k = 1
-    do while (k <= size(arguments))
+    k = 0
+    do while (k < size(arguments) .and. command%question == "")
+      k = k + 1
       associate (argument => arguments(k)%text)
         if (.not. only_files .and. argument == "--") then
           only_files = .true.
         else if (.not. only_files .and. index(argument, "-") == 1) then
-          call take_option(arguments, k, command, n, error)
+          call take_option(argument(:merge(index(argument//"=", "=") - 1, len(argument), index(argument, "--") == 1)))
         else if (command%input == "" .and. argument /= "") then
           command%input = argument
         else if (argument == "") then
-          call fail(error, exit_usage, "the name of the input file is empty")
+          call refuse("the name of the input file is empty")
         else
-          call fail(error, exit_usage, "only one input file is allowed; there is also "//shown(argument))
+          call refuse("only one input file is allowed; there is also "//shown(argument))
         end if
       end associate
-      if (allocated(error) .or. command%question /= "") return
-      k = k + 1
+      if (allocated(error)) return
     end do
-    command%overrides = command%overrides(:n)
-    if (command%input == "") then
-      call fail(error, exit_usage, "no input file is given; usage: ricochet INPUT.nml, see --help")
-    end if
-    if (command%resume .and. command%force) call fail(error, exit_usage, "--resume goes on with a run, --force starts it " &
-      //"over; give one of them")
+    if (command%question /= "") return
+    if (command%input == "") call refuse("no input file is given; usage: ricochet INPUT.nml, see --help")
+    if (command%resume .and. command%force) call refuse("--resume goes on with a run, --force starts it over; give one of them")
     if (command%output == "") command%output = default_output(command%input)
-    if (.not. allocated(error) .and. output_of(command%output) /= "") call fail(error, exit_usage, "the output " &
-      //shown(command%output)//" would have a name that is kept for files of the run with the output " &
-      //shown(output_of(command%output))//"; choose another with -o")
+    if (output_of(command%output) /= "") call refuse("the output "//shown(command%output)//" would have a name that is kept for " &
+      //"files of the run with the output "//shown(output_of(command%output))//"; choose another with -o")
+
+  contains
+
+    !> Wrong usage; what was wrong first counts.
+    subroutine refuse(why)
+      character(len=*), intent(in) :: why
+
+      if (.not. allocated(error)) call fail(error, exit_usage, why)
+    end subroutine refuse
+
+    !> Takes the option of argument k, and the next argument if it is the option's value.
+    subroutine take_option(name)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: value
+
+      if (name /= arguments(k)%text .and. any(switches == name)) then
+        call refuse("option "//name//" takes no value")
+        return
+      end if
+      select case (name)
+      case ("-o", "--output")
+        call take_value(name, command%output)
+      case ("--set")
+        call take_value(name, value)
+        command%overrides = [command%overrides, text_t(value)]
+      case ("--explain")
+        command%question = "explain"
+        call take_value(name, command%topic)
+      case ("-h", "--help")
+        command%question = "help"
+      case ("--version", "--print-defaults", "--print-variables")
+        command%question = name(3:)
+      case ("--resume")
+        command%resume = .true.
+      case ("--check")
+        command%check = .true.
+      case ("--print-input")
+        command%print_input = .true.
+      case ("--quiet")
+        command%quiet = .true.
+      case ("--force")
+        command%force = .true.
+      case default
+        call report_unknown(name)
+      end select
+    end subroutine take_option
+
+    !> Takes the value after `=` or in the next argument.
+    subroutine take_value(name, value)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: value
+
+      value = arguments(k)%text(min(len(name) + 2, len(arguments(k)%text) + 1):)
+      if (name == arguments(k)%text .and. k < size(arguments)) then
+        k = k + 1
+        value = arguments(k)%text
+      end if
+      if (value == "") call refuse("option "//name//" needs a value")
+    end subroutine take_value
+
+    !> The option may be misspelt, or a file name.
+    subroutine report_unknown(name)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: meant
+
+      meant = nearest_word(name, options)
+      if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
+      if (meant /= "") meant = "did you mean "//meant//"?"
+      if (meant == "") meant = "see --help; put -- before a file name that begins with -"
+      call refuse("unknown option "//shown(name)//"; "//meant)
+    end subroutine report_unknown
   end subroutine parse_arguments
-
-  !> Takes one option, and the next argument if it is the option's value.
-  pure subroutine take_option(arguments, k, command, n, error)
-    type(text_t), intent(in) :: arguments(:)
-    integer, intent(inout) :: k
-    type(command_t), intent(inout) :: command
-    integer, intent(inout) :: n                    !! overrides so far
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: name, value
-
-    name = arguments(k)%text
-    if (index(name, "--") == 1) name = name(:index(name//"=", "=") - 1)
-    if (name /= arguments(k)%text .and. any(switches == name)) then
-      call fail(error, exit_usage, "option "//name//" takes no value")
-      return
-    end if
-    select case (name)
-    case ("-o", "--output")
-      call take_value(arguments, k, name, command%output, error)
-    case ("--set")
-      call take_value(arguments, k, name, value, error)
-      n = n + 1
-      command%overrides(n)%text = value
-    case ("--explain")
-      command%question = "explain"
-      call take_value(arguments, k, name, command%topic, error)
-    case ("-h", "--help")
-      command%question = "help"
-    case ("--version", "--print-defaults", "--print-variables")
-      command%question = name(3:)
-    case ("--resume")
-      command%resume = .true.
-    case ("--check")
-      command%check = .true.
-    case ("--print-input")
-      command%print_input = .true.
-    case ("--quiet")
-      command%quiet = .true.
-    case ("--force")
-      command%force = .true.
-    case default
-      call report_unknown(name, error)
-    end select
-  end subroutine take_option
-
-  !> The value after `=` or in the next argument.
-  pure subroutine take_value(arguments, k, name, value, error)
-    type(text_t), intent(in) :: arguments(:)
-    integer, intent(inout) :: k
-    character(len=*), intent(in) :: name
-    character(len=:), allocatable, intent(out) :: value
-    type(error_t), allocatable, intent(inout) :: error
-
-    value = ""
-    if (name /= arguments(k)%text) then
-      value = arguments(k)%text(len(name) + 2:)
-    else if (k < size(arguments)) then
-      k = k + 1
-      value = arguments(k)%text
-    end if
-    if (value == "") call fail(error, exit_usage, "option "//name//" needs a value")
-  end subroutine take_value
-
-  !> The option may be misspelt, or a file name.
-  pure subroutine report_unknown(name, error)
-    character(len=*), intent(in) :: name
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: meant
-
-    meant = nearest_word(name, options)
-    if (meant == "" .and. index(name, "--") /= 1) meant = nearest_word("-"//name, options)
-    if (meant /= "") then
-      meant = "did you mean "//meant//"?"
-    else
-      meant = "see --help; put -- before a file name that begins with -"
-    end if
-    call fail(error, exit_usage, "unknown option "//shown(name)//"; "//meant)
-  end subroutine report_unknown
 
   !> `runs/<input name>.h5`
   pure function default_output(input) result(output)

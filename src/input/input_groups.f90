@@ -4,10 +4,10 @@ module input_groups
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
   use variables, only: allowed, either, excludes, name_length, row_of, table, words_of
-  use texts, only: written, written_exactly
+  use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
-  public :: value_t, group_t, text_length, range_of
+  public :: value_t, group_t, text_length, range_of, json_text
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! values of a variable in an assignment: longer lists are cut
@@ -28,6 +28,7 @@ module input_groups
     procedure :: is_set
     procedure :: integers
     procedure :: clear
+    procedure :: json
   end type value_t
 
   !> One group of the input; of a repeated group, one instance. The functions give the value of a
@@ -271,44 +272,58 @@ contains
 
     text = trim(self%name)//"."
     if (self%instance /= "") text = text//trim(self%instance)//"."
-    text = text//trim(self%values(k)%name)//" = "//value_text(self%values(k))
+    text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(most_written)
   end function value_line
 
-  !> The values of a variable as they would be written in a file.
-  pure function value_text(value) result(text)
-    type(value_t), intent(in) :: value
+  !> The value, or a list of them, as JSON; a list that is longer than wanted is cut.
+  pure function json(self, most) result(text)
+    class(value_t), intent(in) :: self
+    integer, intent(in), optional :: most
     character(len=:), allocatable :: text
-    integer :: k, n
+    type(growing_text_t) :: growing
+    integer :: k, n, last
 
     n = 0
-    if (allocated(value%reals)) n = size(value%reals)
-    if (allocated(value%texts)) n = size(value%texts)
-    text = ""
-    do k = 1, min(n, most_written)
-      if (k > 1) text = text//", "
-      if (value%kind == "real") then
-        text = text//written_exactly(value%reals(k))
-      else if (value%kind == "text") then
-        text = text//quoted(trim(value%texts(k)))
-      else
-        text = text//trim(value%texts(k))
-      end if
+    if (allocated(self%reals)) n = size(self%reals)
+    if (allocated(self%texts)) n = size(self%texts)
+    last = n
+    if (present(most)) last = min(n, most)
+    do k = 1, last
+      if (k > 1) call growing%add(", ")
+      select case (self%kind)
+      case ("real")
+        call growing%add(written_exactly(self%reals(k)))
+      case ("integer")
+        call growing%add(trim(self%texts(k)))
+      case ("logical")
+        call growing%add(trim(merge("true ", "false", self%texts(k) == ".true.")))
+      case default
+        call growing%add(json_text(self%texts(k)))
+      end select
     end do
-    if (n > most_written) text = text//", ... ! "//written(n)//" values"
-  end function value_text
+    if (last < n) call growing%add(", ... "//written(n)//" values")
+    text = growing%text()
+    if (table(self%row)%size /= 1) text = "["//text//"]"
+  end function json
 
-  !> In quotes, with quotes inside doubled.
-  pure function quoted(text)
+  !> A text without trailing blanks as JSON.
+  pure function json_text(text) result(quoted)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
+    character(len=2) :: code
     integer :: i
 
-    quoted = "'"
-    do i = 1, len(text)
-      quoted = quoted//text(i:i)
-      if (text(i:i) == "'") quoted = quoted//"'"
+    quoted = """"
+    do i = 1, len_trim(text)
+      if (iachar(text(i:i)) < 32) then
+        write (code, "(z2.2)") iachar(text(i:i))
+        quoted = quoted//"\u00"//code
+      else
+        if (scan(text(i:i), """\") > 0) quoted = quoted//"\"
+        quoted = quoted//text(i:i)
+      end if
     end do
-    quoted = quoted//"'"
-  end function quoted
+    quoted = quoted//""""
+  end function json_text
 
 end module input_groups

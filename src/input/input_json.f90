@@ -1,8 +1,8 @@
 !> JSON for other programs: the table of variables, and an input as the program has understood it.
 module input_json
-  use input_groups, only: group_t, value_t
+  use input_groups, only: group_t, json_text
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, variable_t, smallest, table, words_of
-  use texts, only: growing_text_t, written, written_exactly
+  use texts, only: growing_text_t, written
   implicit none
   private
   public :: groups_text, variables_text
@@ -19,11 +19,11 @@ contains
     text = "{"
     between = eol
     do g = 1, size(group_names)
-      text = text//between//quoted(group_names(g))//": {"
+      text = text//between//json_text(group_names(g))//": {"
       between = eol
       do k = 1, size(table)
         if (table(k)%group /= group_names(g)) cycle
-        text = text//between//"  "//quoted(table(k)%name)//": {"//row_text(table(k))//"}"
+        text = text//between//"  "//json_text(table(k)%name)//": {"//row_text(table(k))//"}"
         between = ","//eol
       end do
       text = text//"}"
@@ -49,16 +49,16 @@ contains
     words = words_of(row%goes_with)
     associate (low => row%range%lower, high => row%range%upper)
       positive = low > 0 .and. low <= smallest
-      text = """type"": "//quoted(row%kind)//member("size", .true., written(row%size))// &
+      text = """type"": "//json_text(row%kind)//member("size", .true., written(row%size))// &
         member("default", has_default, value)//member("example", .not. has_default, value)// &
         member("needed", .true., truth(row%status == "example"))// &
         member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
         member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
     end associate
     text = text//member("choices", row%choices /= "", list(words_of(row%choices)))// &
-      member("unit", row%unit /= "", quoted(row%unit))//member("help", .true., quoted(row%help))// &
-      member("allowed", .true., quoted(allowed(row)))//", ""goes_with"": {"
-    if (size(words) > 0) text = text//quoted(words(1))//": "//list(words(2:))
+      member("unit", row%unit /= "", json_text(row%unit))//member("help", .true., json_text(row%help))// &
+      member("allowed", .true., json_text(allowed(row)))//", ""goes_with"": {"
+    if (size(words) > 0) text = text//json_text(words(1))//": "//list(words(2:))
     text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
       member("repeated", .true., truth(is_repeated(row%group)))// &
       member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
@@ -70,8 +70,9 @@ contains
     type(group_t), intent(in) :: groups(:)
     character(len=:), allocatable :: text
     type(growing_text_t) :: growing
+    character(len=:), allocatable :: between
     logical :: waiting(size(groups))
-    integer :: g, n
+    integer :: g, k, n
 
     waiting = [(groups(g)%line > 0 .or. any(groups(g)%values%given), g=1, size(groups))]
     do n = 1, count(waiting)
@@ -79,53 +80,19 @@ contains
       waiting(g) = .false.
       call growing%add(trim(merge(",", " ", n > 1))//eol)
       associate (group => groups(g), is_there => groups(g)%line > 0)
-        call growing%add("{""group"": "//quoted(group%name)//member("name", group%instance /= "", quoted(group%instance)) &
-          //member("from", is_there, written(group%first - 1))//member("to", is_there, written(group%last)) &
-          //", ""values"": "//values_text(group%values)//"}")
+        call growing%add("{""group"": "//json_text(group%name)//member("name", group%instance /= "", json_text(group%instance)) &
+          //member("from", is_there, written(group%first - 1))//member("to", is_there, written(group%last))//", ""values"": {")
+        between = ""
+        do k = 1, size(group%values)
+          if (.not. (group%values(k)%given .and. group%values(k)%is_set())) cycle
+          call growing%add(between//json_text(group%values(k)%name)//": "//group%values(k)%json())
+          between = ", "
+        end do
+        call growing%add("}}")
       end associate
     end do
     text = "["//growing%text()//eol//"]"
   end function groups_text
-
-  !> What is given in a group.
-  pure function values_text(values) result(text)
-    type(value_t), intent(in) :: values(:)
-    character(len=:), allocatable :: text
-    integer :: k
-
-    text = ""
-    do k = 1, size(values)
-      if (values(k)%given .and. values(k)%is_set()) text = text//member(values(k)%name, .true., value_text(values(k)))
-    end do
-    text = "{"//text(min(3, len(text) + 1):)//"}"
-  end function values_text
-
-  !> A value, or a list of them.
-  pure function value_text(value) result(text)
-    type(value_t), intent(in) :: value
-    character(len=:), allocatable :: text
-    type(growing_text_t) :: growing
-    integer :: k, n
-
-    n = 0
-    if (allocated(value%reals)) n = size(value%reals)
-    if (allocated(value%texts)) n = size(value%texts)
-    do k = 1, n
-      if (k > 1) call growing%add(", ")
-      select case (value%kind)
-      case ("real")
-        call growing%add(written_exactly(value%reals(k)))
-      case ("integer")
-        call growing%add(trim(value%texts(k)))
-      case ("logical")
-        call growing%add(truth(value%texts(k) == ".true."))
-      case default
-        call growing%add(quoted(value%texts(k)))
-      end select
-    end do
-    text = growing%text()
-    if (table(value%row)%size /= 1) text = "["//text//"]"
-  end function value_text
 
   !> `, "name": value`, with null instead of a value that is not there.
   pure function member(name, is_there, value) result(text)
@@ -133,7 +100,7 @@ contains
     logical, intent(in) :: is_there
     character(len=:), allocatable :: text
 
-    text = ", "//quoted(name)//": null"
+    text = ", "//json_text(name)//": null"
     if (is_there) text = text(:len(text) - 4)//value
   end function member
 
@@ -146,7 +113,7 @@ contains
     text = "["
     do k = 1, size(words)
       if (k > 1) text = text//", "
-      text = text//quoted(words(k))
+      text = text//json_text(words(k))
     end do
     text = text//"]"
   end function list
@@ -158,26 +125,5 @@ contains
 
     word = trim(merge("true ", "false", yes))
   end function truth
-
-  !> A text without trailing blanks, in quotes.
-  pure function quoted(text)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: quoted
-    character(len=2) :: code
-    integer :: i
-
-    quoted = """"
-    do i = 1, len_trim(text)
-      write (code, "(z2.2)") iachar(text(i:i))
-      if (iachar(text(i:i)) < 32) then
-        quoted = quoted//"\u00"//code
-      else if (scan(text(i:i), """\") > 0) then
-        quoted = quoted//"\"//text(i:i)
-      else
-        quoted = quoted//text(i:i)
-      end if
-    end do
-    quoted = quoted//""""
-  end function quoted
 
 end module input_json

@@ -4,12 +4,12 @@ module input_species
   use box_geometry, only: box_t
   use disks, only: longest_name
   use h5md_layout, only: beside_species
+  use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use observables, only: own_names
-  use input_groups, only: group_t
-  use variables, only: largest, most_disks, row_of, smallest
   use settings, only: species_settings_t
   use texts, only: counted, digits, letters, place_of, shown, suggestion, written
+  use variables, only: largest, most_disks, row_of, smallest
   implicit none
   private
   public :: take_species, check_name
@@ -18,7 +18,7 @@ contains
 
   !> Fills the settings of all species; derived values go back into the groups.
   subroutine take_species(groups, box, species, problems)
-    type(group_t), intent(inout) :: groups(:)   !! the species
+    type(group_t), intent(inout) :: groups(:)             !! the species
     type(box_t), intent(in) :: box
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
@@ -34,8 +34,9 @@ contains
       if (groups(k)%text_of("velocities") == "file" .and. .not. groups(k)%given("file")) &
         call groups(k)%complain("velocities", "'file' needs species.file", problems)
       call groups(k)%check_choices(problems)
-      call take_placement(groups(k), box, species(k), problems)
-      call take_velocities(groups(k), species(k), problems)
+      call take_placement(groups(k), species(k))
+      call take_count(groups(k), species(k))
+      call take_velocities(groups(k), species(k))
     end do
     call resolve_sizes(groups, species, problems)
     total = sum(int(species%count, int64))
@@ -52,11 +53,93 @@ contains
         call group%put_reals("region", s%region)
       end associate
     end do
+
+  contains
+
+    !> Where the disks start.
+    subroutine take_placement(group, s)
+      type(group_t), intent(in) :: group
+      type(species_settings_t), intent(inout) :: s
+
+      s%name = trim(group%instance)
+      s%placement = group%text_of("placement")
+      s%file = group%text_of("file")
+      s%radius_in_file = s%file /= "" .and. .not. (group%given("radius") .or. group%given("packing_fraction") &
+        .or. group%given("relative_to"))
+      s%mass_in_file = s%file /= "" .and. .not. (group%given("mass") .or. group%given("relative_to"))
+      s%scale_positions = group%text_of("scale_positions") == ".true."
+      s%region = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
+      if (group%values(row_of("species", "region"))%is_set()) s%region = group%reals_of("region")
+      s%grid = 0
+      associate (grid => group%values(row_of("species", "grid")))
+        if (grid%is_set()) s%grid = int(grid%integers())
+      end associate
+      call take_pairs(group, "position", s%position)
+    end subroutine take_placement
+
+    !> x1, y1, x2, y2, ... as (2,n).
+    subroutine take_pairs(group, name, pairs)
+      type(group_t), intent(in) :: group
+      character(len=*), intent(in) :: name
+      real(real64), allocatable, intent(out) :: pairs(:, :)
+
+      associate (values => group%reals_of(name))
+        if (modulo(size(values), 2) == 1) call group%complain(name, counted(size(values, kind=int64), "value")// &
+          "; each disk has two, x and y", problems)
+        pairs = reshape(values, [2, size(values)/2])
+      end associate
+    end subroutine take_pairs
+
+    !> The number of disks, given or following from the grid or the list of positions. That in a file is counted later.
+    subroutine take_count(group, s)
+      type(group_t), intent(in) :: group
+      type(species_settings_t), intent(inout) :: s
+      character(len=:), allocatable :: source
+      integer(int64) :: n
+
+      s%count = int(group%integer_of("count", 0_int64))
+      source = "position"
+      n = size(s%position, 2, kind=int64)
+      if (s%grid(1) > 0) source = "grid"
+      if (s%grid(1) > 0) n = product(int(s%grid, int64))
+      if (group%faulty("count")) return
+      if (n == 0) then
+        if (s%file /= "" .and. .not. group%given("packing_fraction")) return
+        if (.not. (group%faulty("position") .or. group%faulty("grid"))) call group%demand("count", problems)
+      else if (group%given("count")) then
+        if (n /= s%count) call group%complain(source, "holds "//counted(n, "disk")//", but species.count is "// &
+          written(s%count), problems)
+      else if (n > most_disks) then
+        call group%complain(source, counted(n, "disk")//"; allowed: up to "//written(most_disks), problems)
+      else
+        s%count = int(n)
+      end if
+    end subroutine take_count
+
+    !> How the disks move at the start.
+    subroutine take_velocities(group, s)
+      type(group_t), intent(in) :: group
+      type(species_settings_t), intent(inout) :: s
+
+      s%velocities = group%text_of("velocities")
+      s%speed = group%real_of("speed", 0.0_real64)
+      s%temperature = group%real_of("temperature", 0.0_real64)
+      s%exact_temperature = group%real_of("exact_temperature", -1.0_real64)
+      s%angular_velocity = group%real_of("angular_velocity", 0.0_real64)
+      s%rotational_temperature = group%real_of("rotational_temperature", -1.0_real64)
+      s%spin_in_file = s%velocities == "file" .and. .not. (group%given("angular_velocity") &
+        .or. group%given("rotational_temperature"))
+      call take_pairs(group, "velocity", s%velocity)
+      associate (n => size(s%velocity, 2))
+        if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
+          counted(int(s%count, int64), "disk"), problems)
+      end associate
+    end subroutine take_velocities
   end subroutine take_species
 
   !> A name must fit into file paths, override paths and messages, and be unique among its kind.
   subroutine check_name(groups, k, problems)
-    type(group_t), intent(in) :: groups(:)   !! all obstacles, or all species
+    type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
     integer, intent(in) :: k
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: name
@@ -74,108 +157,29 @@ contains
       written(groups(j)%line), problems)
   end subroutine check_name
 
-  !> Where the disks start, and how many there are.
-  subroutine take_placement(group, box, s, problems)
-    type(group_t), intent(in) :: group
-    type(box_t), intent(in) :: box
-    type(species_settings_t), intent(inout) :: s
-    type(problem_list_t), intent(inout) :: problems
-    real(real64), allocatable :: region(:)
-    integer(int64), allocatable :: grid(:)
-
-    s%name = trim(group%instance)
-    s%placement = group%text_of("placement")
-    s%file = group%text_of("file")
-    s%radius_in_file = s%file /= "" .and. .not. (group%given("radius") .or. group%given("packing_fraction") &
-      .or. group%given("relative_to"))
-    s%mass_in_file = s%file /= "" .and. .not. (group%given("mass") .or. group%given("relative_to"))
-    s%scale_positions = group%text_of("scale_positions") == ".true."
-    s%region = [box%lower(1), box%upper(1), box%lower(2), box%upper(2)]
-    allocate (region, source=group%reals_of("region"))
-    if (size(region) > 0) s%region = region
-    s%grid = 0
-    allocate (grid, source=group%values(row_of("species", "grid"))%integers())
-    if (size(grid) > 0) s%grid = int(grid)
-    call take_pairs(group, "position", s%position, problems)
-    call take_count(group, s, problems)
-  end subroutine take_placement
-
-  !> How the disks move at the start.
-  subroutine take_velocities(group, s, problems)
-    type(group_t), intent(in) :: group
-    type(species_settings_t), intent(inout) :: s
-    type(problem_list_t), intent(inout) :: problems
-
-    s%velocities = group%text_of("velocities")
-    s%speed = group%real_of("speed", 0.0_real64)
-    s%temperature = group%real_of("temperature", 0.0_real64)
-    s%exact_temperature = group%real_of("exact_temperature", -1.0_real64)
-    s%angular_velocity = group%real_of("angular_velocity", 0.0_real64)
-    s%rotational_temperature = group%real_of("rotational_temperature", -1.0_real64)
-    s%spin_in_file = s%velocities == "file" .and. .not. (group%given("angular_velocity") .or. group%given("rotational_temperature"))
-    call take_pairs(group, "velocity", s%velocity, problems)
-    associate (n => size(s%velocity, 2))
-      if (n > 1 .and. n /= s%count .and. s%count > 0) call group%complain("velocity", written(n)//" pairs for "// &
-        counted(int(s%count, int64), "disk"), problems)
-    end associate
-  end subroutine take_velocities
-
-  !> x1, y1, x2, y2, ... as (2,n).
-  subroutine take_pairs(group, name, pairs, problems)
-    type(group_t), intent(in) :: group
-    character(len=*), intent(in) :: name
-    real(real64), allocatable, intent(out) :: pairs(:, :)
-    type(problem_list_t), intent(inout) :: problems
-    real(real64), allocatable :: values(:)
-
-    allocate (values, source=group%reals_of(name))
-    if (modulo(size(values), 2) == 1) call group%complain(name, counted(size(values, kind=int64), "value")// &
-      "; each disk has two, x and y", problems)
-    pairs = reshape(values, [2, size(values)/2])
-  end subroutine take_pairs
-
-  !> The number of disks, given or following from the grid or the list of positions. That in a file is counted later.
-  subroutine take_count(group, s, problems)
-    type(group_t), intent(in) :: group
-    type(species_settings_t), intent(inout) :: s
-    type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: source
-    integer(int64) :: n
-
-    s%count = int(group%integer_of("count", 0_int64))
-    source = "position"
-    if (s%grid(1) > 0) source = "grid"
-    n = size(s%position, 2, kind=int64)
-    if (s%grid(1) > 0) n = product(int(s%grid, int64))
-    if (group%faulty("count")) return
-    if (n == 0) then
-      if (s%file /= "" .and. .not. group%given("packing_fraction")) return
-      if (.not. (group%faulty("position") .or. group%faulty("grid"))) call group%demand("count", problems)
-    else if (group%given("count")) then
-      if (n /= s%count) call group%complain(source, "holds "//counted(n, "disk")//", but species.count is "// &
-        written(s%count), problems)
-    else if (n > most_disks) then
-      call group%complain(source, counted(n, "disk")//"; allowed: up to "//written(most_disks), problems)
-    else
-      s%count = int(n)
-    end if
-  end subroutine take_count
-
   !> Masses and radii, multiplied along the chain of `relative_to`.
   subroutine resolve_sizes(groups, species, problems)
     type(group_t), intent(in) :: groups(:)
     type(species_settings_t), intent(inout) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     real(real64), dimension(size(species)) :: mass, radius
-    integer :: base(size(species)), k, j, step
+    character(len=:), allocatable :: wanted
+    integer :: base(size(species)), k, j, step            ! base: the species that `relative_to` names; 0: none
     logical :: fits
 
     do k = 1, size(species)
-      call find_base(groups, k, base(k), problems)
+      wanted = groups(k)%text_of("relative_to")
+      base(k) = 0
+      if (wanted /= "") base(k) = place_of(wanted, groups%instance)
       mass(k) = groups(k)%real_of("mass", 1.0_real64)
-      call own_radius(groups(k), species(k), radius(k), problems)
-      if (groups(k)%given("relative_to") .and. base(k) == 0) radius(k) = 0
-      if (base(k) == 0) cycle
+      radius(k) = own_radius(groups(k), species(k))
+      if (wanted == "") cycle
+      if (base(k) == 0) then
+        radius(k) = 0
+        call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
+          suggestion(wanted, groups%instance), problems)
+        cycle
+      end if
       species(base(k))%is_base = .true.
       if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the radii of """//species(base(k))%name &
         //""" are those of its file; give mass and radius instead", problems)
@@ -195,48 +199,35 @@ contains
       call groups(k)%complain("relative_to", "leads back to the species itself, or to sizes out of range", problems)
       species(k)%radius = 0
     end do
-  end subroutine resolve_sizes
 
-  !> Finds the species that `relative_to` names; 0 if there is none.
-  subroutine find_base(groups, k, base, problems)
-    type(group_t), intent(in) :: groups(:)
-    integer, intent(in) :: k
-    integer, intent(out) :: base
-    type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: wanted
+  contains
 
-    base = 0
-    wanted = groups(k)%text_of("relative_to")
-    if (wanted == "") return
-    base = place_of(wanted, groups%instance)
-    if (base == 0) call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
-      suggestion(wanted, groups%instance), problems)
-  end subroutine find_base
+    !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
+    function own_radius(group, s) result(radius)
+      type(group_t), intent(in) :: group
+      type(species_settings_t), intent(in) :: s
+      real(real64) :: radius
+      logical :: given, relative
 
-  !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
-  subroutine own_radius(group, s, radius, problems)
-    type(group_t), intent(in) :: group
-    type(species_settings_t), intent(in) :: s
-    real(real64), intent(out) :: radius
-    type(problem_list_t), intent(inout) :: problems
-
-    radius = group%real_of("radius", 0.0_real64)
-    if (group%given("packing_fraction")) then
-      if (group%given("radius") .or. group%given("relative_to")) then
-        radius = 0                                       ! told already
-      else if (s%count > 0 .and. area(s%region) > 0) then
-        radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
+      given = group%given("radius")
+      relative = group%given("relative_to")
+      radius = group%real_of("radius", 0.0_real64)
+      if (group%given("packing_fraction") .and. (given .or. relative)) then
+        radius = 0                                        ! told already
+      else if (group%given("packing_fraction")) then
+        if (s%count > 0 .and. area(s%region) > 0) &
+          radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
+      else if (relative .and. .not. given) then
+        radius = 1
+      else if (.not. (given .or. s%radius_in_file)) then
+        call group%complain("radius", "is missing; give radius, packing_fraction or relative_to", problems)
       end if
-    else if (group%given("relative_to") .and. .not. group%given("radius")) then
-      radius = 1
-    else if (.not. (group%given("radius") .or. s%radius_in_file)) then
-      call group%complain("radius", "is missing; give radius, packing_fraction or relative_to", problems)
-    end if
-  end subroutine own_radius
+    end function own_radius
+  end subroutine resolve_sizes
 
   !> Area of a region; 0 if its ends are the wrong way round.
   pure function area(region)
-    real(real64), intent(in) :: region(4)              !! xlo, xhi, ylo, yhi [length]
+    real(real64), intent(in) :: region(4)                 !! xlo, xhi, ylo, yhi [length]
     real(real64) :: area
 
     area = max(region(2) - region(1), 0.0_real64)*max(region(4) - region(3), 0.0_real64)

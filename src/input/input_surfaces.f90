@@ -1,6 +1,6 @@
 !> From the groups that describe sides and obstacles to their shapes and laws.
 module input_surfaces
-  use box_geometry, only: box_t, surface_t
+  use box_geometry, only: box_t
   use circles, only: new_circle
   use collisions, only: grip_t, normal_rule, wall_law_t, wall_rules
   use input_problems, only: problem_list_t
@@ -20,7 +20,7 @@ contains
 
   !> Puts the obstacles into the box; none if one of them is incomplete.
   subroutine take_obstacles(groups, box, problems)
-    type(group_t), intent(in) :: groups(:)      !! all whose name is in `obstacle_groups`
+    type(group_t), intent(in) :: groups(:)                !! all whose name is in `obstacle_groups`
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
@@ -31,7 +31,7 @@ contains
       call check_name(groups, k, problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
-          if (table(value%row)%status /= "example") cycle       ! has a default, or may be left out
+          if (table(value%row)%status /= "example") cycle           ! has a default, or may be left out
           call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
@@ -40,36 +40,30 @@ contains
     if (.not. complete) return
     call box%add_obstacles(size(groups))
     do k = 1, size(groups)
-      box%surface(n_sides + k)%name = trim(groups(k)%instance)
-      call take_shape(groups(k), box%surface(n_sides + k))
+      associate (group => groups(k), obstacle => box%surface(n_sides + k))
+        obstacle%name = trim(group%instance)
+        select case (group%name)
+        case ("wall")
+          allocate (obstacle%shape, source=new_segment(group%reals_of("from"), group%reals_of("to")))
+        case default                                      ! "obstacle"
+          allocate (obstacle%shape, source=new_circle(group%reals_of("centre"), group%real_of("radius", 0.0_real64), &
+            encloses=group%text_of("side") == "inside"))
+        end select
+      end associate
     end do
   end subroutine take_obstacles
 
-  !> The shape that a group describes.
-  subroutine take_shape(group, obstacle)
-    type(group_t), intent(in) :: group
-    type(surface_t), intent(inout) :: obstacle
-
-    select case (group%name)
-    case ("wall")
-      allocate (obstacle%shape, source=new_segment(group%reals_of("from"), group%reals_of("to")))
-    case default                                          ! "obstacle"
-      allocate (obstacle%shape, source=new_circle(group%reals_of("centre"), group%real_of("radius", 0.0_real64), &
-        encloses=group%text_of("side") == "inside"))
-    end select
-  end subroutine take_shape
-
   !> The laws of all walls: their own where their groups give one, else that of `&contact`.
-  subroutine take_wall_laws(sides, obstacles, law, box, problems)
+  subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)
     type(group_t), intent(inout) :: sides(:)
     type(group_t), intent(inout) :: obstacles(:)
-    type(wall_law_t), intent(in) :: law                   !! of walls without one of their own
+    type(wall_law_t), intent(in) :: otherwise             !! of walls without one of their own
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     integer :: k, side, line_of(n_sides)
 
-    box%surface%law = law
-    if (law%rule /= normal_rule) box%surface%law%grip = grip_t()
+    box%surface%law = otherwise
+    if (otherwise%rule /= normal_rule) box%surface%law%grip = grip_t()
     line_of = 0
     do k = 1, size(sides)
       side = place_of(trim(sides(k)%instance), side_name)
@@ -83,69 +77,66 @@ contains
           problems)
       else
         line_of(side) = sides(k)%line
-        call take_law(sides(k), law, box%surface(side)%law, problems)
-        call take_motion(sides(k), box%surface(side)%motion, problems)
-        if (box%surface(side)%motion%travels()) call check_room(sides(k), box, (side + 1)/2, problems)
+        call take_law(sides(k), box%surface(side)%law)
+        call take_motion(sides(k), box%surface(side)%motion)
+        if (box%surface(side)%motion%travels()) call check_room(sides(k), (side + 1)/2)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
-      call take_law(obstacles(k - n_sides), law, box%surface(k)%law, problems)
+      call take_law(obstacles(k - n_sides), box%surface(k)%law)
     end do
+
+  contains
+
+    !> The law of one wall. Values that follow from `&contact` are put into its group.
+    subroutine take_law(group, law)
+      type(group_t), intent(inout) :: group
+      type(wall_law_t), intent(out) :: law
+
+      associate (rules => words_of(wall_rules), thermal => group%given("temperature"))
+        if (.not. (thermal .or. group%given("rule"))) call group%put_text("rule", trim(rules(otherwise%rule)))
+        call group%check_choices(problems)
+        law%speed = group%real_of("speed", 0.0_real64)
+        law%temperature = group%real_of("temperature", 0.0_real64)
+        if (thermal) return
+        law%rule = max(1, place_of(group%text_of("rule"), rules))
+      end associate
+      law%restitution = group%real_of("restitution", otherwise%restitution)
+      call group%put_reals("restitution", [law%restitution])
+      if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
+      if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
+      if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
+        call group%put_reals("friction", [law%grip%friction])
+      if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("speed", &
+        "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
+    end subroutine take_law
+
+    !> How a side moves.
+    subroutine take_motion(group, motion)
+      type(group_t), intent(in) :: group
+      type(side_motion_t), intent(out) :: motion
+
+      if (group%faulty("motion")) return
+      motion%kind = place_of(group%text_of("motion"), words_of(motions))
+      motion%amplitude = group%real_of("amplitude", 0.0_real64)
+      motion%period = group%real_of("period", 1.0_real64)
+      motion%phase = group%real_of("phase", 0.0_real64)
+      motion%strike = group%real_of("velocity", 0.0_real64)
+      if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
+        written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
+    end subroutine take_motion
+
+    !> Sides must not meet, whenever each is how far inwards.
+    subroutine check_room(group, axis)
+      type(group_t), intent(in) :: group
+      integer, intent(in) :: axis
+      real(real64) :: width
+
+      width = box%upper(axis) - box%lower(axis)
+      if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
+        "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
+    end subroutine check_room
   end subroutine take_wall_laws
-
-  !> The law of one wall. Values that follow from `&contact` are put into its group.
-  subroutine take_law(group, otherwise, law, problems)
-    type(group_t), intent(inout) :: group
-    type(wall_law_t), intent(in) :: otherwise
-    type(wall_law_t), intent(out) :: law
-    type(problem_list_t), intent(inout) :: problems
-
-    associate (rules => words_of(wall_rules), thermal => group%given("temperature"))
-      if (.not. (thermal .or. group%given("rule"))) call group%put_text("rule", trim(rules(otherwise%rule)))
-      call group%check_choices(problems)
-      law%speed = group%real_of("speed", 0.0_real64)
-      law%temperature = group%real_of("temperature", 0.0_real64)
-      if (thermal) return
-      law%rule = max(1, place_of(group%text_of("rule"), rules))
-    end associate
-    law%restitution = group%real_of("restitution", otherwise%restitution)
-    call group%put_reals("restitution", [law%restitution])
-    if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
-    if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
-    if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
-      call group%put_reals("friction", [law%grip%friction])
-    if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("speed", &
-      "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
-  end subroutine take_law
-
-  !> How a side moves.
-  subroutine take_motion(group, motion, problems)
-    type(group_t), intent(in) :: group
-    type(side_motion_t), intent(out) :: motion
-    type(problem_list_t), intent(inout) :: problems
-
-    if (group%faulty("motion")) return
-    motion%kind = place_of(group%text_of("motion"), words_of(motions))
-    motion%amplitude = group%real_of("amplitude", 0.0_real64)
-    motion%period = group%real_of("period", 1.0_real64)
-    motion%phase = group%real_of("phase", 0.0_real64)
-    motion%strike = group%real_of("velocity", 0.0_real64)
-    if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
-      written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
-  end subroutine take_motion
-
-  !> Sides must not meet, whenever each is how far inwards.
-  subroutine check_room(group, box, axis, problems)
-    type(group_t), intent(in) :: group
-    type(box_t), intent(in) :: box
-    integer, intent(in) :: axis
-    type(problem_list_t), intent(inout) :: problems
-    real(real64) :: width
-
-    width = box%upper(axis) - box%lower(axis)
-    if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
-      "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
-  end subroutine check_room
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.
   subroutine take_grip(group, prefix, otherwise, grip, problems)

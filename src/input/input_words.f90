@@ -11,6 +11,8 @@ module input_words
   public :: store_values, read_real
 
   integer, parameter :: most_values = 4000000
+  character(len=7), parameter :: yes(*) = [character(len=7) :: ".true.", "true", ".t.", "t"]
+  character(len=7), parameter :: no(*) = [character(len=7) :: ".false.", "false", ".f.", "f"]
 
 contains
 
@@ -23,14 +25,16 @@ contains
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
     character(len=:), allocatable :: problem
-    integer :: k, n, line
+    integer(int64) :: total
+    integer :: k, n
 
     slot%line = statement%line
     slot%given = .true.
     slot%faulty = .true.
     if (.not. statement%sound) return
     associate (row => table(slot%row), tokens => statement%tokens)
-      call check_shape(slot, row, scanner, statement, problem)
+      total = sum(int(tokens%repeats, int64))
+      call check_number(row)
       if (problem /= "") then
         call problems%add(statement%line, statement%where, problem)
         return
@@ -38,117 +42,99 @@ contains
       new = slot
       new%faulty = .false.
       n = max(statement%element - 1, 0)
-      if (statement%element == 0) call make_room(new, sum(tokens%repeats))
+      if (statement%element == 0) then
+        call new%clear()
+        if (slot%kind == "real") allocate (new%reals(total))
+        if (slot%kind /= "real") allocate (new%texts(total))
+      end if
       do k = 1, size(tokens)
-        call store_token(new, n, row, tokens(k), scanner%content(tokens(k)), statement%line <= 0, problem)
+        call store_token(row, tokens(k), scanner%content(tokens(k)))
         n = n + tokens(k)%repeats
         if (problem == "") cycle
-        line = merge(tokens(k)%line, statement%line, statement%line > 0)
-        call problems%add(line, statement%where, problem)
+        call problems%add(merge(tokens(k)%line, statement%line, statement%line > 0), statement%where, problem)
         new%faulty = .true.
         if (problems%is_full()) exit
       end do
     end associate
     if (.not. new%faulty) slot = new
+
+  contains
+
+    !> The number of values must be what the variable takes.
+    subroutine check_number(row)
+      type(variable_t), intent(in) :: row
+
+      problem = ""
+      if (statement%element > 0) then
+        if (statement%element > row%size .or. .not. slot%is_set()) then
+          problem = "it is set as a whole: name = "//trim(row%value)
+        else if (total /= 1) then
+          problem = counted(total, "value")//" for one element; allowed: "//allowed(row)
+        end if
+      else if (row%size > 0 .and. total /= row%size) then
+        problem = counted(total, "value")//" instead of "//written(row%size)//"; allowed: "//allowed(row)
+        if (row%kind == "real" .and. size(statement%tokens) == 2*row%size) problem = problem//decimal_hint()
+      else if (total > most_values) then
+        problem = counted(total, "value")//"; allowed: up to "//written(most_values)
+      end if
+    end subroutine check_number
+
+    !> What to say when `0,9` stands where one real number is expected.
+    function decimal_hint() result(hint)
+      character(len=:), allocatable :: hint
+
+      hint = ""
+      associate (tokens => statement%tokens)
+        do k = 1, size(tokens), 2
+          if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma between them
+          if (verify(scanner%content(tokens(k + 1)), digits) > 0) return
+        end do
+        hint = "; did you mean "//scanner%content(tokens(1))//"."//scanner%content(tokens(2))// &
+          "? the decimal sign is a point"
+      end associate
+    end function decimal_hint
+
+    !> Checks one word and stores it after the first n values.
+    subroutine store_token(row, token, word)
+      type(variable_t), intent(in) :: row
+      type(token_t), intent(in) :: token
+      character(len=*), intent(in) :: word
+      character(len=:), allocatable :: normal        ! the word as it is kept
+      integer(int64) :: whole
+      real(real64) :: number
+
+      normal = word
+      number = 0
+      problem = ""
+      select case (row%kind)
+      case ("integer")
+        call read_integer(word, whole, problem)
+        normal = written(whole)
+        number = real(whole, real64)
+      case ("real")
+        call read_real(word, number, problem)
+      case ("logical")
+        normal = ".false."
+        if (any(lower_case(word) == yes)) normal = ".true."
+        if (all(lower_case(word) /= [yes, no])) problem = "is neither true nor false"
+      case default
+        call check_text(word, row, statement%line <= 0 .or. token%quote /= " ", problem)
+      end select
+      if (row%kind /= "text") then
+        if (problem == "" .and. (number < row%range%lower .or. number > row%range%upper)) problem = "is out of range"
+        if (token%quote /= " ") problem = "is in quotes"
+        if (problem /= "") problem = shown(word)//" "//problem//"; allowed: "//allowed(row)
+      end if
+      if (problem /= "") return
+      if (row%kind == "real") then
+        new%reals(n + 1:n + token%repeats) = number
+      else
+        new%texts(n + 1:n + token%repeats) = normal
+      end if
+    end subroutine store_token
   end subroutine store_values
 
-  !> The number of values must be what the variable takes.
-  pure subroutine check_shape(slot, row, scanner, statement, problem)
-    type(value_t), intent(in) :: slot
-    type(variable_t), intent(in) :: row
-    type(scanner_t), intent(in) :: scanner
-    type(statement_t), intent(in) :: statement
-    character(len=:), allocatable, intent(out) :: problem
-    integer(int64) :: total
-
-    problem = ""
-    total = sum(int(statement%tokens%repeats, int64))
-    if (statement%element > 0) then
-      if (statement%element > row%size .or. .not. slot%is_set()) then
-        problem = "it is set as a whole: name = "//trim(row%value)
-      else if (total /= 1) then
-        problem = counted(total, "value")//" for one element; allowed: "//allowed(row)
-      end if
-    else if (row%size > 0 .and. total /= row%size) then
-      problem = counted(total, "value")//" instead of "//written(row%size)//"; allowed: "//allowed(row) &
-        //decimal_hint(row, scanner, statement%tokens)
-    else if (total > most_values) then
-      problem = counted(total, "value")//"; allowed: up to "//written(most_values)
-    end if
-  end subroutine check_shape
-
-  !> What to say when `0,9` stands where one real number is expected.
-  pure function decimal_hint(row, scanner, tokens) result(hint)
-    type(variable_t), intent(in) :: row
-    type(scanner_t), intent(in) :: scanner
-    type(token_t), intent(in) :: tokens(:)
-    character(len=:), allocatable :: hint
-    integer :: k
-
-    hint = ""
-    if (row%kind /= "real" .or. size(tokens) /= 2*row%size) return
-    do k = 1, size(tokens), 2
-      if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma between them
-      if (verify(scanner%content(tokens(k + 1)), digits) > 0) return
-    end do
-    hint = "; did you mean "//scanner%content(tokens(1))//"."//scanner%content(tokens(2))// &
-      "? the decimal sign is a point"
-  end function decimal_hint
-
-  !> Allocates n values of the variable's kind.
-  pure subroutine make_room(slot, n)
-    type(value_t), intent(inout) :: slot
-    integer, intent(in) :: n
-
-    call slot%clear()
-    if (slot%kind == "real") then
-      allocate (slot%reals(n))
-    else
-      allocate (slot%texts(n))
-    end if
-  end subroutine make_room
-
-  !> Checks one word and stores it after the first n values.
-  pure subroutine store_token(slot, n, row, token, word, bare, problem)
-    type(value_t), intent(inout) :: slot
-    integer, intent(in) :: n
-    type(variable_t), intent(in) :: row
-    type(token_t), intent(in) :: token
-    character(len=*), intent(in) :: word
-    logical, intent(in) :: bare                    !! text needs no quotes
-    character(len=:), allocatable, intent(out) :: problem
-    character(len=:), allocatable :: normal        ! the word as it is kept
-    integer(int64) :: whole
-    real(real64) :: number
-
-    normal = word
-    number = 0
-    select case (row%kind)
-    case ("integer")
-      call read_integer(word, whole, problem)
-      normal = written(whole)
-      number = real(whole, real64)
-    case ("real")
-      call read_real(word, number, problem)
-    case ("logical")
-      call read_logical(word, normal, problem)
-    case default
-      call check_text(word, row, bare .or. token%quote /= " ", problem)
-    end select
-    if (row%kind /= "text") then
-      if (problem == "" .and. (number < row%range%lower .or. number > row%range%upper)) problem = "is out of range"
-      if (token%quote /= " ") problem = "is in quotes"
-      if (problem /= "") problem = shown(word)//" "//problem//"; allowed: "//allowed(row)
-    end if
-    if (problem /= "") return
-    if (row%kind == "real") then
-      slot%reals(n + 1:n + token%repeats) = number
-    else
-      slot%texts(n + 1:n + token%repeats) = normal
-    end if
-  end subroutine store_token
-
-  !> Text must be in quotes, not too long, and one of the choices if there are any.
+  !> Text must be in quotes, or need none, not too long, and one of the choices if there are any.
   pure subroutine check_text(word, row, quoted, problem)
     character(len=*), intent(in) :: word
     type(variable_t), intent(in) :: row
@@ -203,6 +189,7 @@ contains
     real(real64), intent(out) :: value
     character(len=:), allocatable, intent(out) :: problem
     integer, parameter :: longest = 60
+    character(len=longest) :: mantissa                 ! without its point
     integer :: mark, exponent, status
 
     value = 0
@@ -210,7 +197,9 @@ contains
     if (len(word) > longest) problem = "is too long for a number"
     if (len(word) > longest .or. len(word) == 0) return
     mark = scan(lower_case(word)//"e", "ed")
-    if (.not. is_decimal(word(:mark - 1))) return
+    mantissa = word(:mark - 1)
+    if (index(mantissa, ".") > 0) mantissa(index(mantissa, "."):index(mantissa, ".")) = "0"
+    if (scan(word(:mark - 1), digits) == 0 .or. .not. is_whole(mantissa(:mark - 1))) return
     exponent = 0
     if (mark <= len(word)) then
       if (.not. is_whole(word(mark + 1:))) return
@@ -226,36 +215,5 @@ contains
     value = 0
     problem = "is out of range (sizes from 1e-100 to 1e100)"
   end subroutine read_real
-
-  !> Digits with an optional sign and at most one point.
-  pure function is_decimal(word)
-    character(len=*), intent(in) :: word
-    logical :: is_decimal
-    character(len=len(word)) :: whole
-    integer :: point
-
-    whole = word
-    point = index(word, ".")
-    if (point > 0) whole(point:point) = "0"
-    is_decimal = scan(word, digits) > 0 .and. is_whole(whole)
-  end function is_decimal
-
-  !> Accepts what Fortran accepts; `value` is `.true.` or `.false.`
-  pure subroutine read_logical(word, value, problem)
-    character(len=*), intent(in) :: word
-    character(len=:), allocatable, intent(out) :: value
-    character(len=:), allocatable, intent(out) :: problem
-
-    problem = ""
-    value = ""
-    select case (lower_case(word))
-    case (".true.", "true", ".t.", "t")
-      value = ".true."
-    case (".false.", "false", ".f.", "f")
-      value = ".false."
-    case default
-      problem = "is neither true nor false"
-    end select
-  end subroutine read_logical
 
 end module input_words
