@@ -8,9 +8,10 @@ module run_setup
   use input_fit, only: fit_together
   use input_json, only: groups_text
   use input_problems, only: problem_list_t
+  use input_settings, only: resolve_settings
   use input_text, only: read_text
   use memory, only: room_for_domains
-  use namelist_input, only: read_groups, read_settings
+  use namelist_input, only: read_groups
   use parallel_events, only: parallel_events_t
   use input_groups, only: group_t
   use renumbering, only: renumber
@@ -46,12 +47,16 @@ contains
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
+    logical :: complete
 
     input%path = path
     input%text = text
     input%overrides = overrides
-    call read_settings(text, overrides, input%settings, input%groups, problems)
-    call fit_together(input%settings, input%groups, problems)
+    call read_groups(text, overrides, input%groups, problems, complete)
+    if (complete) then                                    ! else what would be missing is there, in parts that were skipped
+      call resolve_settings(input%groups, input%settings, problems)
+      call fit_together(input%settings, input%groups, problems)
+    end if
     call problems%report(path, overrides, error)
   end subroutine input_from_text
 

@@ -9,6 +9,8 @@ module input_text
   public :: read_text, unix_lines, byte_order_mark
 
   integer(int64), parameter :: largest_file = 4194304   !! bytes
+  integer, private :: i
+  character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
 contains
@@ -40,26 +42,10 @@ contains
       return
     end if
     text = text(:n)
-    odd = first_odd_byte(text)
+    odd = scan(text, transfer(control, repeat(" ", size(control))))
     if (odd > 0) call fail(error, exit_usage, path//": is not a text file: byte "//written(odd)// &
       " is a control character, code "//written(iachar(text(odd:odd))))
   end subroutine read_text
-
-  !> Position of the first byte that does not belong in a text file; 0 if there is none.
-  pure function first_odd_byte(text) result(position)
-    character(len=*), intent(in) :: text
-    integer :: position
-
-    do position = 1, len(text)
-      select case (iachar(text(position:position)))
-      case (0:8, 11:12, 14:31, 127)
-        return
-      case default
-        cycle
-      end select
-    end do
-    position = 0
-  end function first_odd_byte
 
   !> The text with line feeds as the only line ends, without byte order mark, ending in a line feed.
   pure function unix_lines(text) result(lines)

@@ -1,37 +1,20 @@
-!> Reads input text and the `--set` overrides: text to statements to values to settings.
-!> Every problem is collected; the settings are only of use if there is none.
+!> Reads input text and the `--set` overrides: text to statements to values. Every problem is collected.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: problem_list_t
-  use input_settings, only: resolve_settings
   use input_text, only: unix_lines
   use input_words, only: store_values
   use namelist_scanner, only: group_start, plain, scanner_t, setting, statement_t, token_t
-  use settings, only: settings_t
   use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none
   private
-  public :: read_groups, read_settings
+  public :: read_groups
 
   integer, parameter :: most_instances = 5000           !! of each of the repeated groups
   character(len=*), parameter :: eol = new_line("a")
 
 contains
-
-  !> Reads the text of an input file, applies the overrides and resolves the settings. After text that could
-  !> not be understood the settings stay empty: what would be missing in them is there, in the skipped parts.
-  subroutine read_settings(text, overrides, settings, groups, problems)
-    character(len=*), intent(in) :: text
-    type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
-    type(settings_t), intent(out) :: settings
-    type(group_t), allocatable, intent(out) :: groups(:)            !! every value as used
-    type(problem_list_t), intent(out) :: problems
-    logical :: complete
-
-    call read_groups(text, overrides, groups, problems, complete)
-    if (complete) call resolve_settings(groups, settings, problems)
-  end subroutine read_settings
 
   !> Reads the text and applies the overrides: every value as given, or its default.
   subroutine read_groups(text, overrides, groups, problems, complete)

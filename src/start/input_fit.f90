@@ -29,7 +29,7 @@ contains
   !> Takes what the settings leave to starting files from these, and checks every species that is known well enough; the
   !> others have been reported already.
   subroutine fit_together(settings, groups, problems)
-    type(settings_t), intent(inout) :: settings               !! empty if the text could not be understood
+    type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     type(packing_t) :: packing
@@ -38,7 +38,6 @@ contains
     real(real64) :: beyond(2, 2)
     integer :: o(2), s(2), k, colon
 
-    if (.not. allocated(settings%species)) return
     if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])

@@ -91,43 +91,38 @@ contains
     end subroutine refuse_both
   end subroutine join
 
-  !> The first number that is not between two others, which belong to the range; 0: there is none. NaN, which would slip
-  !> through most comparisons, never is.
-  pure function first_outside(values, range) result(place)
-    real(real64), intent(in) :: values(:), range(2)
-    integer :: place
-
-    do place = 1, size(values)
-      if (.not. ieee_is_finite(values(place))) return         ! comparing a NaN is trapped by debug builds
-      if (values(place) < range(1) .or. values(place) > range(2)) return
-    end do
-    place = 0
-  end function first_outside
-
   !> Refuses numbers that the input could not have either.
   subroutine check_numbers(me, farthest)
     type(species_settings_t), intent(inout) :: me
     real(real64), intent(in) :: farthest                      !! coordinate of the box [length]
-    character(len=:), allocatable :: what
-    integer :: k, row, size_row
+    logical :: wrong
+    integer :: k, row
 
     do k = 1, size(me%in_file%rows)
-      associate (disk => me%in_file%table(:, k))
-        what = "is out of range (sizes up to 1e100)"
-        row = first_outside(disk(:radius_row - 1), [-largest, largest])
-        size_row = first_outside(disk(radius_row:), [smallest, largest]) + radius_row - 1
-        if (row == 0 .and. size_row >= radius_row) then
-          row = size_row
-          what = "is not a "//trim(column_names(row))//"; allowed: a number > 0"
-        else if (row == 0) then
-          if (.not. disk(radius_row) < resolution*farthest) cycle
-          row = radius_row
-          what = "is too small a radius to be resolved at coordinates of "//written(farthest)
-        end if
-        call refuse(me, origin(me, k, row)//": "//written(disk(row))//" "//what)
-      end associate
+      do row = 1, mass_row
+        associate (number => me%in_file%table(row, k))
+          wrong = .not. ieee_is_finite(number)                ! comparing a NaN is trapped by debug builds
+          if (.not. wrong) wrong = number > largest .or. number < merge(smallest, -largest, row >= radius_row)
+          if (.not. wrong) cycle
+        end associate
+        if (row < radius_row) call object("is out of range (sizes up to 1e100)")
+        if (row >= radius_row) call object("is not a "//trim(column_names(row))//"; allowed: a number > 0")
+        return
+      end do
+      row = radius_row
+      if (.not. me%in_file%table(row, k) < resolution*farthest) cycle
+      call object("is too small a radius to be resolved at coordinates of "//written(farthest))
       return
     end do
+
+  contains
+
+    !> Refuses the number.
+    subroutine object(what)
+      character(len=*), intent(in) :: what
+
+      call refuse(me, origin(me, k, row)//": "//written(me%in_file%table(row, k))//" "//what)
+    end subroutine object
   end subroutine check_numbers
 
   !> Where the values of a disk come from, for messages: a line of a text file, or a row of a dataset.
