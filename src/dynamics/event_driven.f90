@@ -99,7 +99,7 @@ contains
 
     turns = limits%turns
     self%turns_left = turns
-    self%thorough = present(log) .or. sim%law%rotation .or. sim%law%detailed
+    self%thorough = present(log) .or. sim%with%are_rare()
     self%arrived = .false.
     do while (turns > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return

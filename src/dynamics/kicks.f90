@@ -4,7 +4,6 @@ module kicks
   use kinds, only: int32, pi, real64
   use disks, only: angle_column, spin_column
   use drive, only: active, andersen, noise
-  use encounters, only: land, turn
   use exact_sums, only: exact_sum_t
   use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
   use simulation_state, only: simulation_t
@@ -53,8 +52,7 @@ contains
         is_hit = u < drive%fraction
       end if
       if (.not. is_hit) return
-      if (sim%law%rotation) call turn(sim, i, sim%now)
-      call land(sim%disk(i), sim%box%gravity, sim%now)
+      call sim%bring(i, sim%now)
       sim%tag(i)%met = 0
       call stream%draw_normals(z)
       if (drive%kind == noise) then
@@ -64,7 +62,7 @@ contains
       v = sim%box%stream(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
       if (drive%kind == active) call swim(sim, i, v)
       call change_velocity(sim, i, v)
-      if (.not. sim%law%rotation) return
+      if (.not. sim%with%rotation) return
       call stream%draw_normals(spin)
       call change_spin(sim, i, sqrt(drive%temperature/sim%inertia_of(i))*spin(1))
     end associate

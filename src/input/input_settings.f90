@@ -47,11 +47,12 @@ contains
     call take_drive(groups(place_of("drive", groups%name)))
     call take_stop(groups(place_of("stop", groups%name)))
     call take_output(groups(place_of("output", groups%name)))
-    associate (law => settings%law, box => settings%box)
-      law%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
+    associate (law => settings%law, box => settings%box, with => settings%with)
+      with%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file)
+      with%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
         .or. any(settings%species%rotational_temperature >= 0)
-      law%orientation = settings%drive%kind == active
-      law%detailed = law%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor
+      with%orientation = with%rotation .or. settings%drive%kind == active
+      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor
     end associate
     call check_conflicts(settings, groups, problems)
 

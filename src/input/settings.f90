@@ -2,12 +2,10 @@
 !> Meaning, range and unit of each variable are in `variables`.
 module settings
   use kinds, only: int64, real64
-  use box_geometry, only: box_t
-  use collisions, only: contact_law_t
   use disks, only: species_t
-  use drive, only: drive_t
   use errors, only: error_t
   use input_groups, only: group_t
+  use simulation_state, only: system_t
   use stop_rules, only: stop_settings_t
   use texts, only: text_t
   implicit none
@@ -71,12 +69,9 @@ module settings
     real(real64) :: checkpoint_every                  !! [s] of wall clock
   end type output_settings_t
 
-  type :: settings_t
+  type, extends(system_t) :: settings_t
     type(run_settings_t) :: run
-    type(box_t) :: box
-    type(contact_law_t) :: law
     type(species_settings_t), allocatable :: species(:)
-    type(drive_t) :: drive
     type(stop_settings_t) :: stop
     type(output_settings_t) :: output
   contains

@@ -271,7 +271,7 @@ contains
     if (.not. allocated(error)) call read_slot(record, sim, progress, error)
     call record%file%close()
     if (allocated(error)) return
-    if (.not. sim%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
+    if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
     call sim%choose_units()
     call progress%frames%look_ahead(sim)
     call progress%observables%look_ahead(sim)
@@ -372,10 +372,10 @@ contains
     call exchange_tally(record, sim)
     do k = 1, n_columns
       if (.not. sim%has_column(k)) cycle
-      if ((k == radius_column .or. k == mass_column) .and. .not. sim%own_sizes) cycle     ! they follow from the input
+      if ((k == radius_column .or. k == mass_column) .and. .not. sim%with%own_sizes) cycle     ! they follow from the input
       call exchange_column(record, sim, k)
     end do
-    if (sim%own_sizes .and. record%way == reading) call sim%settle_masses()
+    if (sim%with%own_sizes .and. record%way == reading) call sim%settle_masses()
   end subroutine exchange_state
 
   !> Writes or reads what collisions have gathered.

@@ -1,9 +1,9 @@
 !> The contact laws: restitution by pair of species, laws of walls, the TC model.
 module collisions
-  use kinds, only: int64, real64
+  use kinds, only: real64
   implicit none
   private
-  public :: contact_law_t, grip_t, normal_rule, pair_impulse, still_in_contact, tangential_impulse
+  public :: contact_law_t, grip_t, normal_rule, pair_impulse, tangential_impulse
   public :: wall_law_t, wall_rebound, wall_rules
 
   !> The rules for walls by their names in the input; a rule is its number in this list.
@@ -36,24 +36,11 @@ module collisions
     real(real64) :: contact_time = 0.0_real64
     type(grip_t) :: grip = grip_t()                  !! of two disks
     real(real64) :: inertia = 0.5_real64             !! moment of inertia over mass times radius squared
-    logical :: rotation = .false.                    !! disks can turn
-    logical :: orientation = .false.                 !! disks have a direction, whether they turn or not
-    logical :: detailed = .false.                    !! momentum changes are logged, their tensor is summed
   contains
     procedure :: loses_energy
   end type contact_law_t
 
 contains
-
-  !> Whether the last contact of a disk is not over yet, so that the next one is elastic (TC model).
-  elemental function still_in_contact(law, collisions, elapsed) result(yes)
-    type(contact_law_t), intent(in) :: law
-    integer(int64), intent(in) :: collisions         !! of the disk, so far
-    real(real64), intent(in) :: elapsed              !! since the last of them [time]
-    logical :: yes
-
-    yes = collisions > 0 .and. elapsed < law%contact_time
-  end function still_in_contact
 
   !> Whether contacts of disks can cost energy.
   pure function loses_energy(self) result(yes)

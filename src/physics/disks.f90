@@ -3,11 +3,12 @@
 !> columns that are there only where something needs them. What is derived is not in the table: it is rebuilt at every
 !> start.
 module disks
+  use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
   implicit none
   private
   public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
-  public :: disks_before, longest_name, names_of, species_by_id
+  public :: disks_before, land, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
   !> disks see it by extrapolation.
@@ -66,6 +67,19 @@ module disks
   integer, parameter :: n_columns = size(columns)
 
 contains
+
+  !> Takes a disk to where it is at the time t.
+  pure subroutine land(disk, gravity, t)
+    type(disk_t), intent(inout) :: disk
+    real(real64), intent(in) :: gravity(2), t
+    real(real64) :: s
+
+    s = t - disk%clock
+    disk%x = flight(disk%x, disk%v, gravity, s)
+    disk%v = flight_velocity(disk%v, gravity, s)
+    disk%clock = t
+    disk%stamp = disk%stamp + 1
+  end subroutine land
 
   !> The names of the species.
   pure function names_of(species) result(names)

@@ -3,24 +3,25 @@
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
-  use disks, only: angle_column, image_column, mass_column
+  use disks, only: image_column, land, mass_column
   use event_log, only: event_log_t
-  use free_flight, only: flight, flight_velocity
+  use free_flight, only: flight
   use images, only: image_t, images_t
   use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use tally, only: dissipated, stress, virial, work
   use texts, only: written
-  use wall_hits, only: collide_wall, land, make_contact, spin_up
+  use wall_hits, only: collide_wall
   implicit none
   private
-  public :: collide, collide_pair, encounter_text, land, pass_side, passes, turn
+  public :: collide, collide_pair, encounter_text, pass_side, passes
 
 contains
 
-  !> Collides disk i at the time t with what `code` names, unless they are together already, and logs the collision if there
-  !> is a log: the same entry whichever of two disks expected it.
+  !> Collides disk i at the time t with what `code` names, unless they are together already, with all that is rare: disks
+  !> turn and rub, and the collision is booked, and logged if there is a log: the same entry whichever of two disks expected
+  !> it.
   subroutine collide(sim, i, code, t, counts, log)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
@@ -40,11 +41,11 @@ contains
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
+      call sim%bring(second, t)
     end if
-    v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
-    if (sim%law%rotation) call turn(sim, first, t)
+    call sim%bring(first, t)
+    v = sim%disk(first)%v
     if (code > 0) then
-      if (sim%law%rotation) call turn(sim, second, t)
       call collide_pair(sim, i, code, t, counts)
       if (sim%law%grip%is_rough()) &
         call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
@@ -53,23 +54,12 @@ contains
     end if
     if (.not. counts) return
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
-    if (code > 0 .and. sim%law%detailed) call book_pair(sim, first, second, change)
+    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change)
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
     call log%append([sim%epoch + t, real(ids, real64), sim%mass_of(first)*magnitude(sim%disk(first)%v - v), change])
   end subroutine collide
-
-  !> Turns disk i, whose clock is still to be set, to where it is at the time t.
-  pure subroutine turn(sim, i, t)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    real(real64), intent(in) :: t
-
-    associate (angle => sim%extra(sim%extra_row(angle_column), i))
-      angle = angle + sim%spin(i)*(t - sim%disk(i)%clock)
-    end associate
-  end subroutine turn
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.
   subroutine collide_pair(sim, i, j, t, counts)
@@ -86,15 +76,17 @@ contains
     restitution = sim%law%restitution(si, sj)
     if (sim%law%contact_time > 0) then
       elastic = .false.
-      call make_contact(sim, i, t, elastic)
-      call make_contact(sim, j, t, elastic)
+      call sim%make_contact(i, t, elastic)
+      call sim%make_contact(j, t, elastic)
       if (elastic) restitution = 1
     end if
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
     dv = sim%disk(j)%v - sim%disk(i)%v
-    if (any(sim%box%periodic)) call see_nearest(sim, t, dx, dv)
+    if (any(sim%box%periodic)) then
+      if (any(abs(dx) >= 0.5_real64*sim%box%edges())) call see_nearest(sim, t, dx, dv)    ! seldom
+    end if
     b = dx(1)*dv(1) + dx(2)*dv(2)
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
@@ -140,25 +132,13 @@ contains
       impulse = tangential_impulse(law%grip, law%inertia, reduced, slip, normal_impulse)
       p%v = p%v + (impulse/mass_i)*along
       q%v = q%v - (impulse/mass_j)*along
-      call spin_up(sim, i, -p%radius*impulse)
-      call spin_up(sim, j, -q%radius*impulse)
+      call sim%spin_up(i, -p%radius*impulse)
+      call sim%spin_up(j, -q%radius*impulse)
       if (counts) call sim%tally%sum(dissipated)%add( &
         -impulse*(slip + 0.5_real64*impulse*(1 + 1/law%inertia)/reduced))
     end associate
-    call settle(sim, i, j)
+    call keep_apart(sim, i, j)
   end subroutine rub
-
-  !> Takes from two disks that have collided the approach that rounding has left, if any.
-  pure subroutine settle(sim, i, j)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-    real(real64) :: dx(2), dv(2)
-
-    dx = sim%disk(j)%x - sim%disk(i)%x
-    dv = sim%disk(j)%v - sim%disk(i)%v
-    call see_nearest(sim, sim%disk(i)%clock, dx, dv)
-    if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)
-  end subroutine settle
 
   !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change times their
   !> distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
@@ -179,7 +159,7 @@ contains
     end do
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-slip(1)*change(1))
-    call settle(sim, i, j)
+    call keep_apart(sim, i, j)
   end subroutine book_pair
 
   !> Turns the separation of two disks at the time t, and its rate, into those of the nearest image of the second.
@@ -219,7 +199,7 @@ contains
     end associate
   end function are_together
 
-  !> Takes from two disks of the same clock, which have collided, the approach that is left by rounding, in the very
+  !> Takes from two disks of the same clock, which have collided, the approach that rounding may have left, in the very
   !> expression by which a contact is predicted: then none is. This is no collision, and the clocks stay.
   pure subroutine keep_apart(sim, i, j)
     type(simulation_t), intent(inout) :: sim

@@ -56,9 +56,9 @@ contains
     integer :: s, k
 
     call add_up(sim, sums)
-    call add_means(list, "all", sums(0), sim%law%rotation)
+    call add_means(list, "all", sums(0), sim%with%rotation)
     do s = 1, size(sim%species)
-      call add_means(list, sim%species(s)%name, sums(s), sim%law%rotation)
+      call add_means(list, sim%species(s)%name, sums(s), sim%with%rotation)
     end do
     call list%add("total_energy", [sums(0)%total(sim%is_driven())])
     call list%add("momentum", sums(0)%momentum)
@@ -74,7 +74,7 @@ contains
     end associate
     if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%highest_speed() > 0) call list%add("work", [sim%tally%total(work)])
-    if (sim%law%detailed) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
+    if (sim%with%stress) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
     do k = 1, size(sim%box%surface)
       if (sim%box%is_wall(k)) call add_surface(list, surface_path(sim%box, k), sim%tally%surface(k))
     end do
@@ -163,7 +163,7 @@ contains
     empty%box = box_t()
     empty%box%surface%law%temperature = 1         ! but all that can be measured
     empty%box%surface%law%speed = 1
-    empty%law%detailed = .true.
+    empty%with%stress = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
     names(list%n + 1) = "walls"                   ! it has none
@@ -233,7 +233,7 @@ contains
         if (falling) own%potential = own%potential - mass*dot_product(sim%box%gravity, sim%position(i))
         own%speed = own%speed + sqrt(speed2)
         own%momentum = own%momentum + mass*v
-        if (sim%law%rotation) own%rotational = own%rotational + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
+        if (sim%with%rotation) own%rotational = own%rotational + 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
         if (sheared) then
           v = v - sim%box%stream(sim%position(i))
           own%own_kinetic = own%own_kinetic + 0.5_real64*mass*dot_product(v, v)
@@ -241,7 +241,7 @@ contains
         end if
         if (driven) call add_energy(own, 0.5_real64*mass*speed2)
         if (driven .and. falling) call add_energy(own, -mass*dot_product(sim%box%gravity, sim%position(i)))
-        if (driven .and. sim%law%rotation) call add_energy(own, 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2)
+        if (driven .and. sim%with%rotation) call add_energy(own, 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2)
       end associate
     end do
     do s = 1, size(sim%species)

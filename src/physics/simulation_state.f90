@@ -4,28 +4,33 @@ module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, n_fixed, species_by_id, &
-    species_t, spin_column, tag_t
+  use disks, only: angle_column, columns, contact_column, disk_t, image_column, land, mass_column, n_columns, n_fixed, &
+    species_by_id, species_t, spin_column, tag_t
   use drive, only: drive_t
+  use features, only: features_t
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
   use tally, only: tally_t
   implicit none
   private
-  public :: given_t, simulation_t
+  public :: given_t, simulation_t, system_t
 
   !> Walls and kicks may give more than they commonly do, and nobody knows how much less until they act: units fine enough
   !> for the energies before that leave room for the sums of 2**35 terms.
   real(real64), parameter :: uncommon = 64, finer = 2.0_real64**(-30)
 
-  !> What the input gives, the same for all parts of a simulation.
-  type :: given_t
+  !> What acts on disks.
+  type :: system_t
     type(box_t) :: box
     type(contact_law_t) :: law
+    type(drive_t) :: drive
+    type(features_t) :: with                      !! what it does beside plain collisions
+  end type system_t
+
+  !> What the input gives, the same for all parts of a simulation.
+  type, extends(system_t) :: given_t
     type(species_t), allocatable :: species(:)
     integer(int64) :: seed = 1                    !! of random numbers drawn in the run
-    type(drive_t) :: drive
-    logical :: own_sizes = .false.                !! masses and radii are not those of the species
   end type given_t
 
   !> And what a checkpoint stores.
@@ -65,6 +70,9 @@ module simulation_state
     procedure :: position
     procedure :: velocity
     procedure :: spin
+    procedure :: spin_up
+    procedure :: bring
+    procedure :: make_contact
     procedure :: inertia_of
     procedure :: kinetic_energy
     procedure :: is_driven
@@ -109,7 +117,7 @@ contains
     call self%make_room(sum(self%species%count))
     self%tag%id = [(i, i=1, self%n_disks())]
     self%tag%species = species_by_id(self%species)
-    do i = 1, merge(self%n_disks(), 0, self%own_sizes)
+    do i = 1, merge(self%n_disks(), 0, self%with%own_sizes)
       self%extra(self%extra_row(mass_column), i) = self%species(self%tag(i)%species)%mass
     end do
   end subroutine list_disks
@@ -132,11 +140,11 @@ contains
     logical :: needed(n_fixed + 1:n_columns)
     integer :: k
 
-    needed(mass_column) = self%own_sizes
+    needed(mass_column) = self%with%own_sizes
     needed(image_column:image_column + 1) = any(self%box%periodic)
     needed(contact_column) = self%law%contact_time > 0
-    needed(spin_column) = self%law%rotation
-    needed(angle_column) = self%law%rotation .or. self%law%orientation
+    needed(spin_column) = self%with%rotation
+    needed(angle_column) = self%with%orientation
     self%extra_row = [(count(needed(:k)), k=n_fixed + 1, n_columns)]
     where (.not. needed) self%extra_row = 0
   end subroutine choose_columns
@@ -324,6 +332,44 @@ contains
     if (self%extra_row(spin_column) > 0) omega = self%extra(self%extra_row(spin_column), i)
   end function spin
 
+  !> Changes the angular momentum of disk i.
+  pure subroutine spin_up(self, i, change)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: change            !! [mass length**2/time]
+
+    associate (omega => self%extra(self%extra_row(spin_column), i))
+      omega = omega + change/self%inertia_of(i)
+    end associate
+  end subroutine spin_up
+
+  !> Takes disk i to where it is at the time t, and turns it.
+  pure subroutine bring(self, i, t)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: t
+
+    if (self%with%rotation) then
+      associate (angle => self%extra(self%extra_row(angle_column), i))
+        angle = angle + self%spin(i)*(t - self%disk(i)%clock)
+      end associate
+    end if
+    call land(self%disk(i), self%box%gravity, t)
+  end subroutine bring
+
+  !> Disk i makes contact at the time t, which is elastic if its last contact is not over yet (TC model).
+  pure subroutine make_contact(self, i, t, elastic)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: t
+    logical, intent(inout) :: elastic             !! already, or for this reason
+
+    associate (last => self%extra(self%extra_row(contact_column), i))
+      elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
+      last = t
+    end associate
+  end subroutine make_contact
+
   !> Moment of inertia of disk i.
   pure function inertia_of(self, i) result(inertia)
     class(simulation_t), intent(in) :: self
@@ -344,7 +390,7 @@ contains
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
-    if (.not. self%law%rotation) return
+    if (.not. self%with%rotation) return
     do i = 1, self%n_disks()
       energy = energy + 0.5_real64*self%inertia_of(i)*self%spin(i)**2
     end do

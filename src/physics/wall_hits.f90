@@ -1,56 +1,18 @@
-!> What changes in the state when a disk hits a surface of the box; and what every contact does to a disk.
+!> What changes in the state when a disk hits a surface of the box.
 module wall_hits
   use kinds, only: int32, real64
   use box_geometry, only: strike_velocity, surface_velocity, wall_normal
-  use collisions, only: grip_t, still_in_contact, tangential_impulse, wall_law_t, wall_rebound
-  use disks, only: contact_column, disk_t, spin_column
-  use free_flight, only: flight, flight_velocity
+  use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
+  use disks, only: land, spin_column
   use partners, only: is_side
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat, work
   implicit none
   private
-  public :: collide_wall, land, make_contact, spin_up
+  public :: collide_wall
 
 contains
-
-  !> Advances a disk's own state to the time t.
-  pure subroutine land(disk, gravity, t)
-    type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: gravity(2), t
-    real(real64) :: s
-
-    s = t - disk%clock
-    disk%x = flight(disk%x, disk%v, gravity, s)
-    disk%v = flight_velocity(disk%v, gravity, s)
-    disk%clock = t
-    disk%stamp = disk%stamp + 1
-  end subroutine land
-
-  !> Disk i makes contact at the time t. `elastic`: its last contact is not over, by the contact law.
-  pure subroutine make_contact(sim, i, t, elastic)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    real(real64), intent(in) :: t
-    logical, intent(inout) :: elastic
-
-    associate (last => sim%extra(sim%extra_row(contact_column), i))
-      elastic = elastic .or. still_in_contact(sim%law, sim%tag(i)%collisions, t - last)
-      last = t
-    end associate
-  end subroutine make_contact
-
-  !> Changes the angular momentum of disk i.
-  pure subroutine spin_up(sim, i, change)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    real(real64), intent(in) :: change           !! [mass length**2/time]
-
-    associate (omega => sim%extra(sim%extra_row(spin_column), i))
-      omega = omega + change/sim%inertia_of(i)
-    end associate
-  end subroutine spin_up
 
   !> Collides disk i with a surface of the box at the time t.
   subroutine collide_wall(sim, i, code, t, counts)
@@ -63,7 +25,7 @@ contains
     logical :: elastic
 
     elastic = .false.
-    if (sim%law%contact_time > 0) call make_contact(sim, i, t, elastic)
+    if (sim%law%contact_time > 0) call sim%make_contact(i, t, elastic)
     call land(sim%disk(i), sim%box%gravity, t)
     law = sim%box%surface(1 - code)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
@@ -99,7 +61,7 @@ contains
     call stream%draw_normals(normals)
     thermal = sqrt(temperature/sim%mass_of(i))
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
-    if (sim%law%rotation) sim%extra(sim%extra_row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
+    if (sim%with%rotation) sim%extra(sim%extra_row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine leave_thermally
 
   !> The tangential part of a hit of disk i on a rough wall; the velocity along the normal has changed already.
@@ -117,7 +79,7 @@ contains
       impulse = tangential_impulse(grip, sim%law%inertia, mass, &
         dot_product(disk%v - u, along) - disk%radius*sim%spin(i), mass*abs(dot_product(disk%v - before, normal)))
       disk%v = disk%v + (impulse/mass)*along
-      call spin_up(sim, i, -disk%radius*impulse)
+      call sim%spin_up(i, -disk%radius*impulse)
     end associate
   end subroutine rub_wall
 
@@ -134,7 +96,7 @@ contains
 
     mass = sim%mass_of(i)
     gain = 0.5_real64*mass*(dot_product(sim%disk(i)%v, sim%disk(i)%v) - dot_product(v, v))
-    if (sim%law%rotation) gain = gain + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
+    if (sim%with%rotation) gain = gain + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
     done = mass*dot_product(u, sim%disk(i)%v - v)
     sim%tally%events = sim%tally%events + 1
     if (heats) then

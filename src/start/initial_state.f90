@@ -2,6 +2,7 @@
 module initial_state
   use kinds, only: int32, real64
   use box_geometry, only: box_t
+  use drive, only: active
   use errors, only: error_t
   use input_groups, only: range_of
   use input_problems, only: problem_list_t
@@ -34,7 +35,7 @@ contains
       call describe_system(settings, sim)
       call sim%list_disks()
       call check_lengths(sim%box, settings%species%radius, problems)
-      if (sim%law%orientation) call orient(sim)
+      if (sim%drive%kind == active) call orient(sim)
       if (problems%count == 0) call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
       if (problems%count == 0) call set_in_motion(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)
@@ -83,17 +84,14 @@ contains
     end if
   end subroutine check_speeds
 
-  !> Box, contact law and species.
+  !> All but the disks.
   subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
     integer :: s
 
-    sim%box = settings%box
-    sim%law = settings%law
+    sim%system_t = settings%system_t
     sim%seed = settings%run%seed
-    sim%drive = settings%drive
-    sim%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file)
     allocate (sim%species(size(settings%species)))
     do s = 1, size(sim%species)
       sim%species(s) = settings%species(s)%species_t

@@ -41,7 +41,7 @@ contains
     if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
-    associate (box => settings%box, law => settings%law, species => settings%species)
+    associate (box => settings%box, with => settings%with, species => settings%species)
       beyond = box%reach()                                    ! of sides that move
       do k = n_sides + 1, size(box%surface)                   ! obstacles say themselves what is wrong with their places
         misfit = box%surface(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
@@ -51,9 +51,9 @@ contains
       do k = 1, size(species)
         call survey_file(species, k, box, groups(s(1) + k - 1), problems)
       end do
-      law%rotation = law%rotation .or. any(species%spin_in_file)
-      law%orientation = law%orientation .or. any(species%angle_in_file)
-      law%detailed = law%detailed .or. law%rotation
+      with%rotation = with%rotation .or. any(species%spin_in_file)
+      with%orientation = with%rotation .or. with%orientation .or. any(species%angle_in_file)
+      with%stress = with%stress .or. with%rotation
       if (settings%n_disks() > most_disks) return             ! told already
       k = problems%count
       call check_memory(settings, problems)

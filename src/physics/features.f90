@@ -1,0 +1,27 @@
+!> What a run does beside flights and collisions that change two velocities. Whoever must know asks here: which columns the
+!> disks have, what is observed, how much a collision takes, and what the input is refused.
+module features
+  implicit none
+  private
+  public :: features_t
+
+  type :: features_t
+    logical :: own_sizes = .false.      !! masses and radii are not those of the species
+    logical :: rotation = .false.       !! disks can turn
+    logical :: orientation = .false.    !! disks have a direction, as all have that can turn
+    logical :: stress = .false.         !! the changes of momentum are summed, and logged
+  contains
+    procedure :: are_rare
+  end type features_t
+
+contains
+
+  !> Whether collisions take more than the usual path.
+  pure function are_rare(self) result(yes)
+    class(features_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%rotation .or. self%stress
+  end function are_rare
+
+end module features
