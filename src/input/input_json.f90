@@ -74,6 +74,7 @@ contains
     logical :: waiting(size(groups))
     integer :: g, k, n
 
+    between = ""
     waiting = [(groups(g)%line > 0 .or. any(groups(g)%values%given), g=1, size(groups))]
     do n = 1, count(waiting)
       g = minloc(merge(groups%first, huge(g), groups%line > 0), dim=1, mask=waiting)

@@ -34,6 +34,8 @@ contains
 
     outside = 0
     overlapping = 0
+    taken = ""
+    if (any(packing%box%surface%motion%travels())) taken = ", less what a side that moves takes of it at the start"
     largest = maxval(species%radius)
     before = disks_before(species, s)
     call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
@@ -44,8 +46,6 @@ contains
       slack = rounding*(radius(k) + largest)
       call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
       if (any(x(:, k) < lower - slack .or. x(:, k) > upper + slack)) then
-        taken = ""
-        if (any(packing%box%surface%motion%travels())) taken = ", less what a side that moves takes of it at the start"
         call report(outside, "is not wholly in its region"//taken)
         cycle
       end if
