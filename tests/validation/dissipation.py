@@ -62,33 +62,10 @@ ENDLESS = tuple(
 )  # fmt: skip
 
 
-def coldest(run: Run) -> list[float]:
-    """Decades that the temperature has fallen, and the momentum over sum m |v| at the start."""
+def fall(run: Run) -> float:
+    """Decades that the temperature has fallen."""
     kt = run.observable("all/temperature").value
-    momentum = np.linalg.norm(run.observable("momentum").value[-1])
-    return [np.log10(kt[0] / kt[-1]), momentum / np.sum(run.mass * run.speed(0))]
-
-
-LEDGER = tuple(
-    Member(
-        gas(
-            200, radius=0.02, contact=contact, stop={"collisions_per_disk": 20},
-            output={"observables_every_collisions": 20},
-        )
-    )
-    for contact in (
-        {"restitution": 0.9},
-        {"restitution": 0.7, "wall_restitution": 0.95, "wall_rule": "normal"},
-        {"restitution": 0.8, "contact_time": 1e-4},
-    )
-)  # fmt: skip
-
-
-def ledger(run: Run) -> float:
-    """Largest gap between energy lost and energy booked as lost, over the first energy."""
-    total = run.observable("total_energy").value
-    booked = run.observable("dissipated_energy").value
-    return float(np.max(np.abs(total + booked - total[0])) / total[0])
+    return float(np.log10(kt[0] / kt[-1]))
 
 
 SLOW = 0.99999
@@ -130,16 +107,8 @@ GAS = [
         hd.haff_by_time(12.8, 0.9), relative(0.015), "Haff 1983; R",
     ),
     Case(
-        "P9-03", "energy lost and energy booked, in 3 gases with walls, over the first energy",
-        LEDGER, lambda *runs: [ledger(run) for run in runs], 1e-10, AT_MOST, "D",
-    ),
-    Case(
         "P9-12", "cooling without end: ends by itself, decades that T has fallen",
-        ENDLESS, lambda *runs: [coldest(run)[0] for run in runs], 26, within(1), "D",
-    ),
-    Case(
-        "P9-12", "the same: momentum over sum m |v| at the start",
-        ENDLESS, lambda *runs: [coldest(run)[1] for run in runs], 1e-15, AT_MOST, "D",
+        ENDLESS, lambda *runs: [fall(run) for run in runs], 26, within(1), "D",
     ),
     *[
         Case(
@@ -198,16 +167,6 @@ MIXTURE = [
     Case(
         "P9-05", "the same, xi = 1: K_heavy / K_light after 10 collisions per disk",
         EXAM[:16], temperature_ratio, 1, relative(0.03), "D",
-    ),
-    Case(
-        "P9-05", "the same, xi = .9, .8: K of each species over twice its last value, at least",
-        EXAM[16:],
-        lambda *runs: min(
-            run.observable(f"{name}/kinetic_energy").value[0]
-            / run.observable(f"{name}/kinetic_energy").value[-1] / 2
-            for run in runs for name in run.names
-        ),
-        1, AT_LEAST, "EX",
     ),
     *[
         Case(
@@ -274,19 +233,6 @@ def wrong_flags(run: Run) -> int:
     return int(np.sum(lost == flagged(run)))
 
 
-def unequal_before_flag(*runs: Run) -> int:
-    """Differences of logs of pairs of runs, up to the first elastic collision of one of each."""
-    unequal = compared = 0
-    for run, plain in zip(runs[::2], runs[1::2], strict=True):
-        first = int(np.argmax(flagged(run)))
-        logs = zip(run.events, plain.events, strict=True)
-        unequal += sum(int(np.sum(a[:first] != b[:first])) for a, b in logs if a is not None)
-        compared += first
-    if compared < 100:
-        raise ValueError(f"only {compared} collisions before the first elastic ones")
-    return unequal
-
-
 TC = [
     Case(
         "P9-07", "packing .05, .1: collisions less than t_c after another, w t_c = .01 to 2",
@@ -301,11 +247,6 @@ TC = [
     Case(
         "P9-08", "the same, t_c without limit: elastic from the second collision on",
         (flagged_gas(1e9),), wrong_flags, 0, EXACT, "D",
-    ),
-    Case(
-        "P9-09", "6 gases, t_c = 1e-4 against 0: differences before the first elastic collision",
-        tuple(flagged_gas(t_c, seed) for seed in range(1, 7) for t_c in (1e-4, 0)),
-        unequal_before_flag, 0, EXACT, "D",
     ),
 ]  # fmt: skip
 
@@ -334,21 +275,6 @@ def symmetric(*factors: float) -> tuple[Member, ...]:
     )
 
 
-def two_and_wall(*factors: float) -> tuple[Member, ...]:
-    """Two disks that fly at a wall, one behind the other: half of four in free space."""
-    return tuple(
-        Member(
-            namelist(
-                box={"upper": (1000, 1)},
-                species=[disk((x, 0.5), (-1, 0), 0.05) for x in (0.2, 0.4)],
-                contact={"restitution": factor * (3 - 2 * sqrt(2))}, stop={"time": 100.0},
-                output={"event_log": True, "frames_every_events": 1},
-            )
-        )
-        for factor in factors
-    )  # fmt: skip
-
-
 def spread(run: Run) -> float:
     """Largest difference of the velocities at the end."""
     return float(np.ptp(run.velocity[-1][:, 0]))
@@ -370,16 +296,6 @@ COLLAPSE = [
         "P9-10", "the same, 0.97 and 0.7 of it: they collapse, the run ends, speed left",
         symmetric(0.97, 0.7), lambda *runs: [spread(run) for run in runs], 1e-16, AT_MOST,
         "Bernu and Mazighi 1990",
-    ),
-    Case(
-        "P9-10", "two and a wall, 1.03 and 1.4 of 3 - 2 sqrt 2: they part, with a speed of",
-        two_and_wall(1.03, 1.4), lambda *runs: [spread(run) for run in runs], 1e-12, AT_LEAST,
-        "Bernu and Mazighi 1990",
-    ),
-    Case(
-        "P9-10", "the same, 0.97 and 0.7 of it: they collapse, speed left",
-        two_and_wall(0.97, 0.7), lambda *runs: [run.speed(-1).max() for run in runs],
-        1e-16, AT_MOST, "Bernu and Mazighi 1990",
     ),
     Case(
         "P9-11", "xi = .05: times of the first six collisions",

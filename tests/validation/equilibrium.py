@@ -7,10 +7,10 @@ import numpy as np
 from ricochet import Run
 from ricochet import hard_disks as hd
 from ricochet.statistics import SeriesMean, combined
-from ricochet.thermodynamics import collision_rate, packing, z_rate, z_virial, z_wall
+from ricochet.thermodynamics import collision_rate, z_rate, z_virial, z_wall
 
-from .case import AT_LEAST, Case, Member, relative, sigmas, within
-from .estimators import closest_gap, force, hit_rate, over_runs, several
+from .case import Case, Member, relative, sigmas, within
+from .estimators import force, hit_rate, over_runs, several
 from .inputs import PERIODIC, ROOT_2, gas, namelist
 from .laws import mixture_rates, mixture_z
 
@@ -75,11 +75,6 @@ BULK = [
             hd.simulated_finite(eta, N), sigmas(3, 0.003), "KR",
         ),
         Case(
-            "P8-01", f"periodic, packing {eta}: Z by the collision rate",
-            bulk(eta), lambda *runs: combined([z_rate(run) for run in runs]),
-            hd.simulated_finite(eta, N), sigmas(3, 0.003), "KR",
-        ),
-        Case(
             "P8-01", f"periodic, packing {eta}: one over the other",
             bulk(eta),
             lambda *runs: combined([z_virial(run) for run in runs]).mean
@@ -113,14 +108,6 @@ def walled(radius: float) -> tuple[Member]:
     return (long_gas(N, WALLED[radius][3], radius=radius),)
 
 
-def wall_estimate(radius: float) -> float:
-    """Force from the equation of state and the line tension of scaled particle theory."""
-    a = 1 - 2 * radius
-    e = N * pi * radius**2 / a**2
-    tension = -(e**2) / (pi * radius * (1 - e) ** 2)
-    return N / a * (hd.simulated(e) + (8 / (1 - e) - 2) * tension * a / N)
-
-
 WALLS = [
     Case(
         "P7-02", f"walls, radius {radius}: collision rate, hits, force",
@@ -129,13 +116,6 @@ WALLS = [
         values[:3], relative(0.01), "R",
     )
     for radius, values in WALLED.items()
-] + [
-    Case(
-        "P7-03", f"walls, radius {radius}: force",
-        walled(radius), force, wall_estimate(radius),
-        relative(0.01 if radius > 0.012 else 0.005), "D, R",
-    )
-    for radius in WALLED
 ]  # fmt: skip
 
 # --- exact: two disks ---
@@ -331,11 +311,6 @@ def lattice(columns: int, rows: int, eta: float, tau: float) -> Member:
     )  # fmt: skip
 
 
-def no_overlap(run: Run) -> float:
-    """Closest gap, and proof that this was the packing wanted."""
-    return closest_gap(run) if packing(run) > 0.74 else -np.inf
-
-
 # Packing: beta P (2 r)^2 of 870 disks in a square box.
 NEAR_FREEZING = {0.67: 7.986779, 0.69: 8.969898}
 
@@ -359,25 +334,6 @@ DENSE = [
         "P8-05", "lattice start, crystal at packing 0.80: Z",
         (lattice(30, 32, 0.80, 4000),), z_virial, hd.crystal(0.80, 960), relative(0.005),
         "Alder, Hoover and Young 1968",
-    ),
-    Case(
-        "P8-06", "dense starts, .80 periodic and walled, .75 of 1 : 1.4: closest gap",
-        (
-            Member(gas(1000, stop={"collisions": 1000}, packing_fraction=0.8, placement="dense",
-                       periodic=True)),
-            Member(gas(1000, stop={"collisions": 1000}, packing_fraction=0.8, placement="dense")),
-            Member(
-                namelist(
-                    box=PERIODIC,
-                    species=[
-                        {"count": 500, "radius": r, "placement": "dense", "speed": 1.0}
-                        for r in radii_for(0.75, 1.4, 1000)
-                    ],
-                    stop={"collisions": 1000},
-                )
-            ),
-        ),
-        lambda *runs: min(no_overlap(run) for run in runs), -1e-12, AT_LEAST, "D",
     ),
 ]  # fmt: skip
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from ricochet import Run
 from ricochet.statistics import Estimate, SeriesMean, estimate, series_mean
@@ -50,24 +49,6 @@ def force(run: Run) -> SeriesMean:
     """Mean force on one side."""
     s = steps(run)
     return series_mean(s.impulse.mean(axis=1), s.time)
-
-
-def closest_gap(run: Run) -> float:
-    """Smallest gap between two disks in any frame, in mean diameters; -1e-12 counts as contact."""
-    reach = 2 * run.radius.max()
-    smallest = np.inf
-    box = np.where(run.periodic, run.edges, 0)
-    for x in run.position:
-        inside = (x - run.lower) % np.where(run.periodic, run.edges, np.inf)
-        tree = cKDTree(inside, boxsize=box if run.periodic.any() else None)
-        pairs = tree.query_pairs(1.01 * reach, output_type="ndarray")
-        if len(pairs) == 0:
-            continue
-        apart = inside[pairs[:, 0]] - inside[pairs[:, 1]]
-        apart -= box * np.round(apart / np.where(run.periodic, run.edges, 1))
-        gap = np.linalg.norm(apart, axis=1) - run.radius[pairs].sum(axis=1)
-        smallest = min(smallest, gap.min())
-    return smallest / (2 * run.radius.mean())
 
 
 def differences(run: Run, other: Run, factor: float = 1.0) -> int:

@@ -8,11 +8,6 @@ from scipy.optimize import brentq
 from ricochet import hard_disks as hd
 
 
-def luding(eta: np.ndarray) -> np.ndarray:
-    """Z with the next term, Luding, Phys. Rev. E 63, 042201 (2001)."""
-    return hd.henderson(eta) - eta**4 / (64 * (1 - eta) ** 4)
-
-
 def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
     """chi_ij of a mixture, from that of equal disks at the same packing fraction.
 

@@ -14,8 +14,8 @@ from validation.running import validate
 from validation.tables import CASES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-03", "P9-09", "P9-1", "P10-01", "P10-07")
-QUICK += ("P12-01", "P12-02", "P13-03", "P13-04", "P13-06", "P13-07", "W1-")
+QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-07", "P9-08", "P9-1", "P10-07", "P12-", "P13-02", "P13-03")
+QUICK += ("P13-04", "P13-06", "W1-", "P15-01", "P15-07", "P15-11")
 
 
 def case(measure, reference, tolerance, members=()) -> Case:
@@ -86,7 +86,7 @@ def test_the_page_has_every_case_of_the_report_and_the_worst_value_of_each():
     assert page == report.markdown(data)
     exact = [case for case in data["cases"] if report.is_rounding(case)]
     counted = sum(map(int, re.findall(r"\| (\d+) to rounding \|", page)))
-    assert 80 < counted == len(exact) < 130
+    assert 50 < counted == len(exact) < 100
     others = [case for case in data["cases"] if case not in exact]
     for name in {case["case"] for case in others}:
         worst = max(case["used"] for case in others if case["case"] == name)
