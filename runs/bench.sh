@@ -202,22 +202,23 @@ ensemble() {
 
 # --- The gate ------------------------------------------------------------------------------------------
 
-# instructions PACKING [OPTION...]: per collision of 1000 disks, of the event loop alone: what starts and writes a run depends
-# on the clock.
+# instructions PACKING COLLISIONS [OPTION...]: of the event loop and of what begins an epoch: what else starts and writes a
+# run depends on the clock.
 instructions() {
-  local packing=$1 collisions=100000
-  shift
+  local packing=$1 collisions=$2
+  shift 2
   gas 1000 "$packing"
-  run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=__event_driven_MOD_advance)
+  run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
+  run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,renumbering_MOD_renumber,epochs_MOD_move_origin}'*')
   run "gas_1000_$packing" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
-  awk -v collisions="$collisions" '/Collected/ { printf "%.0f\n", $4/collisions }' "$work/count"
+  awk '/Collected/ { print $4 }' "$work/count"
 }
 
 check() {
   local packing limit options count verdict=0
   while read -r packing limit options; do
     # shellcheck disable=SC2086 # several options, or none
-    count=$(instructions "$packing" $options)
+    count=$((($(instructions "$packing" 100000 $options) - $(instructions "$packing" 1 $options))/100000))
     printf 'packing %s%s: %s instructions per collision, at most %s\n' "$packing" "${options:+, ${options#--set }}" "$count" "$limit"
     [ "$count" -gt 0 ] && [ "$count" -le "$limit" ] || verdict=1
   done <<'LIMITS'

@@ -7,8 +7,7 @@ module run
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
-  use kicks, only: kick
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int64, real64
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
   use partners, only: n_sides
@@ -24,6 +23,7 @@ module run
   use tally, only: dissipated, drive_energy
   use texts, only: counted, legible, size_text, written
   use threads, only: start_threads
+  use timeline, only: advance_once
   implicit none
   private
   public :: perform_run
@@ -179,12 +179,11 @@ contains
     type(run_t), intent(inout) :: run
     type(error_t), allocatable, intent(out) :: error
     type(limits_t) :: limits
-    integer(int64) :: turns, kicks, events
+    integer(int64) :: turns
     integer :: requests, requests_served
     logical :: stopping
     real(real64) :: now, next_checkpoint              ! [s]
-    real(real64) :: first_time, time, kick_time       ! of the simulation [time]
-    integer(int32), allocatable :: kicked(:)
+    real(real64) :: first_time                        ! of the simulation [time]
 
     turns = 1
     requests_served = 0
@@ -194,27 +193,14 @@ contains
     limits%time = run%sim%time()
     call run%output%tighten(limits)
     ! Where nothing can happen any more a run ends with a sample; one that was stopped right after it has to know.
-    if (run%sim%settled .and. limits%sampled >= run%sim%time()) call run%evolution%advance(run%sim, limits, error)
-    do while (.not. (is_over(run) .or. allocated(error)))
+    if (run%sim%settled .and. limits%sampled >= run%sim%time()) call advance_once(run%evolution, run%sim, limits, error)
+    do while (.not. (run%stop_rule%is_over(run%sim, run%evolution) .or. allocated(error)))
       limits = run%stop_rule%limits
       limits%turns = turns
       call run%output%tighten(limits)
-      kick_time = next_kick(run)
-      limits%time = min(limits%time, kick_time)
       now = seconds()
-      kicks = run%sim%kicks
-      events = run%sim%tally%events
-      time = run%sim%time()
-      call run%evolution%advance(run%sim, limits, error, run%log)
-      do while (run%evolution%arrived .and. run%sim%time() >= kick_time .and. next_kick(run) <= kick_time)
-        call kick(run%sim, kicked)
-        call run%evolution%renew(run%sim, kicked)
-      end do
-      associate (sim => run%sim)
-        sim%settled = run%evolution%arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > time)
-      end associate
-      turns = adapted(turns, seconds() - now, limits%reached(run%sim%tally) .or. run%sim%time() >= limits%time &
-        .or. run%sim%kicks > kicks)
+      call advance_once(run%evolution, run%sim, limits, error, run%log)
+      turns = adapted(turns, seconds() - now, run%evolution%turns_left > 0)
       if (allocated(run%log)) call run%output%write_events(run%sim, run%log)
       if (allocated(error)) exit
       call run%output%write_what_is_due(run%sim, error)
@@ -237,24 +223,6 @@ contains
     end do
     call run%line%clear()
   end subroutine main_loop
-
-  !> Whether the run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever
-  !> happen any more and no rule names a time to wait for.
-  pure function is_over(run) result(yes)
-    type(run_t), intent(in) :: run
-    logical :: yes
-
-    yes = run%stop_rule%met(run%sim) .or. run%stop_rule%too_cold(run%sim) .or. &
-      (run%evolution%idle .and. .not. min(run%stop_rule%limits%time, next_kick(run)) < never)
-  end function is_over
-
-  !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
-  pure function next_kick(run) result(t)
-    type(run_t), intent(in) :: run
-    real(real64) :: t                                 !! since the start of the run; `never` without kicks
-
-    t = run%evolution%pause_at(run%sim%drive%time_of(run%sim%kicks + 1))
-  end function next_kick
 
   !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
   !> would have any number of them, and when the samples cease it would not look up for hours.

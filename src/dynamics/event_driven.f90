@@ -8,7 +8,7 @@ module event_driven
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
-  use epochs, only: begin_first_epoch, last_time, most_events, move_epoch, stands_still
+  use epochs, only: begin_first_epoch, last_time
   use errors, only: error_t, exit_broken, fail
   use event_heap, only: event_t
   use event_log, only: event_log_t, is_full
@@ -34,7 +34,6 @@ module event_driven
     logical :: thorough = .false.                  !! a collision is more than a change of two velocities
     logical :: is_part = .false.                   !! of a simulation: only collisions of disks that belong here count
     class(tracks_t), allocatable :: tracks         !! of its disks, in a part
-    integer(int64) :: turns_left = 0               !! of those that the last advance was allowed
   contains
     procedure :: start
     procedure :: advance
@@ -45,31 +44,23 @@ module event_driven
 
 contains
 
-  !> Predicts all events of a state, new or restored.
+  !> Builds search and queue from a state: new, restored, or in a new epoch.
   subroutine start(self, sim)
-    class(event_driven_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-
-    if (.not. self%is_part) sim%box%epoch = sim%epoch    ! later `move_epoch` sees to it
-    call rebuild(self, sim)
-    call sim%start_sums()
-    self%idle = .false.
-    if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
-  end subroutine start
-
-  !> Rebuilds search and queue from the state.
-  subroutine rebuild(self, sim)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
 
+    self%idle = .false.
+    if (.not. self%is_part) sim%box%epoch = sim%epoch    ! later `move_epoch` sees to it
+    call sim%start_sums()
+    if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
     call self%search%build(sim)
     do i = 1, sim%n_disks()
       if (stop_requested()) return                 ! see `advance`
       if (sim%tag(i)%id > 0) call self%search%predict(sim, i)    ! else a vacant slot
     end do
     call self%queue%fill(sim%disk, sim%tag, sim%now, self%windowed)
-  end subroutine rebuild
+  end subroutine start
 
   !> Predicts the disks anew that have changed; the events of all others that they were to meet are stale.
   subroutine renew(self, sim, changed)
@@ -94,7 +85,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
     type(event_t) :: event
-    real(real64) :: t_limit
     integer(int64) :: turns, pause_at, events
 
     turns = limits%turns
@@ -104,44 +94,27 @@ contains
     do while (turns > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
-      t_limit = min(limits%time - sim%epoch, sim%epoch_end)
       pause_at = next_pause(self, sim, limits, log)
       if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
       events = sim%tally%events
-      call self%run_events(sim, t_limit, pause_at, turns, event, log)
+      call self%run_events(sim, limits%time, pause_at, turns, event, log)
       self%turns_left = turns
-      if (turns == 0 .and. .not. sim%now < t_limit) turns = 1    ! a sample of this moment waits for all its events
+      self%last_event = [event%disk, event%partner]
+      if (turns == 0 .and. .not. sim%now < limits%time) turns = 1    ! a sample of this moment waits for all its events
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
-      if (.not. event%time <= t_limit) then
-        if (is_stale(sim, event)) then             ! what is to come must not depend on who was predicted when
-          call predict(self, sim, event%disk)
-          cycle
-        end if
-        if (event%time /= event%time) &
-          call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
-        self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! there images move for ever
-        if (allocated(error)) return
-        if (self%idle .or. limits%time - sim%epoch <= sim%epoch_end) then
-          if (limits%time < last_time) then
-            sim%now = max(sim%now, limits%time - sim%epoch)
-          else                                     ! a stale event may have moved it
-            sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%epoch)
-          end if
-          self%arrived = .true.
-          return
-        end if
-        sim%now = max(sim%now, sim%epoch_end)
-      else if (sim%tally%events < most_events(sim)) then
+      if (event%time <= limits%time) cycle
+      if (is_stale(sim, event)) then               ! what is to come must not depend on who was predicted when
+        call predict(self, sim, event%disk)
         cycle
       end if
-      if (stands_still(sim)) then
-        call fail(error, exit_broken, "inelastic collapse, time no longer advances: " &
-          //encounter_text(sim, event%disk, event%partner)//remedy(sim, event%disk, event%partner))
+      if (event%time /= event%time) then
+        call fail(error, exit_broken, "a time became NaN: "//encounter_text(sim, event%disk, event%partner))
         return
       end if
-      call move_epoch(sim)
-      call rebuild(self, sim)
-      if (limits%epochs) return
+      self%idle = event%time > last_time .and. .not. sim%box%is_sheared()    ! there images move for ever
+      if (limits%time < last_time) sim%now = max(sim%now, limits%time)
+      self%arrived = .true.
+      return
     end do
   end subroutine advance
 
@@ -190,8 +163,7 @@ contains
     type(event_log_t), intent(in), optional :: log
     integer(int64) :: events
 
-    events = min(most_events(sim), limits%events, &
-      sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
+    events = min(limits%events, sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
     if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
   end function next_pause
 
@@ -272,25 +244,5 @@ contains
       call predict(self, sim, i)
     end do
   end subroutine predict_all
-
-  !> What helps against the collapse of disk i with its partner, as far as it has not been done.
-  pure function remedy(sim, i, code) result(text)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i, code
-    character(len=:), allocatable :: text
-    real(real64) :: restitution
-
-    if (code > 0) then
-      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
-    else
-      restitution = sim%box%surface(1 - code)%law%restitution
-    end if
-    text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
-      //" contact.contact_time (TC model), well below the mean time between collisions"
-    if (restitution < 1) text = text//", or raise " &
-      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
-    if (code <= 0 .and. sim%box%falling()) text = text//"; a disk that starts at rest on a wall never leaves it: " &
-      //"start it higher, or take run.dynamics = 'steps'"
-  end function remedy
 
 end module event_driven

@@ -1,4 +1,4 @@
-!> The seam between the main loop and the ways to move on in time.
+!> The seam between the timeline and the ways to move on in time.
 module evolution
   use kinds, only: int32, int64, never, real64
   use errors, only: error_t
@@ -16,11 +16,10 @@ module evolution
 
   !> Where to pause; the first that is met counts. What is not set is out of reach.
   type :: limits_t
-    real(real64) :: time = never                         !! since the start of the run
+    real(real64) :: time = never                         !! since the start of the run; for an evolution, since the epoch
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: most(n_grown) = huge(0.0_real64)     !! of what is in `grown`
-    logical :: epochs = .false.                          !! whenever the epoch has moved
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
     real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
   contains
@@ -32,6 +31,8 @@ module evolution
   type, abstract :: evolution_t
     logical :: idle = .false.     !! nothing will ever happen again
     logical :: arrived = .false.  !! at the limit of time of the last advance, with all that happens up to it behind
+    integer(int64) :: turns_left = 0       !! of those that the last advance was allowed
+    integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the limit of time
   contains
     procedure :: warning
     procedure :: pause_at

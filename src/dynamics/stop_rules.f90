@@ -5,8 +5,9 @@
 !> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
-  use evolution, only: energy_lost, grown, limits_t
+  use evolution, only: energy_lost, evolution_t, grown, limits_t
   use simulation_state, only: simulation_t
+  use timeline, only: next_kick
   implicit none
   private
   public :: stop_rule_t, stop_settings_t, whole_collisions
@@ -26,9 +27,11 @@ module stop_rules
   type :: stop_rule_t
     type(limits_t) :: limits
     real(real64) :: wall_clock = never       !! [s]
+    logical :: cools = .false.               !! for ever, if the disks lose energy
   contains
     procedure :: met
     procedure :: too_cold
+    procedure :: is_over
     procedure :: share
   end type stop_rule_t
 
@@ -50,8 +53,8 @@ contains
     rule%limits%events = settings%events
     rule%wall_clock = settings%wall_clock
     if (settings%energy_fraction > 0) rule%limits%most(energy_lost) = (1 - settings%energy_fraction)*sim%start_energy
-    if (all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. sim%law%loses_energy() &
-      .and. .not. sim%is_driven()) rule%limits%epochs = .true.
+    rule%cools = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. sim%law%loses_energy() &
+      .and. .not. sim%is_driven()
   end function new_stop_rule
 
   !> The first whole number of collisions that reaches a real one, rounding errors aside; huge if there is none.
@@ -79,9 +82,21 @@ contains
     logical :: yes
 
     yes = .false.
-    if (self%limits%epochs .and. sim%tally%events > 0 .and. sim%tally%events == sim%epoch_events) &
+    if (self%cools .and. sim%tally%events > 0 .and. sim%tally%events == sim%epoch_events) &
       yes = relative_energy(sim) <= coldest*sim%start_energy
   end function too_cold
+
+  !> Whether a run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever happen any more
+  !> and no rule names a time to wait for. What breaks a run off is an error of `timeline` or of an evolution.
+  pure function is_over(self, sim, evolution) result(yes)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    class(evolution_t), intent(in) :: evolution
+    logical :: yes
+
+    yes = self%met(sim) .or. self%too_cold(sim) .or. &
+      (evolution%idle .and. .not. min(self%limits%time, next_kick(evolution, sim)) < never)
+  end function is_over
 
   !> Kinetic energy relative to the common motion. Two passes, because the difference of two large sums would lose digits.
   pure function relative_energy(sim) result(energy)

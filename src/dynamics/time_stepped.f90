@@ -85,15 +85,16 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    integer(int64) :: k, turn
+    integer(int64) :: k
 
     self%arrived = .false.
+    self%turns_left = limits%turns
     k = steps_taken(sim%now, self%dt)
-    do turn = 1, limits%turns
+    do while (self%turns_left > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
-      if (self%idle .or. (k + 1)*self%dt > limits%time - sim%epoch) then
-        if (limits%time < never) sim%now = max(sim%now, limits%time - sim%epoch)
+      if (self%idle .or. (k + 1)*self%dt > limits%time) then
+        if (limits%time < never) sim%now = max(sim%now, limits%time)
         self%arrived = .true.
         return
       end if
@@ -101,6 +102,7 @@ contains
       sim%now = k*self%dt
       call take_step(self, sim, error, log)
       if (allocated(error)) return
+      self%turns_left = self%turns_left - 1
     end do
   end subroutine advance
 

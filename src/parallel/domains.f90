@@ -106,7 +106,6 @@ contains
     if (.not. allocated(self%sim%species)) then
       self%sim%given_t = sim%given_t
       self%sim%epoch_end = forever
-      self%sim%epoch_events = 2_int64**62           ! the whole simulation has epochs, its domains have none
       allocate (self%engine%search, self%engine%tracks)
       self%engine%is_part = .true.
     end if
@@ -223,7 +222,7 @@ contains
       call self%engine%advance(self%sim, limits, error, self%log)
       left = left - (limits%turns - self%engine%turns_left)
       if (allocated(error)) exit
-      self%done = self%sim%now >= t_end
+      self%done = self%engine%arrived
       if (self%done) exit
       if (stop_requested()) exit
       if (seconds() - began > longest_window) exit

@@ -6,7 +6,7 @@
 module parallel_events
   use kinds, only: int32, int64, real64
   use domains, only: merge_logs
-  use epochs, only: begin_first_epoch, most_events, move_epoch, stands_still
+  use epochs, only: begin_first_epoch, most_events
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t, is_full
@@ -50,7 +50,6 @@ module parallel_events
     procedure :: advance
     procedure :: most_domains
     procedure, private :: advance_plainly
-    procedure, private :: end_epoch
     procedure, private :: visit
     procedure, private :: conclude
     procedure, private :: heed_cores
@@ -65,7 +64,8 @@ contains
 
     self%holder = nobody
     self%idle = .false.
-    self%parts%cores = self%parts%threads
+    if (.not. self%parts%cores > 0) self%parts%cores = self%parts%threads
+    self%parts%widening = max(self%parts%widening - 1, 0)
     associate (wanted => self%parts%wanted)
       wanted = min(self%parts%threads, self%most_domains(sim%n_disks(), sim%box%periodic))
       if (wanted > 0) wanted = wanted*max(sim%n_disks()/self%most_disks/wanted, 1)
@@ -105,44 +105,19 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    type(limits_t) :: goal
-    logical :: at_end
     integer :: outcome
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
     outcome = left_alone
-    if (worthwhile(self, sim, limits)) then
-      at_end = sim%now >= sim%epoch_end .and. limits%time - sim%epoch > sim%epoch_end
-      if (at_end .and. .not. stands_still(sim)) then
-        call self%end_epoch(sim)
-        at_end = .false.
-        if (limits%epochs) return
-      end if
-      goal = limits
-      goal%time = min(limits%time - sim%epoch, sim%epoch_end)
-      goal%events = min(limits%events, most_events(sim))
-      if (goal%time > sim%now .and. .not. at_end) call self%visit(sim, goal, outcome, log)
-      if (outcome == kept .and. sim%now >= limits%time - sim%epoch) self%arrived = self%parts%is_past(sim%now)
-    end if
-    if (outcome == left_alone) then
-      call self%advance_plainly(sim, limits, error, log)
-    else if (outcome == kept .and. sim%tally%events >= most_events(sim)) then
-      call self%end_epoch(sim)
+    if (worthwhile(self, sim, limits)) call self%visit(sim, limits, outcome, log)
+    if (outcome == left_alone) call self%advance_plainly(sim, limits, error, log)
+    if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
+      (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
+      deallocate (self%parts%domain)               ! to leave room for sorting many
+      self%holder = nobody
     end if
   end subroutine advance
-
-  !> Begins the next epoch, with all events to be predicted again.
-  subroutine end_epoch(self, sim)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-
-    if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain)) &
-      deallocate (self%parts%domain)               ! to leave room for sorting many
-    call move_epoch(sim)
-    self%holder = nobody
-    self%parts%widening = max(self%parts%widening - 1, 0)
-  end subroutine end_epoch
 
   !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
   subroutine advance_plainly(self, sim, limits, error, log)
@@ -166,8 +141,10 @@ contains
     call self%engine%advance(sim, goal, error, log)
     self%idle = self%engine%idle
     self%arrived = self%engine%arrived
+    self%last_event = self%engine%last_event
+    self%turns_left = self%engine%turns_left
     if (sim%tally%events - events >= sim%n_disks()) &
-      call self%parts%pace%learn(sim%tally%events - events, goal%turns - self%engine%turns_left, sim%time() - time)
+      call self%parts%pace%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
   end subroutine advance_plainly
 
   !> Whether several domains can be faster than the plain engine.
@@ -180,14 +157,14 @@ contains
 
     least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
     yes = self%parts%wanted > 1 .and. sim%tally%events >= self%plain_until .and. limits%events - sim%tally%events > least &
-      .and. limits%collisions - sim%tally%collisions > least
+      .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
   end function worthwhile
 
   !> Lets the domains move on by some windows of time.
-  subroutine visit(self, sim, goal, outcome, log)
+  subroutine visit(self, sim, limits, outcome, log)
     class(parallel_events_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    type(limits_t), intent(in) :: goal             !! its time counts since the epoch
+    type(limits_t), intent(in) :: limits
     integer, intent(out) :: outcome
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: t
@@ -207,20 +184,21 @@ contains
       self%holder = all_domains
     end if
     t = sim%now
-    call self%parts%run_windows(sim, goal, self%patience, t, windows, good)
+    call self%parts%run_windows(sim, limits, self%patience, t, windows, good)
     self%windows_done = self%windows_done + windows
     if (present(log)) then
       listed = log%n
       if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
     end if
     call self%conclude(sim, good, outcome)
-    if (good .and. (goal%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
+    if (good .and. (limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
       ! the plain engine finds the very event, or a collapse
       outcome = left_alone
       self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
     end if
     if (outcome == kept) then
       call self%parts%gather_all(sim, t)
+      if (t >= limits%time) self%arrived = self%parts%is_past(t)
       if (self%parts%threads > 1) call self%heed_cores(sim)
       if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
         outcome = left_alone

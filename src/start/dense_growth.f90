@@ -17,6 +17,7 @@ module dense_growth
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use texts, only: written
+  use timeline, only: advance
   implicit none
   private
   public :: grow_disks, smallest_scale
@@ -175,7 +176,7 @@ contains
       limits%collisions = sim%tally%collisions + (to_come + 1)/2
       limits%events = sim%tally%events + 4*to_come            ! one may rattle in a hole between obstacles
       limits%time = sim%time() + maxval(sim%box%edges())      ! few disks may never collide
-      call evolution%advance(sim, limits, error)
+      call advance(evolution, sim, limits, error)
       do i = 1, sim%n_disks()
         sim%disk(i)%x = sim%position(i)
         sim%disk(i)%clock = sim%now

@@ -8,7 +8,10 @@ import pytest
 from synthetic_run import ROOT
 
 VALGRIND = """#!/bin/sh
-echo "==1== Collected : $((100000 * {}))" >&2
+case "$* " in
+*"stop.collisions=1 "*) echo "==1== Collected : 5000" >&2 ;;
+*) echo "==1== Collected : $((100000 * {} + 5000))" >&2 ;;
+esac
 """
 
 

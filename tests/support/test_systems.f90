@@ -15,6 +15,7 @@ module test_systems
   use side_motion, only: side_motion_t
   use simulation_state, only: simulation_t
   use tally, only: dissipated
+  use timeline, only: advance
   implicit none
   private
   public :: add_obstacle, few_disks, system, systems, every_system, prepare, evolve, difference
@@ -260,7 +261,7 @@ contains
     if (present(collisions)) limits%collisions = collisions
     if (present(events)) limits%events = events
     call prepare(dynamics, method, sim)
-    call dynamics%advance(sim, limits, error)
+    call advance(dynamics, sim, limits, error)
     if (.not. present(failure)) return
     failure = ""
     if (allocated(error)) failure = error%message

@@ -1,0 +1,136 @@
+!> What is due for all disks at once, in its order: at each moment first all collisions, then kicks, then what the caller
+!> does, samples or the end of the run. In between the origin of time moves.
+module timeline
+  use encounters, only: encounter_text
+  use epochs, only: last_time, most_events, move_epoch, stands_still
+  use errors, only: error_t, exit_broken, fail
+  use event_log, only: event_log_t, is_full
+  use evolution, only: evolution_t, limits_t
+  use kicks, only: kick
+  use kinds, only: int32, int64, never, real64
+  use signals, only: stop_requested
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: advance, advance_once, next_kick
+
+contains
+
+  !> Moves on until a limit is met, or nothing will ever happen any more.
+  subroutine advance(evolution, sim, limits, error, log)
+    class(evolution_t), intent(inout) :: evolution
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
+
+    do while (.not. (limits%reached(sim%tally) .or. sim%has_reached(limits%time) .or. is_full(log)))
+      call advance_once(evolution, sim, limits, error, log)
+      if (allocated(error) .or. (evolution%idle .and. .not. limits%time < never)) return
+      if (stop_requested()) return
+    end do
+  end subroutine advance
+
+  !> Moves on until a limit is met, a kick is due, or the epoch is over, and lets that happen. Where this pauses leaves no
+  !> trace in the trajectory.
+  subroutine advance_once(evolution, sim, limits, error, log)
+    class(evolution_t), intent(inout) :: evolution
+    type(simulation_t), intent(inout) :: sim
+    type(limits_t), intent(in) :: limits
+    type(error_t), allocatable, intent(out) :: error
+    type(event_log_t), intent(inout), optional :: log
+    type(limits_t) :: goal
+    real(real64) :: due, kick_time, before         ! [time]
+    integer(int64) :: events
+    integer(int32), allocatable :: kicked(:)
+    logical :: arrived, epoch_is_over
+
+    events = sim%tally%events
+    before = sim%time()
+    kick_time = next_kick(evolution, sim)
+    due = min(limits%time, kick_time)
+    goal = limits
+    goal%time = due - sim%epoch
+    if (sim%epoch_end > 0) then                    ! time steps have no epochs
+      goal%time = min(goal%time, sim%epoch_end)
+      goal%events = min(goal%events, most_events(sim))
+    end if
+    call evolution%advance(sim, goal, error, log)
+    arrived = evolution%arrived
+    if (sim%epoch_end > 0 .and. .not. allocated(error)) then
+      epoch_is_over = sim%tally%events >= most_events(sim)
+      if (arrived .and. evolution%idle) then
+        call wait(sim, due, limits%sampled)
+      else if (arrived .and. due - sim%epoch > sim%epoch_end) then
+        epoch_is_over = .true.
+        arrived = .false.                          ! at the end of the epoch, not where it was to go
+      end if
+      if (epoch_is_over) call end_epoch(evolution, sim, error)
+    end if
+    do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
+      call kick(sim, kicked)
+      call evolution%renew(sim, kicked)
+    end do
+    sim%settled = arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > before)
+  end subroutine advance_once
+
+  !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
+  pure function next_kick(evolution, sim) result(t)
+    class(evolution_t), intent(in) :: evolution
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: t                              !! since the start of the run; `never` without kicks
+
+    t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
+  end function next_kick
+
+  !> Lets time pass until something is due where nothing will ever happen by itself; without an end, to the last collision.
+  pure subroutine wait(sim, due, sampled)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: due                !! since the start of the run [time]
+    real(real64), intent(in) :: sampled            !! the end is not before it [time]
+
+    if (due < last_time) then
+      sim%now = max(sim%now, due - sim%epoch)
+    else                                           ! a stale event, or the end of the epoch, may have moved it
+      sim%now = max(maxval(sim%disk%clock), sampled - sim%epoch)
+    end if
+  end subroutine wait
+
+  !> Begins the next epoch, unless time stands still.
+  subroutine end_epoch(evolution, sim, error)
+    class(evolution_t), intent(inout) :: evolution
+    type(simulation_t), intent(inout) :: sim
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (stands_still(sim)) then
+      associate (i => evolution%last_event(1), code => evolution%last_event(2))
+        call fail(error, exit_broken, "inelastic collapse, time no longer advances: "//encounter_text(sim, i, code) &
+          //remedy(sim, i, code))
+      end associate
+    else
+      call move_epoch(sim)
+      call evolution%start(sim)
+    end if
+  end subroutine end_epoch
+
+  !> What helps against the collapse of disk i with its partner, as far as it has not been done.
+  pure function remedy(sim, i, code) result(text)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, code
+    character(len=:), allocatable :: text
+    real(real64) :: restitution
+
+    if (code > 0) then
+      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+    else
+      restitution = sim%box%surface(1 - code)%law%restitution
+    end if
+    text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
+      //" contact.contact_time (TC model), well below the mean time between collisions"
+    if (restitution < 1) text = text//", or raise " &
+      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
+    if (code <= 0 .and. sim%box%falling()) text = text//"; a disk that starts at rest on a wall never leaves it: " &
+      //"start it higher, or take run.dynamics = 'steps'"
+  end function remedy
+
+end module timeline
