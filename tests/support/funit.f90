@@ -2,13 +2,13 @@
 !> `translate_pf.py` turns each `@assert` into a call of what is below. What pFUnit refuses does not
 !> compile here either: `pf_pair` exists only for the combinations of types that pFUnit accepts.
 module funit
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use, intrinsic :: iso_fortran_env, only: error_unit, int32, int64, output_unit, real32, real64
   implicit none
   private
   public :: anyexceptions, pf_real, pf_begin, pf_run, pf_finish, pf_fail, pf_fail_pair
   public :: pf_conform, pf_same, pf_close, pf_relatively_close, pf_width
-  public :: pf_holds, pf_is_nan, pf_is_finite
+  public :: pf_holds
   public :: pf_pair, pf_number_pair, pf_real_pair
 
   integer, parameter :: pf_real = real64      !! the kind in which tolerances apply
@@ -234,16 +234,6 @@ contains
     logical, intent(in) :: condition(:)
     holds = all(condition)
   end function holds_vector
-
-  pure logical function pf_is_nan(x)
-    real(real64), intent(in) :: x
-    pf_is_nan = ieee_is_nan(x)
-  end function pf_is_nan
-
-  pure logical function pf_is_finite(x)
-    real(real64), intent(in) :: x
-    pf_is_finite = ieee_is_finite(x)
-  end function pf_is_finite
 
   elemental character(len=pair_length) function pair_int32(expected, actual) result(pair)
     integer(int32), intent(in) :: expected, actual
