@@ -298,8 +298,8 @@ contains
       call exchange_all(record, sim, progress)
       words = record%file%length(record%name)
       if (words > 0 .and. words /= record%words) then
-        call fail(error, exit_files, record%file%path//": has other disks than the input describes now: a starting file is not " &
-          //"what it was; --resume needs it as it was, --force instead starts over")
+        call fail(error, exit_files, record%file%path//": has other disks than the input describes now: a starting file " &
+          //"(species.file) is not what it was; --resume needs it as it was, --force instead starts over")
         return
       end if
       call record%begin(reading)
@@ -354,6 +354,7 @@ contains
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: settled
+    real(real64), allocatable :: mass(:)
     integer :: k
 
     call record%exchange(sim%epoch)
@@ -371,11 +372,16 @@ contains
     call record%exchange(sim%kicks)
     call exchange_tally(record, sim)
     do k = 1, n_columns
-      if (.not. sim%has_column(k)) cycle
-      if ((k == radius_column .or. k == mass_column) .and. .not. sim%with%own_sizes) cycle     ! they follow from the input
+      if (.not. sim%has_column(k) .or. k == mass_column) cycle
+      if (k == radius_column .and. .not. sim%with%own_sizes) cycle        ! it follows from the input
       call exchange_column(record, sim, k)
     end do
-    if (sim%with%own_sizes .and. record%way == reading) call sim%settle_masses()
+    if (.not. sim%with%own_sizes) return
+    mass = sim%masses()                         ! there is no column of them if they turn out to be equal
+    call record%exchange(mass)
+    if (record%way /= reading) return
+    sim%extra(sim%extra_row(mass_column), :) = mass
+    call sim%settle_masses()
   end subroutine exchange_state
 
   !> Writes or reads what collisions have gathered.

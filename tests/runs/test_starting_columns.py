@@ -71,67 +71,6 @@ def test_every_column_arrives_to_the_last_digit(ricochet, tmp_path, bed):
     assert own["packing_fraction"] == pytest.approx(area / 2)
 
 
-def test_each_collision_has_the_masses_and_radii_of_its_disks(ricochet, tmp_path, bed):
-    """Energy and momentum are kept disk by disk, and nothing overlaps."""
-    finished(ricochet, "gas.h5", "--set", "box.boundary=periodic,periodic")
-    run = read_run(tmp_path / "gas.h5")
-    energy = run.kinetic_energy(slice(None)).sum(axis=1)
-    assert np.ptp(energy) < 1e-12 * energy[0]
-    assert np.allclose(run.observable("total_energy").value, energy[0], rtol=1e-12)
-    for frame in (0, -1):
-        momentum = run.mass @ run.velocity[frame]
-        assert np.allclose(momentum, run.observable("momentum").value[frame], atol=1e-11)
-    apart = run.position[-1][:, None] - run.position[-1]
-    apart -= np.round(apart / run.edges) * run.edges
-    gap = np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(COUNT)
-    assert -1e-13 < gap.min() < 1e-3
-    # v' = v - J/m n: the change of the velocity of either disk gives the same impulse
-    assert run.events.impulse.min() > 0
-
-
-@pytest.mark.parametrize("method", ["search=pairs", "queue=heap", "dynamics=steps run.dt=1e-6"])
-def test_other_methods_see_the_same_disks(ricochet, tmp_path, bed, method):
-    stop = ["--set", "stop.time=0.02"]
-    options = [word for part in method.split() for word in ("--set", part)]
-    options[1] = "run." + options[1]
-    finished(ricochet, "one.h5", *stop)
-    finished(ricochet, "other.h5", *stop, *options)
-    one, other = (read_run(tmp_path / f"{name}.h5") for name in ("one", "other"))
-    exact = "steps" not in method
-    assert len(one.events.time) == len(other.events.time) > 10
-    close = {} if exact else {"atol": 1e-3}
-    same = np.allclose if close else np.array_equal
-    assert same(one.velocity[-1], other.velocity[-1], **close)
-
-
-def test_several_cores_see_the_same_disks(ricochet, tmp_path):
-    side, rng = 100, np.random.default_rng(6)
-    site = np.stack(np.divmod(np.arange(side**2), side), axis=1)
-    arrays = {
-        "radius": rng.uniform(0.2, 0.49, side**2) / side,
-        "mass": rng.uniform(0.1, 9, side**2),
-    }
-    write_start(tmp_path / "bed.txt", (site + 0.5) / side, rng.normal(size=(side**2, 2)), **arrays)
-    periodic = INPUT.replace("'wall' upper = 2, 1", "'periodic'").replace("40", "2")
-    write_input(tmp_path, periodic.replace("&species name = 'stone' file = 'bed.txt' /", ""))
-    finished(ricochet, "one.h5")
-    finished(ricochet, "two.h5", "--set", "run.threads=2")
-    assert not differences(tmp_path / "one.h5", tmp_path / "two.h5")
-
-
-def test_a_stopped_or_finished_run_goes_on_with_its_disks(ricochet, tmp_path, bed):
-    finished(ricochet, "whole.h5")
-    part = ricochet("gas.nml", "-o", "part.h5", "--quiet", "--set", "stop.wall_clock=1e-9")
-    assert part.returncode == STOPPED
-    finished(ricochet, "part.h5", "--resume")
-    assert not [name for name in differences(tmp_path / "whole.h5", tmp_path / "part.h5")
-                if "wall_clock" not in name and "overrides" not in name]  # fmt: skip
-    finished(ricochet, "short.h5", "--set", "stop.collisions_per_disk=20")
-    finished(ricochet, "short.h5", "--resume")
-    one, other = (read_run(tmp_path / f"{name}.h5") for name in ("whole", "short"))
-    assert (one.position[-1] == other.position[-1]).all()
-
-
 def test_a_run_from_the_last_frame_of_another_has_its_disks(ricochet, tmp_path, bed):
     finished(ricochet, "gas.h5")
     write_input(tmp_path, INPUT.replace("bed.txt", "gas.h5"), "gas.nml")

@@ -24,7 +24,7 @@ def study(tmp_path):
     stand_in(tmp_path / "python", f"echo \"$@\" >>'{tmp_path}/drawn.txt'")
     stand_in(
         tmp_path / "bin" / "awk",
-        f"echo \"$LC_ALL\" >>'{tmp_path}/language.txt'\nexec {shutil.which('awk')} \"$@\"",
+        f'echo "$LC_ALL" >>\'{tmp_path}/language.txt\'\nexec {shutil.which("awk")} "$@"',
     )
     environment = {
         **os.environ,
