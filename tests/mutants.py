@@ -5,11 +5,12 @@
 
 It works in build/mutants, on a copy of the last commit, and goes on where it was stopped:
 `results` there has a line for each mutant of each commit. The copy is tested without a fault first.
-Then for each mutant of the table: the unit tests, and if they pass the others, up to the first that
-fails. Some minutes each on two quiet cores, as long as `make test` for one that survives. Run it
-with `nice` beside other work. `--check` only looks whether each text is found once in the sources.
+Then for each mutant of the table: the unit tests, the file of the test that caught it before, and
+all others, up to the first that fails. Some minutes each on two quiet cores, as long as `make test`
+for one that survives. Run it with `nice` beside other work; what waits too long on a busy machine
+is no catch, and `NAME.log` there shows it. `--check` only looks whether each text is found once.
 
-In the table `before` says what caught the fault when it was drawn. A fault is a sentence; `file`,
+In the table `before` says what caught a fault when it was drawn. A fault is a sentence; `file`,
 `old` and `new` express it in the sources as they are now. Whoever rebuilds the code expresses the
 same sentence anew; git has the former texts, and this tests them as they were:
 
@@ -46,10 +47,9 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRATCH = ROOT / "build" / "mutants"
 UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
-OTHERS = (
-    "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all",
-    ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly tests",
-)
+PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all"
+PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly "
+TEST = re.compile(r"tests/[\w/]+\.py")
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR )(\S+)", re.MULTILINE)
 
 
@@ -78,14 +78,16 @@ def applies(mutant: dict[str, str], tree: Path) -> bool:
 
 def outcome(tree: Path, mutant: dict[str, str] | None, jobs: int, log: Path) -> str:
     """What the tests say of a tree with a fault, or without any."""
-    steps = [*UNIT_TESTS, *OTHERS]
+    steps = [*UNIT_TESTS, PROGRAM, PYTEST + "tests"]
     if mutant:
         if not applies(mutant, tree):
             return "does not apply"
         path = tree / mutant["file"]
         path.write_text(path.read_text().replace(mutant["old"], mutant["new"]))
+        likely = {file for file in TEST.findall(mutant["before"]) if (tree / file).exists()}
+        steps[3:3] = [PYTEST + " ".join(likely)] if likely else []
         if path.is_relative_to(tree / "post"):
-            steps = list(OTHERS)
+            steps = steps[2:]
     for step in steps:
         command = step.format(jobs=jobs, unit_build=f"{UNIT_BUILD} build/tests")
         with log.open("w") as output:
@@ -112,7 +114,7 @@ def main() -> int:
         parser.error(f"not in the table: {', '.join(unknown)}")
     if args.check:
         lost = [name for name, mutant in table.items() if not applies(mutant, ROOT)]
-        print(*(f"{name}: its text is not found once" for name in lost), sep="\n", end="")
+        print("".join(f"{name}: its text is not found once\n" for name in lost), end="")
         return 1 if lost else 0
     SCRATCH.mkdir(parents=True, exist_ok=True)
     commit = git("rev-parse", "--short=12", args.commit)
@@ -130,7 +132,7 @@ def main() -> int:
         if not mutant and known[key] != "survived":
             print("The tests fail without a fault: first make them pass.", file=sys.stderr)
             return 1
-        worse += known[key] == "survived" and "caught" in (mutant or {}).get("before", "")
+        worse += known[key] == "survived" and "caught" in (mutant or {"before": ""})["before"]
     return 1 if worse else 0
 
 
