@@ -50,7 +50,7 @@ UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
 PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all"
 PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly "
 TEST = re.compile(r"tests/[\w/]+\.py")
-FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR )(\S+)", re.MULTILINE)
+FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
 
 
 def git(*arguments: str, folder: Path = ROOT) -> str:
