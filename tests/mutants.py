@@ -84,7 +84,7 @@ def outcome(tree: Path, mutant: dict[str, str] | None, jobs: int, log: Path) -> 
             return "does not apply"
         path = tree / mutant["file"]
         path.write_text(path.read_text().replace(mutant["old"], mutant["new"]))
-        likely = {file for file in TEST.findall(mutant["before"]) if (tree / file).exists()}
+        likely = {file for file in TEST.findall(mutant.get("before", "")) if (tree / file).exists()}
         steps[3:3] = [PYTEST + " ".join(likely)] if likely else []
         if path.is_relative_to(tree / "post"):
             steps = steps[2:]
@@ -132,7 +132,7 @@ def main() -> int:
         if not mutant and known[key] != "survived":
             print("The tests fail without a fault: first make them pass.", file=sys.stderr)
             return 1
-        worse += known[key] == "survived" and "caught" in (mutant or {"before": ""})["before"]
+        worse += known[key] == "survived" and "caught" in (mutant or {}).get("before", "")
     return 1 if worse else 0
 
 
