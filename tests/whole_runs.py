@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import time
-import zlib
 from pathlib import Path
 
 import h5py
@@ -210,11 +209,3 @@ def frames_in(path, group="particles/disks") -> int:
             return int(file[group]["committed"][()])
     except OSError:
         return 0
-
-
-def seal(path):
-    """Renews the checksum of a checkpoint: CRC-32 over all but the header, whose title stays."""
-    data = path.read_bytes()
-    title = data[: data.index(b",")]
-    header = title + f", CRC-32 of the rest: {zlib.crc32(data[64:]):08X}".encode()
-    path.write_bytes(header.ljust(63) + b"\n" + data[64:])

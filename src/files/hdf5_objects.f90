@@ -80,30 +80,33 @@ contains
     call self%check(status, "link "//second_name)
   end subroutine link
 
-  !> Takes the dataset out of the file that was made last; the file then ends where the values of the one before end. HDF5
-  !> cuts the file before the header says so, and a kill between would leave one that nobody can open: so the header says it
-  !> first.
+  !> Takes the dataset out of the file that was made last; the file then ends where the values of the one before end. At
+  !> every moment it can be opened: first the dataset loses its name, while it is open and so still there; then the header
+  !> says where the file ends, which HDF5 does only after it has cut it; then it is closed, and gone.
   subroutine remove_last(self, name, before)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, before
     integer(int64), parameter :: header_end = 40  ! where the header of an HDF5 file has its length
-    integer(hid_t) :: dataset
+    integer(hid_t) :: dataset, kept
     integer(hsize_t) :: bytes
     integer(hsize_t), allocatable :: extents(:)
     integer(haddr_t) :: offset
     integer :: status, closed
     logical :: done
 
+    if (allocated(self%failure)) return
+    call self%open_dataset(before, kept, extents, status)
+    if (status >= 0) call h5dget_offset_f(kept, offset, status)
+    if (status >= 0) call h5dget_storage_size_f(kept, bytes, status)
+    call h5dclose_f(kept, closed)
+    if (status >= 0) call self%open_dataset(name, dataset, extents, status)
+    if (status >= 0) call h5ldelete_f(self%id, name, status)
+    call self%check(status, "remove "//name)
     call self%flush()
     if (allocated(self%failure)) return
-    call self%open_dataset(before, dataset, extents, status)
-    if (status >= 0) call h5dget_offset_f(dataset, offset, status)
-    if (status >= 0) call h5dget_storage_size_f(dataset, bytes, status)
+    call write_word(self%path, header_end, int(offset + bytes, int64), done)
     call h5dclose_f(dataset, closed)
-    done = status >= 0
-    if (done) call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    if (done) call h5ldelete_f(self%id, name, status)
-    call self%check(merge(status, -1, done), "remove "//name)
+    call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
   !> Makes a dataset and leaves it open.

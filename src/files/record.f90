@@ -3,9 +3,10 @@
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5dclose_f, h5kind_to_type, h5t_std_i64le
+  use hdf5, only: h5_integer_kind, h5kind_to_type
   use checksums, only: crc_of
   use hdf5_objects, only: hdf5_file_t
+  use hdf5_series, only: long_integer, series_t
   use kinds, only: int64, real64
   implicit none
   private
@@ -34,11 +35,10 @@ contains
   !> Makes the dataset of a record that has been counted.
   subroutine make(self)
     class(record_t), intent(inout) :: self
-    integer(hid_t) :: dataset
-    integer :: closed
+    type(series_t) :: words
 
-    call self%file%make_dataset(self%name, h5t_std_i64le, [int(self%words, hsize_t)], dataset)
-    call h5dclose_f(dataset, closed)
+    words = series_t(self%name, long_integer)
+    call words%make(self%file, self%words)
   end subroutine make
 
   !> Begins anew, to count, write or read.

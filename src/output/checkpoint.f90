@@ -15,6 +15,7 @@ module checkpoint
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, parameters_group
   use hdf5_objects, only: hdf5_file_t, scalar
+  use hdf5_series, only: long_integer, series_t
   use input_groups, only: group_t, most_written
   use progress, only: progress_t
   use record, only: counting, reading, record_t, writing
@@ -132,17 +133,23 @@ contains
     call file%link(slots(1), kept)
   end subroutine make_checkpoints
 
-  !> Gives a new file both checkpoints of another.
+  !> Gives a new file both checkpoints of another, laid out as `make_checkpoints` does: `remove_last` relies on it.
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
-    type(hdf5_file_t), intent(in) :: source
+    type(hdf5_file_t), intent(inout) :: source
+    type(series_t) :: words
+    integer :: k
 
     call file%make_group(checkpoint_group)
     call file%copy(checkpoint_group//"program", source)
     call file%copy(checkpoint_group//"input", source)
     call file%copy(current, source)
-    call file%copy(slots(1), source)
-    call file%copy(slots(2), source)
+    do k = 1, 2
+      words = series_t(slots(k), long_integer)
+      call words%find(source)
+      call words%make(file, words%capacity)
+      call words%copy(file, source, words%capacity)
+    end do
     call file%link(slots(1), kept)
   end subroutine copy_checkpoints
 

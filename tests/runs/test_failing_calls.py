@@ -1,8 +1,9 @@
-"""Each system call of a run fails, or is met by a signal: one line, and nothing is lost."""
+"""Each system call of a run fails, or is met by a signal or a kill: one line, nothing is lost."""
 
 import os
 import re
 import shutil
+import signal
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
@@ -39,9 +40,8 @@ WAYS = {
     "pread64": ["EIO", "EIO+"],
     "write": ["EIO", "ENOSPC+"],
     "pwrite64": ["EIO", "ENOSPC+"],
-    "fallocate": ["ENOSPC", "EIO"],
+    "ftruncate": ["EIO", "EIO+"],
     "fsync": ["EIO", "EIO+", "EINVAL+"],
-    "link": ["EPERM"],
     "rename": ["EIO", "EIO+"],
     "unlink": ["EIO", "EIO+"],
     "close": ["EIO", "EIO+"],
@@ -139,7 +139,7 @@ def check_after_failure(program, stage, folder, option, call, inject):
     earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     assert run.returncode in (FINISHED, USAGE, FILES), (run.returncode, run.stderr)
-    result, part = folder / "gas.h5", folder / "gas.h5.part"
+    result = folder / "gas.h5"
     if run.returncode == FINISHED:
         assert run.stderr == ""
         assert same_results(stage, result)
@@ -149,14 +149,21 @@ def check_after_failure(program, stage, folder, option, call, inject):
     if call == "write" and result.exists() and same_results(stage, result):
         return  # only its summary could not be written
     assert not result.exists() or result.read_bytes() == earlier, "the earlier result is gone"
+    go_on(program, stage, folder, option)
+
+
+def go_on(program, stage, folder, option):
+    """What was left is good, and the run goes on from there, or from its start."""
+    part = folder / "gas.h5.part"
     if part.exists():
         found = committed(part)
         assert is_beginning(found, committed(stage / "whole" / "gas.h5")) == []
-    resumable = (folder / "gas.chk.h5").exists()
-    assert resumable or option == "--force", "the checkpoint is gone"
-    again = started(program, *COMMAND, "--resume" if resumable else "--force", folder=folder)
-    assert again.returncode == FINISHED, ("again", run.stderr, again.stderr)
-    assert same_results(stage, result)
+        if shutil.which("h5dump"):
+            subprocess.run(["h5dump", "-H", part], check=True, stdout=subprocess.DEVNULL)
+    assert part.exists() or option == "--force", "the checkpoint is gone"
+    again = started(program, *COMMAND, "--resume" if part.exists() else "--force", folder=folder)
+    assert again.returncode == FINISHED, ("again", again.stderr)
+    assert same_results(stage, folder / "gas.h5")
 
 
 @pytest.mark.parametrize("call", WAYS)
@@ -180,6 +187,30 @@ def problems(check, program, stage, call, cases) -> list[str]:
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return [found for found in pool.map(problem, cases) if found]
+
+
+def check_after_kill(program, stage, folder, option, call, inject):
+    """What the final name names is an earlier result or the whole one; the other file goes on."""
+    earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
+    run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
+    assert run.returncode in (FINISHED, -signal.SIGKILL, 128 + signal.SIGKILL), run.stderr
+    result = folder / "gas.h5"
+    if result.exists() and result.read_bytes() != earlier:
+        assert same_results(stage, result)
+    else:
+        go_on(program, stage, folder, option)
+
+
+@pytest.mark.parametrize("call", ["pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat"])
+@pytest.mark.parametrize("step", [40, pytest.param(1, marks=pytest.mark.check)])
+def test_a_kill_at_any_call_costs_nothing(program, stage, call, step):
+    """Above all in the last moments, when HDF5 cuts the file and it gets its name."""
+    cases = []
+    for option in OPTIONS:
+        numbers = positions(stage, option, call)
+        chosen = sorted({*numbers[::step], *numbers[-12:]})
+        cases += [(option, f"inject={call}:signal=SIGKILL:when={number}") for number in chosen]
+    assert problems(check_after_kill, program, stage, call, cases) == []
 
 
 def check_after_signal(program, stage, folder, option, call, inject):

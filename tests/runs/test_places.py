@@ -28,13 +28,20 @@ SHORT = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &output frames_every_time = 0.1 /
 """
 ENDLESS = SHORT.replace("time = 1 ", "time = 1e6 ").replace("0.1", "5")
-COMMAND = ["gas.nml", "-o", "gas.h5"]
+COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
 AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
-#: The output, and all that a run has beside it.
-PLACES = [
-    *("gas.h5", "gas.h5.lock", "gas.h5.part", "gas.h5.part_new"),
-    *("gas.chk.h5", "gas.chk_prev.h5", "gas.chk_new.h5"),
-]
+#: A library that the program is started with instead of the system's own fsync.
+FSYNC = "#include <errno.h>\n#include <signal.h>\nint fsync(int d)\n{ (void)d; %s }\n"
+#: The first one finds the results complete, except what is written at the end: there it stops.
+PAUSE = "static int n; if (!n++) raise(SIGSTOP); return 0;"
+
+
+def with_fsync(folder, body) -> dict[str, str]:
+    """The environment of a program for which fsync does something else."""
+    (folder / "fsync.c").write_text(FSYNC % body)
+    command = ["cc", "-shared", "-fPIC", "-o", "fsync.so", "fsync.c"]
+    subprocess.run(command, cwd=folder, check=True)
+    return {**os.environ, "LD_PRELOAD": str(folder / "fsync.so")}
 
 
 def occupy(path, kind, precious):
@@ -63,7 +70,7 @@ def everything_in(folder) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", ["gas.h5", "gas.h5.lock", "gas.h5.part", "gas.h5.part_new"])
 @pytest.mark.parametrize(
     "kind", ["link", "hard link", "link to nothing", "pipe", "device", "folder", "file"]
 )
@@ -100,15 +107,6 @@ def test_a_run_goes_on_only_in_a_file_without_another_name(ricochet, tmp_path):
     assert ricochet(*COMMAND, "--resume").returncode == FINISHED
 
 
-def test_the_checkpoint_may_have_a_second_name(ricochet, tmp_path):
-    """As after a kill at the moment when it is also the previous one."""
-    write_input(tmp_path, SHORT)
-    assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
-    (tmp_path / "gas.chk_prev.h5").hardlink_to(tmp_path / "gas.chk.h5")
-    assert ricochet(*COMMAND, *AT_ONCE, "--resume").returncode == STOPPED
-    assert ricochet(*COMMAND, "--resume").returncode == FINISHED
-
-
 def test_what_a_killed_run_has_half_made_is_in_nobodys_way(ricochet, tmp_path):
     write_input(tmp_path, SHORT)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
@@ -116,11 +114,26 @@ def test_what_a_killed_run_has_half_made_is_in_nobodys_way(ricochet, tmp_path):
     for content in (b"", bytes(4096), (tmp_path / "gas.h5.part").read_bytes()[:3000]):
         (tmp_path / "gas.h5.part_new").write_bytes(content)
         (tmp_path / "gas.h5.lock").touch()
-        half = bytes(4096) if content else b""
-        (tmp_path / "gas.chk_new.h5").write_bytes(half)
         assert ricochet(*COMMAND, *AT_ONCE, "--resume").returncode == STOPPED
     assert ricochet(*COMMAND, "--resume").returncode == FINISHED
     assert sorted(path.name for path in tmp_path.iterdir()) == ["gas.h5", "gas.nml", "whole.h5"]
+
+
+def test_a_run_that_was_killed_before_its_first_checkpoint_goes_on(ricochet, started, tmp_path):
+    """From its start; it is deleted by --force only."""
+    write_input(tmp_path, ENDLESS)
+    process = started(*COMMAND)
+    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 10)
+    process.kill()
+    process.wait()
+    before = (tmp_path / "gas.h5.part").read_bytes()
+    end = ["--set", "stop.time=9"]
+    run = ricochet(*COMMAND, *end)
+    assert run.returncode == FILES and "--force" in one_line(run)
+    assert (tmp_path / "gas.h5.part").read_bytes() == before
+    assert ricochet(*COMMAND, *end, "--resume").returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "whole.h5", *end).returncode == FINISHED
+    assert differences(tmp_path / "gas.h5", tmp_path / "whole.h5") == []
 
 
 def test_the_folder_of_the_output_may_be_a_link(ricochet, tmp_path):
@@ -138,7 +151,7 @@ def test_positions_come_from_files_only(ricochet, tmp_path, name, kind):
     write_input(tmp_path, SHORT.replace("radius = 0.02 speed = 1", placed))
     run = ricochet("gas.nml", "--check")
     assert run.returncode == FILES
-    assert one_line(run).startswith(f"{name}: cannot be read: ")
+    assert f"{name}: cannot be read: " in one_line(run)
 
 
 @pytest.mark.parametrize(
@@ -166,56 +179,17 @@ def test_blanks_at_the_end_belong_to_a_name(ricochet, tmp_path):
     (tmp_path / "doc ").write_text("chapter one")
     (tmp_path / "other.nml ").write_text(SHORT.replace("20", "30"))
     write_input(tmp_path, SHORT, "other.nml")
-    run = ricochet("gas.nml", "-o", "doc ")
-    assert run.returncode == FILES and one_line(run).startswith("doc : ")
-    run = ricochet("gas.nml", "-o", "doc ", "--force")
-    assert run.returncode == FILES
+    for option in ("--quiet", "--force"):
+        run = ricochet("gas.nml", "-o", "doc ", option)
+        assert run.returncode == FILES and one_line(run).startswith("doc : ")
     assert (tmp_path / "doc ").read_text() == "chapter one"
     assert ricochet("gas.nml", "-o", "doc").returncode == FINISHED
     assert "30 disks" in ricochet("other.nml ", "--check").stdout
 
 
-def test_a_run_that_was_killed_without_a_checkpoint_is_deleted_by_force_only(
-    ricochet, started, tmp_path
-):
-    write_input(tmp_path, ENDLESS)
-    part = tmp_path / "gas.h5.part"
-    process = started(*COMMAND)
-    wait_for(lambda: frames_in(part) > 10)
-    process.kill()
-    process.wait()
-    before = part.read_bytes()
-    for option in ("--quiet", "--resume"):
-        run = ricochet(*COMMAND, "--set", "stop.time=9", option)
-        assert run.returncode == FILES and "--force" in one_line(run)
-        assert part.read_bytes() == before
-    run = ricochet(*COMMAND, "--set", "stop.time=9", "--force")
-    assert run.returncode == FINISHED
-    assert not part.exists()
-
-
-def test_a_stopped_run_goes_on_or_starts_over_as_the_message_says(ricochet, tmp_path):
-    write_input(tmp_path, SHORT)
-    assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
-    before = everything_in(tmp_path)
-    run = ricochet(*COMMAND)
-    assert run.returncode == FILES
-    assert "--resume goes on" in one_line(run) and "--force starts over" in run.stderr
-    assert everything_in(tmp_path) == before
-    assert ricochet(*COMMAND, "--force").returncode == FINISHED
-
-
 @pytest.mark.parametrize(
     ("taken", "owner"),
-    [
-        ("x.chk.h5", "x.h5"),
-        ("x.chk_prev.h5", "x.h5"),
-        ("x.chk_new.h5", "x.h5"),
-        ("x.h5.part", "x.h5"),
-        ("some/x.h5.lock", "some/x.h5"),
-        ("x.part_new", "x"),
-        ("x.chk", "x"),
-    ],
+    [("x.h5.part", "x.h5"), ("some/x.h5.lock", "some/x.h5"), ("x.part_new", "x")],
 )
 def test_no_output_has_the_name_of_a_file_of_another_run(ricochet, tmp_path, taken, owner):
     run = ricochet(write_input(tmp_path, SHORT), "-o", taken)
@@ -226,7 +200,7 @@ def test_no_output_has_the_name_of_a_file_of_another_run(ricochet, tmp_path, tak
 
 def test_outputs_that_differ_in_any_letter_share_nothing(ricochet, tmp_path):
     write_input(tmp_path, SHORT)
-    names = ["x", "x.h5", "x.h", "x.chk_", "x.h5 "]
+    names = ["x", "x.h5", "x.h", "x.part_", "x.h5 "]
     for name in names:
         assert ricochet("gas.nml", "-o", name, *AT_ONCE).returncode == STOPPED
     for name in names:
@@ -235,26 +209,116 @@ def test_outputs_that_differ_in_any_letter_share_nothing(ricochet, tmp_path):
         assert differences(tmp_path / "x", tmp_path / name) == []
 
 
-def test_force_leaves_a_finished_run_alone_that_has_the_name_of_a_checkpoint(ricochet, tmp_path):
+# --- what a run replaces at its end: the very file that was there when it began ---
+
+#: How a run begins: with the option that it starts with where a finished run is.
+BEGINNINGS = {"in an empty place": [], "from a finished run": ["--resume"], "over one": ["--force"]}
+EARLY = ["--set", "stop.time=0.5"]
+
+
+@pytest.fixture(params=BEGINNINGS)
+def beginning(request, ricochet, tmp_path):
+    """The options of a run, in whose place an earlier end of it is, or nothing."""
     write_input(tmp_path, SHORT)
-    assert ricochet("gas.nml", "-o", "z.h5").returncode == FINISHED
-    shutil.copy(tmp_path / "z.h5", tmp_path / "z.chk.h5")
-    before = everything_in(tmp_path)
-    run = ricochet("gas.nml", "-o", "z.h5", "--force")
-    assert run.returncode == FILES and one_line(run).startswith("z.chk.h5: ")
-    assert everything_in(tmp_path) == before
+    if BEGINNINGS[request.param]:
+        assert ricochet(*COMMAND, *EARLY).returncode == FINISHED
+    return BEGINNINGS[request.param]
 
 
-def test_a_file_that_appears_during_the_run_is_not_overwritten(started, tmp_path):
-    write_input(tmp_path, ENDLESS)
-    process = started(*COMMAND, "--set", "stop.time=30000")
-    wait_for((tmp_path / "gas.h5.part").exists)
-    with held(process):
-        (tmp_path / "gas.h5").write_text("copied here meanwhile")
-    message = process.communicate()[1]
-    assert process.returncode == FILES and "gas.h5.part" in message.splitlines()[-1]
-    assert (tmp_path / "gas.h5").read_text() == "copied here meanwhile"
-    assert frames_in(tmp_path / "gas.h5.part") == 6001
+def put(kind, place, other):
+    """Puts something where the result is to come."""
+    if kind == "another run":
+        shutil.copy(other, place.with_name("copy"))
+        place.with_name("copy").replace(place)
+    elif kind == "another run in the same inode":
+        place.write_bytes(other.read_bytes())
+    elif kind == "a changed bit, with the same date":
+        if not place.exists():
+            place.write_bytes(other.read_bytes())
+        date, content = place.stat().st_mtime_ns, bytearray(place.read_bytes())
+        content[len(content) // 2] ^= 1
+        place.write_bytes(content)
+        os.utime(place, ns=(date, date))
+    elif kind == "a link":  # to what was there, or to nothing
+        if place.exists():
+            place.rename(place.with_name("moved"))
+        place.symlink_to("moved")
+    elif kind == "an empty file":
+        place.write_bytes(b"")
+    else:
+        place.unlink(missing_ok=True)
+        place.mkdir()
+
+
+def what_stands(place):
+    """What a name stands for, so that it can be compared."""
+    return place.readlink() if place.is_symlink() else place.is_file() and place.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *("another run", "another run in the same inode", "a changed bit, with the same date"),
+        *("an empty file", "a folder", "a link"),
+    ],
+)
+@pytest.mark.parametrize("moment", ["while it runs", "while it is stopped"])
+def test_what_has_come_since_the_run_began_is_left(
+    ricochet, started, tmp_path, beginning, kind, moment
+):
+    """The results stay in the .part, and take their name when the place is free."""
+    other, place = tmp_path / "other.h5", tmp_path / "gas.h5"
+    assert ricochet("gas.nml", "-o", other, *EARLY, "--set", "run.seed=2").returncode == FINISHED
+    if moment == "while it runs":
+        process = started(*COMMAND, *beginning, env=with_fsync(tmp_path, PAUSE))
+        assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
+        put(kind, place, other)
+        process.send_signal(signal.SIGCONT)
+        message = process.communicate(timeout=60)[1]
+        assert process.returncode == FILES, message
+        assert len(message.splitlines()) == 1 and "gas.h5.part" in message
+        assert frames_in(tmp_path / "gas.h5.part") == 11
+    else:
+        assert ricochet(*COMMAND, *beginning, *AT_ONCE).returncode == STOPPED
+        put(kind, place, other)
+    before = what_stands(place)
+    run = ricochet(*COMMAND, "--resume")
+    assert run.returncode == FILES and one_line(run).startswith("gas.h5: ")
+    assert what_stands(place) == before
+    place.rename(tmp_path / "away")
+    assert ricochet(*COMMAND, "--resume").returncode == FINISHED
+    assert what_stands(tmp_path / "away") == before
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    assert differences(place, tmp_path / "whole.h5") == []
+
+
+def test_a_copy_of_the_earlier_result_is_another_file(ricochet, tmp_path, beginning):
+    """In another folder the run goes on where no result is, and leaves one that is there."""
+    assert ricochet(*COMMAND, *beginning, *AT_ONCE).returncode == STOPPED
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    for path in tmp_path.glob("gas.*"):
+        shutil.copyfile(path, folder / path.name)
+    if beginning:
+        run = ricochet(*COMMAND, "--resume", cwd=folder)
+        assert run.returncode == FILES and "is not the file that was there" in one_line(run)
+        (folder / "gas.h5").unlink()
+    assert ricochet(*COMMAND, "--resume", cwd=folder).returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", folder / "gas.h5") == []
+    assert sorted(path.name for path in folder.iterdir()) == ["gas.h5", "gas.nml"]
+
+
+def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
+    write_input(tmp_path, SHORT)
+    assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
+    assert ricochet("gas.nml", "-o", "other.h5", *EARLY).returncode == FINISHED
+    (tmp_path / "other.h5").rename(tmp_path / "gas.h5")
+    assert ricochet(*COMMAND, "--force").returncode == FINISHED
+    assert frames_in(tmp_path / "gas.h5") == 11
+
+
+# --- locks, users, folders ---
 
 
 def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
@@ -286,19 +350,12 @@ def shared(program):
         yield Path(name)
 
 
-def as_nobody(folder, *arguments, **options):
+def as_nobody(folder, *arguments):
     """A run of another user."""
-    return subprocess.run(
-        [folder / "ricochet", *arguments],
-        cwd=folder,
-        user=65534,
-        group=65534,
-        extra_groups=[],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        **options,
-    )
+    user = {"user": 65534, "group": 65534, "extra_groups": []}
+    command = [folder / "ricochet", *arguments]
+    options = {"capture_output": True, "text": True, "timeout": PATIENCE}
+    return subprocess.run(command, cwd=folder, **user, **options)
 
 
 def test_a_run_of_another_user_is_a_twin(shared):
@@ -327,13 +384,8 @@ def test_a_folder_that_cannot_be_written_or_listed(shared):
 
 def test_a_disk_that_cannot_synchronize_has_the_result(ricochet, tmp_path):
     """Some file systems refuse fsync of a folder, or at all."""
-    source, library = tmp_path / "sync.c", tmp_path / "sync.so"
-    source.write_text(
-        "#include <errno.h>\nint fsync(int d) { errno = EINVAL; return d < 0 ? 0 : -1; }\n"
-    )
-    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
     write_input(tmp_path, SHORT)
-    environment = {**os.environ, "LD_PRELOAD": str(library)}
-    run = ricochet(*COMMAND, "--set", "output.checkpoint_every=1e-6", env=environment)
+    refused = with_fsync(tmp_path, "errno = EINVAL; return -1;")
+    run = ricochet(*COMMAND, "--set", "output.checkpoint_every=1e-6", env=refused)
     assert (run.returncode, run.stderr) == (FINISHED, "")
     assert (tmp_path / "gas.h5").exists()

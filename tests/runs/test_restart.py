@@ -1,292 +1,356 @@
-"""One run is the same run stopped and resumed, bit for bit; what no run can resume is refused."""
+"""A run that is stopped, killed, damaged or finished goes on as if nothing had been, or says why not.
 
-import itertools
-import os
+That the bits are the same whatever the system and the way is asserted by `test_random_systems.py`.
+"""
+
 import random
 import re
-import shutil
-import subprocess
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+import signal
 
 import h5py
+import numpy as np
 import pytest
 
 from whole_runs import (
+    BROKEN,
     FILES,
     FINISHED,
     MIXTURE,
     STOPPED,
     USAGE,
+    contents,
     differences,
+    frames_in,
+    let_work,
     one_line,
-    seal,
+    processor_time_of,
+    wait_for,
     write_input,
 )
 
 CHECK = pytest.mark.check
 GAS = "&species name = 'gas' count = 40 radius = 0.02 speed = 1 /\n"
-#: Every combination of these is a system of its own.
-CHOICES = {
-    "dynamics": {
-        "cells": "",
-        "heap": "&run queue = 'heap' /",
-        "pairs": "&run search = 'pairs' /",
-        "rescan": "&run search = 'rescan' /",
-        "steps": "&run dynamics = 'steps' dt = 2e-3 /",
-        "steps by pairs": "&run dynamics = 'steps' dt = 2e-3 search = 'pairs' /",
-    },
-    "box": {
-        "walls": "",
-        "falling": "&box gravity = 0.1, -1 /",
-        "channel": "&box boundary = 'periodic', 'wall' /",
-        "falling channel": "&box boundary = 'periodic', 'wall' gravity = 0, -1 /",
-        "periodic": "&box boundary = 'periodic', 'periodic' /",
-    },
-    "obstacles": {
-        "free": "",
-        "peg in a pot": "&obstacle name = 'peg' centre = 0.5, 0.5 radius = 0.1 /"
-        " &obstacle name = 'pot' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /",
-    },
-    "species": {
-        "equal": "",
-        "giants": "&species name = 'giant' count = 2 mass = 50 radius = 0.1 /",
-    },
-    "contact": {
-        "elastic": "",
-        "inelastic": "&contact restitution = 0.99 wall_rule = 'normal' contact_time = 5e-3 /",
-    },
-    "output": {
-        "growing": "&output frames_every_time = 0.05 observables_every_collisions = 30"
-        " event_log = .true. / &stop time = 20 /",
-        "planned": "&output frames_every_events = 77 observables_every_events = 31"
-        " precision = 'single' / &stop events = 4000 /",
-        "mixed": "&output frames_every_collisions = 50 observables_every_time = 0.1 /"
-        " &stop collisions_per_disk = 80 /",
-        "per disk": "&output frames_every_collisions_per_disk = 3.3"
-        " observables_every_collisions_per_disk = 0.7 / &stop collisions_per_disk = 80 /",
-        "ends": "&stop time = 20 /",
-    },
-}
-SYSTEMS = list(itertools.product(*(choice.values() for choice in CHOICES.values())))
+GROWING = """&output frames_every_time = 0.05 observables_every_collisions = 30
+event_log = .true. /\n"""
+AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
+COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
+#: A ball that bounces ever faster and lower.
+COLLAPSE = """&box gravity = 0, -1 /
+&species name = 'ball' radius = 0.05 position = 0.5, 0.5, 0.3, 0.3 /
+&contact restitution = 0.5 /
+&stop time = 100 /
+&output frames_every_time = 0.1 event_log = .true. /
+"""
 
 
-def stops_until_the_end(run, times):
-    """Runs to the end with a stop soon after each of these times; how often it was stopped.
-
-    No clock decides where: the run ends at the time, goes on, and its wall clock stops it after a
-    single step.
-    """
-    resume = []
-    for stops, time in enumerate(times):
-        assert run(f"stop.time={time}", *resume) == FINISHED
-        resume = ["--resume"]
-        if run("stop.wall_clock=1e-9", *resume) == FINISHED:
-            return stops
-    assert run("run.threads=1", *resume) == FINISHED
-    return len(times)
-
-
-def stopped_and_whole(program, most, folder, system):
-    """Stops of a run in parts, and where its output differs from that of the run in one piece."""
-    folder.mkdir()
-    write_input(folder, GAS + "\n".join(system) + "\n")
-
-    def run(setting, *options, name="parts.h5"):
-        command = [program, "gas.nml", "-o", name, "--quiet", "--set", setting, *options]
-        return subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL).returncode
-
-    assert run("run.threads=1", name="whole.h5") == FINISHED
-    with h5py.File(folder / "whole.h5") as file:
-        end = file["particles/disks/position/time"][-1]
-    rng = random.Random(str(system))
-    stops = stops_until_the_end(run, sorted(rng.uniform(0, end) for _ in range(most)))
-    other = differences(folder / "whole.h5", folder / "parts.h5")
-    shutil.rmtree(folder)
-    return stops, other
-
-
-@pytest.mark.parametrize(("stride", "most"), [(41, 4), pytest.param(1, 20, marks=CHECK)])
-def test_one_run_is_the_same_run_stopped_and_resumed(program, tmp_path, stride, most):
-    """For every combination of the choices; fast: for some, in which every choice occurs."""
-    systems = SYSTEMS[::stride]
-    for k, choice in enumerate(CHOICES.values()):
-        assert {system[k] for system in systems} == set(choice.values())
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        folders = (tmp_path / str(k) for k in range(len(systems)))
-        results = list(pool.map(partial(stopped_and_whole, program, most), folders, systems))
-    failed = {system: found for system, (_, found) in zip(systems, results, strict=True) if found}
-    assert failed == {}
-    assert sum(stops for stops, _ in results) > most / 2 * len(systems)
-
-
-@pytest.fixture
-def stopped(ricochet, tmp_path):
-    """`stopped(*options)`: a run that its wall clock has stopped; its command less --resume."""
+@pytest.fixture(params=["stopped", "finished"])
+def before(request, ricochet, tmp_path):
+    """What a run has left that can go on: the path; its command is COMMAND with a later end."""
     write_input(tmp_path, MIXTURE)
-    command = ["gas.nml", "-o", "gas.h5", "--set", "stop.time=1000"]
-    run = ricochet(*command, "--set", "stop.wall_clock=1e-9")
-    assert run.returncode == STOPPED and "--resume" in one_line(run)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "gas.chk.h5",
-        "gas.h5.part",
-        "gas.nml",
-    ]
-    return command
+    end = AT_ONCE if request.param == "stopped" else ["--set", "stop.time=0.5"]
+    run = ricochet(*COMMAND, *end)
+    assert run.returncode == (STOPPED if request.param == "stopped" else FINISHED)
+    (path,) = tmp_path.glob("gas.h5*")
+    assert path.name == ("gas.h5.part" if request.param == "stopped" else "gas.h5")
+    return path
 
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
-    """The wall clock stops a run at once, so that every resume makes one little step."""
-    write_input(tmp_path, GAS + SYSTEMS[0][-1])
+    """The wall clock stops a run at once, so that every part makes one little step, but makes it."""
+    write_input(tmp_path, GAS + GROWING)
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
     assert ricochet(*short, "whole.h5").returncode == FINISHED
-    resume, status, stops = [], STOPPED, 0
-    while status == STOPPED:
-        run = ricochet(*short, "parts.h5", "--set", "stop.wall_clock=1e-9", *resume)
-        status, resume, stops = run.returncode, ["--resume"], stops + 1
-        assert stops < 500
-    assert status == FINISHED and stops > 20
+    run, times, resume = None, [], []
+    while run is None or run.returncode == STOPPED:
+        run = ricochet(*short, "parts.h5", *AT_ONCE, *resume)
+        resume = ["--resume"]
+        if run.returncode == STOPPED:
+            times.append(float(re.search("stopped at time ([^,]+),", one_line(run))[1]))
+    assert run.returncode == FINISHED and times == sorted(set(times)) and len(times) > 20
     changed = ["/parameters/overrides", "/parameters/stop@wall_clock"]
     assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == changed
 
 
-def test_every_part_of_a_run_gets_somewhere(ricochet, stopped):
-    """Also when its wall clock stops it at once, before a disk comes to the next cell."""
-    times = []
-    for _ in range(12):
-        run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9")
-        assert run.returncode == STOPPED
-        times.append(float(re.search("stopped at time ([^,]+),", one_line(run))[1]))
-    assert times == sorted(set(times))
-
-
-def test_how_a_run_is_done_may_change_when_it_goes_on(ricochet, tmp_path, stopped):
-    fewer = [*stopped[:-1], "stop.time=40"]
-    assert ricochet(*fewer, "--set", "stop.wall_clock=1e-9", "--force").returncode == STOPPED
-    run = ricochet(*fewer, "--resume", "--set", "run.search='pairs'", "--set", "run.queue='heap'")
-    assert run.returncode == FINISHED
-    fewer[2] = "whole.h5"
-    assert ricochet(*fewer).returncode == FINISHED
-    other = differences(tmp_path / "whole.h5", tmp_path / "gas.h5")
-    assert all(name.startswith("/parameters") for name in other)
-
-
 @pytest.mark.parametrize(
-    ("change", "names"),
+    "change",
     [
-        ("run.seed=8", "run.seed = 8"),
-        ("species.heavy.mass=3", "species.heavy.mass = 3"),
-        ("contact.contact_time=0.002", "contact.contact_time = 0.002"),
-        ("contact.restitution=0.9", "contact.restitution = 0.9"),
-        ("output.event_log=.false.", "output.event_log = .false."),
+        *("run.seed=8", "species.heavy.mass=3", "contact.contact_time=0.002", "box.gravity=0,-1"),
+        "output.event_log=.false.",
     ],
 )
-def test_a_checkpoint_of_another_input_is_refused(ricochet, tmp_path, stopped, change, names):
-    before = (tmp_path / "gas.h5.part").read_bytes()
-    run = ricochet(*stopped, "--set", change, "--resume")
+def test_what_would_be_another_run_is_refused_by_name(ricochet, before, change):
+    content = before.read_bytes()
+    run = ricochet(*COMMAND, "--set", change, "--resume")
     assert run.returncode == USAGE
-    assert "another input" in one_line(run) and names in one_line(run)
-    assert (tmp_path / "gas.h5.part").read_bytes() == before
+    assert "another input" in one_line(run) and change.split("=")[0] in run.stderr
+    assert before.read_bytes() == content
 
 
-def test_a_checkpoint_of_another_version_is_refused(ricochet, tmp_path, stopped):
-    path = tmp_path / "gas.chk.h5"
-    with h5py.File(path, "r+") as file:
-        file["program"][()] = b"ricochet 0.0.9"
-    seal(path)
-    run = ricochet(*stopped, "--resume")
+def test_a_checkpoint_of_another_version_is_refused_by_name(ricochet, before):
+    with h5py.File(before, "r+") as file:
+        del file["checkpoint/program"]
+        file["checkpoint/program"] = np.bytes_("ricochet 0.0.9")
+    run = ricochet(*COMMAND, "--resume")
     assert run.returncode == USAGE and "ricochet 0.0.9" in one_line(run)
 
 
-@pytest.mark.parametrize("trials", [60, pytest.param(600, marks=CHECK)])
-def test_a_damaged_checkpoint_is_refused(ricochet, tmp_path, stopped, trials):
-    path = tmp_path / "gas.chk.h5"
-    whole, rng = path.read_bytes(), random.Random(1)
+def flip(path, slot, rng):
+    """Changes a random bit of a checkpoint."""
+    with h5py.File(path, "r+") as file:
+        words = file[f"checkpoint/{slot}"][:]
+        words[rng.randrange(len(words) - 1)] ^= 1 << rng.randrange(63)
+        file[f"checkpoint/{slot}"][:] = words
+
+
+@pytest.mark.parametrize("trials", [10, pytest.param(200, marks=CHECK)])
+def test_of_two_checkpoints_one_may_be_damaged(ricochet, tmp_path, trials):
+    """Then the run goes on from the other one; with both damaged it does not."""
+    write_input(tmp_path, MIXTURE)
+    assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=1").returncode == FINISHED
+    command, rng = [*COMMAND, "--set", "stop.time=1"], random.Random(trials)
     for k in range(trials):
-        damaged = bytearray(whole)
-        if k % 2:
-            damaged[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
-        else:
-            damaged = damaged[: k * len(whole) // trials]
-        path.write_bytes(damaged)
-        run = ricochet(*stopped, "--resume")
-        assert run.returncode == USAGE and re.search("damaged|is empty", one_line(run))
-    path.write_bytes(whole)
-    run = ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9")
-    assert run.returncode == STOPPED
+        assert ricochet(*command, *AT_ONCE, "--force").returncode == STOPPED
+        for _ in range(rng.randrange(3)):
+            assert ricochet(*command, *AT_ONCE, "--resume").returncode == STOPPED
+        flip(tmp_path / "gas.h5.part", 1 + k % 2, rng)
+        if k % 3 == 2:
+            flip(tmp_path / "gas.h5.part", 2 - k % 2, rng)
+            run = ricochet(*command, "--resume")
+            assert run.returncode == FILES and "checksum" in one_line(run)
+            continue
+        assert ricochet(*command, "--resume").returncode == FINISHED
+        assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
 
 
-def test_what_is_no_checkpoint_is_called_what_it_is(ricochet, tmp_path, stopped):
-    """And the way out that is named is there."""
-    path, earlier = tmp_path / "gas.chk.h5", tmp_path / "gas.chk_prev.h5"
-    assert ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9").returncode == STOPPED
-    whole = path.read_bytes()
-    for content, flaw in [
-        (b"", "is empty"),
-        (b"ricochet", "is damaged, of another version, or not a checkpoint"),
-        (whole[:40], "is damaged or cut short"),
-        (whole[:-1], "is damaged or cut short"),
-        (b"ricochet checkpoint, CRC-64 of the rest: ".ljust(64), "is damaged, of another version"),
-        (b"notes\n" * 100, "is damaged, of another version, or not a checkpoint"),
-        ((tmp_path / "gas.h5.part").read_bytes(), "is damaged, of another version"),
-    ]:
-        path.write_bytes(content)
-        run = ricochet(*stopped, "--resume")
-        assert run.returncode == USAGE
-        assert one_line(run).startswith(f"gas.chk.h5: {flaw}") and "gas.chk_prev.h5" in run.stderr
-    earlier.rename(path)
-    earlier.write_bytes(whole[:-1])
-    assert ricochet(*stopped, "--resume", "--set", "stop.wall_clock=1e-9").returncode == STOPPED
-    path.unlink()
-    path.mkdir()
-    earlier.unlink()
-    run = ricochet(*stopped, "--resume")
-    assert run.returncode == USAGE
-    assert one_line(run) == (
-        "gas.chk.h5: is a folder; remove it; then --force instead of --resume starts over"
-    )
+@pytest.mark.parametrize("trials", [12, pytest.param(200, marks=CHECK)])
+def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials):
+    """Cut anywhere, without its checkpoints, with a wrong one, of others, or gone."""
+    whole = before.read_bytes()
+    for k in range(trials):
+        before.write_bytes(whole[: k * len(whole) // trials])
+        run = ricochet(*COMMAND, "--resume")
+        assert run.returncode == FILES and one_line(run).startswith(f"{before.name}: ")
+    before.write_bytes(whole)
+    for slot in (1, 2):
+        with h5py.File(before) as file:
+            there = f"checkpoint/{slot}" in file
+        if there:
+            flip(before, slot, random.Random(slot))
+    run = ricochet(*COMMAND, "--resume")
+    assert run.returncode == FILES and "checksum" in one_line(run)
+    with h5py.File(before, "r+") as file:
+        del file["checkpoint"]
+    run = ricochet(*COMMAND, "--resume")
+    assert run.returncode == FILES and one_line(run).startswith(f"{before.name}: cannot be read: ")
+    before.unlink()
+    run = ricochet(*COMMAND, "--resume")
+    assert run.returncode == FILES and "no run to go on from" in one_line(run)
 
 
-def test_the_checkpoint_before_is_kept_and_is_as_good(ricochet, tmp_path):
-    command = write_short_run(tmp_path)
-    assert ricochet(*command, "whole.h5").returncode == FINISHED
-    parts = [*command, "parts.h5"]
-    for resume in ([], ["--resume"], ["--resume"]):
-        run = ricochet(*parts, "--set", "stop.wall_clock=1e-9", *resume)
-        assert run.returncode == STOPPED
-    shutil.copy(tmp_path / "parts.chk_prev.h5", tmp_path / "parts.chk.h5")
-    assert ricochet(*parts, "--resume").returncode == FINISHED
-    other = differences(tmp_path / "whole.h5", tmp_path / "parts.h5")
-    assert all(name.startswith("/parameters") for name in other)
-
-
-def test_resuming_needs_a_checkpoint(ricochet, tmp_path):
-    command = [*write_short_run(tmp_path), "gas.h5"]
-    run = ricochet(*command, "--resume")
-    assert run.returncode == FILES and "no checkpoint" in one_line(run)
-    assert ricochet(*command).returncode == FINISHED
-    run = ricochet(*command, "--resume")
-    assert run.returncode == FILES and "finished" in one_line(run)
-
-
-def test_resuming_needs_the_unfinished_output(ricochet, tmp_path, stopped):
-    part = tmp_path / "gas.h5.part"
-    part.write_bytes(part.read_bytes()[:5000])
-    assert "gas.h5.part" in one_line(ricochet(*stopped, "--resume"))
-    part.unlink()
-    run = ricochet(*stopped, "--resume")
-    assert run.returncode == FILES and "gas.h5.part" in one_line(run)
-
-
-def test_a_stopped_run_is_started_over_by_force_only(ricochet, tmp_path, stopped):
-    run = ricochet(*stopped)
-    assert run.returncode == FILES and "--resume" in one_line(run) and "--force" in one_line(run)
-    assert ricochet(*stopped[:-1], "stop.time=1", "--force").returncode == FINISHED
+def test_a_stopped_run_is_started_over_by_force_only(ricochet, tmp_path):
+    write_input(tmp_path, MIXTURE)
+    assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
+    content = (tmp_path / "gas.h5.part").read_bytes()
+    run = ricochet(*COMMAND)
+    assert run.returncode == FILES and "--resume" in one_line(run) and "--force" in run.stderr
+    assert (tmp_path / "gas.h5.part").read_bytes() == content
+    assert ricochet(*COMMAND, "--force").returncode == FINISHED
     assert sorted(path.name for path in tmp_path.iterdir()) == ["gas.h5", "gas.nml"]
 
 
-def write_short_run(folder) -> list[str]:
-    """The beginning of a command that runs a moment, up to -o."""
-    write_input(folder, MIXTURE)
-    return ["gas.nml", "--set", "stop.time=0.5", "-o"]
+def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
+    """The same command replaces it and says so; it cannot be resumed."""
+    write_input(tmp_path, COLLAPSE)
+    run = ricochet("gas.nml", "-o", "gas.h5", "--quiet")
+    assert run.returncode == BROKEN and "collapse" in one_line(run)
+    assert {path.name for path in tmp_path.iterdir()} == {"gas.nml", "gas.h5.part"}
+    with h5py.File(tmp_path / "gas.h5.part") as file:
+        disks, observables = file["particles/disks"], file["observables"]
+        times = disks["position/time"][:]
+        assert len(times) == disks["committed"][()] == len(disks["position/value"])
+        assert 2 < times[-1] < 2.2 and times[-1] % 0.1 > 1e-3
+        assert np.all(disks["position/value"][-1, :, 1] < 0.1)
+        assert file["events/committed"][()] == observables["wall_collisions/value"][-1].sum()
+        assert observables["total_energy/time"][-1] == times[-1]
+        assert file["provenance"].attrs["note"].decode() == run.stderr.strip()
+    again = ricochet("gas.nml", "-o", "gas.h5", "--quiet", "--resume")
+    assert again.returncode == FILES and "gas.h5.part: its run broke off" in one_line(again)
+    again = ricochet("gas.nml", "-o", "gas.h5")
+    assert again.returncode == BROKEN
+    first, last = again.stderr.splitlines()
+    assert first == "note: gas.h5.part, of a run that broke off, has been replaced"
+    assert f"{last}\n" == run.stderr
+
+
+# --- a finished run goes on ---
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        ("stop.time=3.21", "stop.time=5.005", "stop.time=9"),
+        ("stop.events=77", "stop.events=1031", "stop.events=2000"),
+        ("stop.time=0.05", "stop.events=300", "stop.collisions=703"),
+        ("stop.collisions=57", "stop.collisions_per_disk=10", "stop.time=40"),
+    ],
+)
+def test_a_run_that_ends_three_times_is_one_long_run(ricochet, tmp_path, ends):
+    """Every kind of stop rule, between samples and at them, and of a planned number or not."""
+    write_input(tmp_path, GAS + GROWING)
+    options = [] if "time=9" in ends[-1] else ["--set", "output.event_log=F"]
+    assert ricochet("gas.nml", "-o", "whole.h5", *options, "--set", ends[-1]).returncode == FINISHED
+    for k, end in enumerate(ends):
+        resume = ["--resume"] * (k > 0)
+        assert ricochet(*COMMAND, *options, "--set", end, *resume).returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
+    assert {path.name for path in tmp_path.iterdir()} == {"gas.nml", "whole.h5", "gas.h5"}
+
+
+#: Three collisions at the time 0.5, and walls from 2.25 on.
+TOGETHER = """&box upper = 8, 8 /
+&species radius = 0.25 position = 1,1, 2,1, 1,3, 2,3, 1,5, 2,5
+  velocity = 0.5,0, -0.5,0, 0.5,0, -0.5,0, 0.5,0, -0.5,0 /
+"""
+
+
+@pytest.mark.parametrize(
+    "pause", ["event_log=T", "frames_every_events=1", "frames_every_collisions=2"]
+)
+def test_all_that_happens_at_the_end_happens_whatever_the_cadence(ricochet, tmp_path, pause):
+    write_input(tmp_path, TOGETHER + "&stop time = 0.5 /")
+    assert ricochet(*COMMAND, "--set", f"output.{pause}").returncode == FINISHED
+    with h5py.File(tmp_path / "gas.h5") as file:
+        assert file["observables/collisions/value"][-1] == 3
+        assert np.all(file["particles/disks/collisions/value"][-1] == 1)
+
+
+@pytest.mark.parametrize("end", ["events=1", "collisions=2"])
+def test_a_sample_between_collisions_of_one_moment_is_not_that_of_the_moment(
+    ricochet, tmp_path, end
+):
+    """The moment is not over, neither for samples nor for `stop.time`."""
+    cadences = "&output frames_every_time = 0.25 observables_every_time = 0.5 /"
+    write_input(tmp_path, TOGETHER + cadences)
+    for time in (0.5, 3):
+        last = ["--set", f"stop.{end[:-2]}=", "--set", f"stop.time={time}"]
+        assert ricochet("gas.nml", "-o", "whole.h5", *last, "--force").returncode == FINISHED
+        assert ricochet(*COMMAND, "--set", f"stop.{end}", "--force").returncode == FINISHED
+        assert ricochet(*COMMAND, *last, "--resume").returncode == FINISHED
+        assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
+
+
+LONG = ["--set", "stop.time=30", "--set", "output.checkpoint_every=0.05"]
+
+
+@pytest.mark.parametrize("tries", [12, pytest.param(100, marks=CHECK)])
+def test_a_continued_run_that_is_stopped_and_killed_loses_nothing(
+    ricochet, started, tmp_path, tries
+):
+    """The finished file stays as it is until the longer one takes its place."""
+    write_input(tmp_path, GAS + GROWING)
+    duration = processor_time_of(started("gas.nml", "-o", "whole.h5", *LONG))
+    assert ricochet(*COMMAND, "--set", "stop.time=1.01").returncode == FINISHED
+    output, rng = tmp_path / "gas.h5", random.Random(tries)
+    short, ended = output.read_bytes(), 0
+    for k in range(tries):
+        process = started(*COMMAND, *LONG, "--resume")
+        let_work(process, rng.uniform(0, duration))
+        process.send_signal(signal.SIGTERM if k % 3 == 2 else signal.SIGKILL)
+        message = process.communicate()[1]
+        allowed = STOPPED
+        if output.read_bytes() != short:  # it has finished, even if it was killed right afterwards
+            assert differences(tmp_path / "whole.h5", output) == []
+            output.write_bytes(short)
+            ended += 1
+            allowed = FINISHED
+        assert process.returncode in (allowed, -signal.SIGKILL), message
+    assert ended < tries
+    if output.read_bytes() == short:
+        assert ricochet(*COMMAND, *LONG, "--resume").returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", output) == []
+
+
+def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
+    write_input(tmp_path, MIXTURE)
+    assert ricochet(*COMMAND, "--set", "stop.time=1.3").returncode == FINISHED
+    new = ["output.frames_every_time=0.5", "output.observables_every_events=100", "stop.time=3.1"]
+    new += ["run.title='longer'", "run.search='pairs'", "run.queue='heap'"]
+    options = [word for value in new for word in ("--set", value)]
+    assert ricochet(*COMMAND, *options, "--resume").returncode == FINISHED
+    with h5py.File(tmp_path / "gas.h5") as file:
+        times = file["particles/disks/position/time"][:]
+        assert file["parameters/run"].attrs["title"] == b"longer"
+        events = file["observables/collisions/value"][:]
+        events = events + file["observables/wall_collisions/value"][:].sum(axis=1)
+        sampled = file["observables/collisions/time"][:]
+    assert times.tolist() == [0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2, 2.5, 3, 3.1]
+    assert {900, 1000, 1100, 1200, 1300} < set(events[sampled > 1.3])
+    assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=3.1").returncode == FINISHED
+    here, there = contents(tmp_path / "gas.h5"), contents(tmp_path / "whole.h5")
+    for name in ("position", "velocity", "collisions"):
+        path = f"/particles/disks/{name}/value"
+        assert here[path][-1].tobytes() == there[path][-1].tobytes()
+
+
+@pytest.mark.parametrize("end", ["time=0.5", "collisions=3", "energy_fraction=0.999"])
+def test_a_finished_run_asks_for_a_later_stop_rule(ricochet, tmp_path, end):
+    write_input(tmp_path, MIXTURE)
+    assert ricochet(*COMMAND, "--set", "stop.time=0.5").returncode == FINISHED
+    content = (tmp_path / "gas.h5").read_bytes()
+    run = ricochet(*COMMAND, "--set", "stop.time=0.5", "--set", f"stop.{end}", "--resume")
+    assert run.returncode == FILES and "is a finished run" in one_line(run)
+    assert "a later stop rule" in run.stderr
+    assert (tmp_path / "gas.h5").read_bytes() == content
+
+
+def test_a_check_of_a_run_that_goes_on_changes_nothing(ricochet, before):
+    content, there = before.read_bytes(), set(before.parent.iterdir())
+    run = ricochet(*COMMAND, "--resume", "--check")
+    assert run.returncode == FINISHED and "goes on from time " in run.stdout
+    assert set(before.parent.iterdir()) == there and before.read_bytes() == content
+
+
+def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_path):
+    """Without it the run that is there is unharmed."""
+    disk = small_disk(2000)
+    write_input(tmp_path, MIXTURE)
+    command = ["gas.nml", "-o", "disk/gas.h5", "--quiet", "--set"]
+    assert ricochet(*command, "stop.time=0.5").returncode == FINISHED
+    content = (disk / "gas.h5").read_bytes()
+    run = ricochet(*command, "stop.time=2e4", "--resume")
+    assert run.returncode == FILES and "disk/gas.h5" in one_line(run)
+    assert (disk / "gas.h5").read_bytes() == content
+    small_disk(80000)
+    assert ricochet(*command, "stop.time=2000", "--resume").returncode == FINISHED
+    assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=2000").returncode == FINISHED
+    assert differences(tmp_path / "whole.h5", disk / "gas.h5") == []
+
+
+def test_a_twin_of_a_continued_run_is_refused(ricochet, started, tmp_path):
+    write_input(tmp_path, MIXTURE)
+    assert ricochet(*COMMAND, "--set", "stop.time=0.5").returncode == FINISHED
+    command = [*COMMAND, "--resume", "--set", "stop.time=1e5"]
+    process = started(*command)
+    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 9)
+    run = ricochet(*command)
+    assert run.returncode == FILES and "another run" in one_line(run)
+    process.terminate()
+    assert process.wait() == STOPPED
+
+
+def test_a_run_knows_its_overrides(ricochet, tmp_path):
+    """Stop rules and cadences are as the command says; the rest is as it was, in the same words."""
+    write_input(tmp_path)
+    fixed = ["run.seed=8", "species.heavy.mass=7", "Contact.restitution=0.9", "run.title=a = b"]
+    sets = [f"--set={word}" for word in fixed]
+    assert ricochet("gas.nml", "-o", "whole.h5", *sets, "--set=stop.time=2").returncode == FINISHED
+    assert ricochet(*COMMAND, *sets, *AT_ONCE).returncode == STOPPED
+    run = ricochet(*COMMAND, "--resume", "--set=species.heavy.mass=8")
+    assert run.returncode == USAGE and "species.heavy.mass" in one_line(run)
+    for time, said in ((1, []), (2, ["--set=species.heavy.mass=7"])):  # a stopped, a finished one
+        options = [*said, "--set=run.title=a = b", f"--set=stop.time={time}"]
+        run = ricochet(*COMMAND, "--resume", *options)
+        assert run.returncode == FINISHED, run.stderr
+    found = differences(tmp_path / "whole.h5", tmp_path / "gas.h5")
+    assert found == ["/parameters/overrides"]  # in another order
