@@ -158,9 +158,10 @@ contains
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
     if (status >= 0) call h5tget_size_f(type, bytes, status)
-    stored = 0
-    if (status >= 0 .and. n > 0) call h5dget_storage_size_f(dataset, stored, status)
-    if (status >= 0 .and. layout /= h5d_chunked_f .and. stored /= n*int(bytes, hsize_t)) status = -1
+    if (status >= 0 .and. layout /= h5d_chunked_f .and. n > 0) then
+      call h5dget_storage_size_f(dataset, stored, status)
+      if (stored /= n*int(bytes, hsize_t)) status = -1
+    end if
     if (present(like)) then
       if (status >= 0) call h5tget_class_f(type, kinds(1), status)
       if (status >= 0) call h5tget_class_f(like, kinds(2), status)
