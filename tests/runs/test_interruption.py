@@ -57,10 +57,10 @@ LOGGED = """&box boundary = 'periodic', 'wall' /
   checkpoint_every = 600 /
 """
 #: What a run says on a disk without room: which file, how much is wanted, how much is free ...
-NO_ROOM = r"^disk/gas\.(h5|h5\.part|chk\.h5): .*(\d+ bytes needed, \d+ bytes free|.* are free)"
+NO_ROOM = r"^disk/gas\.h5(\.part)?: .*(\d+ bytes needed, \d+ bytes free|.* are free)"
 #: ... and what to do, at the start and later.
 MAKE_ROOM = NO_ROOM + "(; choose fewer frames or make room)?$"
-GO_ON = NO_ROOM + "; a checkpoint has been written: --resume goes on from here$"
+GO_ON = NO_ROOM + "; --resume goes on from the last checkpoint$"
 
 
 def frames_by_h5dump(path) -> int:
@@ -74,15 +74,15 @@ def frames_by_h5dump(path) -> int:
 @pytest.mark.parametrize("text", [BUSY, PLANNED], ids=["growing", "planned"])
 @pytest.mark.parametrize("tries", [20, pytest.param(200, marks=pytest.mark.check)])
 def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_path, text, tries):
+    """In the file that is left all is right, and the run goes on from it."""
     write_input(tmp_path, text)
     assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
     whole = committed(tmp_path / "whole.h5")
     frames = len(whole["particles/disks/position/time"])
     part, rng, killed = tmp_path / "gas.h5.part", random.Random(tries), 0
     for _ in range(tries):
-        again = "--resume" if (tmp_path / "gas.chk.h5").exists() else "--force"
         goal = frames_in(part) + rng.randrange(frames // 3)
-        process = started("gas.nml", "-o", "gas.h5", "--quiet", again)
+        process = started("gas.nml", "-o", "gas.h5", "--quiet", *["--resume"] * part.exists())
         let_write(process, part, goal)
         time.sleep(rng.uniform(0, 0.05))  # so much until samples are committed
         process.kill()
@@ -90,8 +90,8 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
         assert process.returncode in (FINISHED, -signal.SIGKILL), message
         if (tmp_path / "gas.h5").exists():  # perhaps killed just after
             (tmp_path / "gas.h5").rename(tmp_path / "finished.h5")
-            (tmp_path / "gas.chk.h5").unlink(missing_ok=True)
-        elif part.exists():
+            assert differences(tmp_path / "whole.h5", tmp_path / "finished.h5") == []
+        else:
             killed += 1
             found = committed(part)
             assert len(found["particles/disks/position/time"]) > 0
@@ -99,8 +99,8 @@ def test_kills_cost_no_committed_sample_and_no_result(ricochet, started, tmp_pat
             if shutil.which("h5dump"):
                 assert frames_by_h5dump(part) == len(found["particles/disks/position/time"])
     assert killed > tries / 4
-    again = "--resume" if (tmp_path / "gas.chk.h5").exists() else "--force"
-    assert ricochet("gas.nml", "-o", "gas.h5", again).returncode == FINISHED
+    again = ["--resume"] * part.exists()
+    assert ricochet("gas.nml", "-o", "gas.h5", *again).returncode == FINISHED
     assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
 
 
@@ -114,28 +114,20 @@ def let_write(process, part, frames):
 def test_a_kill_while_checkpoints_are_written_leaves_a_whole_one(
     ricochet, started, tmp_path, tries
 ):
+    """The time of the run never goes back behind one that counted."""
     write_input(tmp_path, BUSY)
     always = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "output.checkpoint_every=1e-6"]
-    checkpoint, rng = tmp_path / "gas.chk.h5", random.Random(tries)
+    part, rng, times = tmp_path / "gas.h5.part", random.Random(tries), []
     for _ in range(tries):
-        before = identity(checkpoint)
-        process = started(*always, "--quiet", *["--resume"] * checkpoint.exists())
-        wait_for_another(checkpoint, before)
+        process = started(*always, "--quiet", *["--resume"] * part.exists())
+        let_write(process, part, frames_in(part) + 20)
         time.sleep(rng.uniform(0, 0.05))
         process.kill()
         assert process.communicate()[1] == ""
-    run = ricochet(*always, "--resume", "--set", "stop.wall_clock=1e-3")
-    assert run.returncode == STOPPED
-
-
-def identity(path) -> int | None:
-    """What tells a file from one that has replaced it; None if there is none."""
-    return path.stat().st_mtime_ns if path.exists() else None
-
-
-def wait_for_another(path, before):
-    """Returns when there is another file than before."""
-    wait_for(lambda: identity(path) not in (before, None))
+        run = ricochet(*always, "--resume", "--check")
+        assert run.returncode == FINISHED, run.stderr
+        times.append(float(run.stdout.split()[-1]))
+    assert times == sorted(times) and times[0] < times[-1]
 
 
 def test_files_never_take_the_place_of_closed_standard_streams(program, tmp_path):
@@ -215,16 +207,26 @@ def test_a_signal_stops_the_run_with_a_checkpoint(started, tmp_path, name, times
             process.send_signal(number)
         message = ended_soon(process, 0)
     assert process.returncode == STOPPED and "--resume" in message.splitlines()[-1]
-    assert (tmp_path / "gas.chk.h5").exists() and not (tmp_path / "gas.h5.lock").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gas.h5.part", "gas.nml"]
 
 
 def test_usr1_makes_a_checkpoint_and_the_run_goes_on(started, tmp_path):
     process = start_long(started, tmp_path)
     process.send_signal(signal.SIGUSR1)
-    wait_for((tmp_path / "gas.chk.h5").exists)
+    wait_for_checkpoint(tmp_path)
     frames = frames_in(tmp_path / "gas.h5.part")
     wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > frames)
     assert process.poll() is None
+
+
+def wait_for_checkpoint(folder):
+    """Returns when the first checkpoint of a new run counts: it takes the other place."""
+
+    def is_there():
+        with h5py.File(folder / "gas.h5.part", "r", locking=False) as file:
+            return file["checkpoint/current"][()] == 1
+
+    wait_for(is_there)
 
 
 def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
@@ -310,13 +312,13 @@ def test_a_signal_does_not_wait_until_all_pairs_are_compared(
     &output observables_every_events = 2 event_log = .true. checkpoint_every = 1e6 /"""
     write_input(tmp_path, text)
     for wait in (0.0, 0.2, 0.5):
-        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+        resume = ["--resume"] * (tmp_path / "gas.h5.part").exists()
         process = started("gas.nml", "-o", "gas.h5", *resume)
         wait_for(lambda: frames_in(tmp_path / "gas.h5.part") or (tmp_path / "gas.h5").exists())
         time.sleep(wait)
         if process.poll() is None and not (tmp_path / "gas.h5").exists():
             stopped_in_time(process, FINISHED)  # the last events may just have happened
-            assert process.returncode == FINISHED or (tmp_path / "gas.chk.h5").exists()
+            assert process.returncode == FINISHED or (tmp_path / "gas.h5.part").exists()
     if count > few:
         return
     if not (tmp_path / "gas.h5").exists():
@@ -357,7 +359,7 @@ def test_a_run_whose_samples_cease_still_makes_checkpoints(started, tmp_path):
     process = started("gas.nml", "-o", "gas.h5", "--quiet")
     let_work(process, 0.5)
     process.send_signal(signal.SIGUSR1)
-    wait_for((tmp_path / "gas.chk.h5").exists)
+    wait_for_checkpoint(tmp_path)
     assert frames_in(tmp_path / "gas.h5.part", "observables") == 61
 
 
@@ -370,7 +372,7 @@ def test_a_million_disks_stop_in_time(started, tmp_path, dynamics):
     &stop events = 1000000000 /"""
     write_input(tmp_path, text)
     for wait in (0.0, 0.5, 1.0, 2.0):
-        resume = ["--resume"] if (tmp_path / "gas.chk.h5").exists() else []
+        resume = ["--resume"] * (tmp_path / "gas.h5.part").exists()
         process = started("gas.nml", "-o", "gas.h5", *resume)
         wait_for((tmp_path / "gas.h5.part").exists)
         time.sleep(wait + 0.1)
@@ -444,7 +446,7 @@ def test_a_reader_that_locks_the_file_stops_nobody(ricochet, tmp_path):
 def test_a_twin_is_refused_and_harms_nobody(ricochet, started, tmp_path, option):
     process = start_long(started, tmp_path, "--set", "stop.collisions=100000")
     process.send_signal(signal.SIGUSR1)
-    wait_for((tmp_path / "gas.chk.h5").exists)
+    wait_for_checkpoint(tmp_path)
     command = ["gas.nml", "-o", "gas.h5", *LONG, "--set", "stop.collisions=100000"]
     with held(process):
         run = ricochet(*command, option)
