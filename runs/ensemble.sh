@@ -31,8 +31,8 @@ running:
   -h, --help
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
-with NAME.h5 is finished and left out, one with NAME.chk.h5 resumes, one that failed is tried
-again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
+with NAME.h5 is finished and left out, one with NAME.h5.part resumes, one that broke off or failed
+is tried again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
 build/ricochet).  All machines need the same folders.
 
@@ -135,8 +135,8 @@ check_names() {
       $name != *[[:blank:]] ]] ||
       die "'$name' cannot name a member: up to 200 characters, not empty, no slash," \
         "no dash or dot in front, no blanks around"
-    [[ $name != *.chk && $name != parallel && $name != slurm ]] ||
-      die "'$name' cannot name a member: $name.h5 or $name.log is something else"
+    [[ $name != parallel && $name != slurm ]] ||
+      die "'$name' cannot name a member: $name.log is something else"
     [[ -z ${seen[x$name]:-} ]] || die "two members are called '$name'"
     seen[x$name]=1
   done
@@ -162,9 +162,13 @@ put() {
   fi
 }
 
-# Does member NAME have data, finished or not?
+# What member NAME has said last.
+last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
+
+# Does member NAME have data, finished or to go on from? One that broke off has said why.
 has_data() {
-  [[ -e $folder/$1.h5 || -e $folder/$1.chk.h5 ]]
+  [[ -e $folder/$1.h5 ]] ||
+    [[ -e $folder/$1.h5.part && $(last_words "$1") =~ ^(stopped .*|.*--resume goes on.*|)$ ]]
 }
 
 # Members of an earlier command on the folder must mean the same: results are told apart by name.
@@ -214,27 +218,27 @@ remember() {
 
 # Run member k; what became of it goes through the pipe to the parent.
 run_member() {
-  local base=$folder/${names[$1]} rest=${overrides[$1]} status
+  local base=$folder/${names[$1]} rest=${overrides[$1]} status resume=
   local arguments=("$input" -o "$base.h5" --quiet)
   while [[ $rest == '--set '* ]]; do
     rest=${rest#--set }
     arguments+=(--set "${rest%% --set *}")
     if [[ $rest == *' --set '* ]]; then rest="--set ${rest#* --set }"; else rest=; fi
   done
-  if [[ -e $base.chk.h5 ]]; then
-    arguments+=(--resume)
-  elif [[ -e $base.h5.part ]]; then
-    arguments+=(--force) # killed, or broke off: its frames come again
-  fi
-  "$program" "${arguments[@]}" >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
-  child=$!
-  [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
-  while :; do # `wait` also ends when a signal comes
-    interrupted='' status=0
-    wait "$child" || status=$?
-    [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
+  [[ ! -e $base.h5.part ]] || resume=--resume
+  while :; do
+    "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
+    child=$!
+    [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
+    while :; do # `wait` also ends when a signal comes
+      interrupted='' status=0
+      wait "$child" || status=$?
+      [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
+    done
+    child=
+    [[ -n $resume && $(last_words "${names[$1]}") == *": its run broke off "* ]] || break
+    resume= # it starts over
   done
-  child=
   # Stopped while it started, or while bash waited for it a second time (-1: it has lost the status).
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
   printf '%s %s\n' "$1" "$status" >&"$events"
@@ -383,10 +387,7 @@ prepare_shares() {
 judge_by_files() {
   local name
   for name in "${names[@]}"; do
-    if [[ ! -e $folder/$name.h5 && ! -e $folder/$name.chk.h5 && -s $folder/$name.log ]] &&
-      may_be_ours "$folder/$name.log"; then
-      failure "$name" "$(tail -n 1 -- "$folder/$name.log")"
-    fi
+    has_data "$name" || [[ -z $(last_words "$name") ]] || failure "$name" "$(last_words "$name")"
   done
 }
 

@@ -217,7 +217,7 @@ def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
     running.send_signal(by)
     _, errors = running.communicate(timeout=PATIENCE)
     assert running.returncode == 75, errors
-    assert len(list(folder.glob("*.chk.h5"))) == 2
+    assert len(list(folder.glob("*.h5.part"))) == 2
     assert not list(folder.glob("seed_?.h5"))
     again = ensemble(*arguments, *LONG)
     assert again.returncode == 0, again.stderr
@@ -343,7 +343,7 @@ def test_a_member_that_slurm_puts_back_goes_on(ensemble, cluster, tmp_path):
     wait_for(lambda: list(folder.glob("*.part")), "a member runs")
     job = (folder / "slurm.job").read_text().strip()
     cluster("scontrol", "requeue", f"{job}_1")
-    wait_for(lambda: list(folder.glob("*.chk.h5")), "a checkpoint")
+    wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text(), "a checkpoint")
     assert not list(folder.glob("seed_?.h5"))
     wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")
 
@@ -356,7 +356,7 @@ def test_a_member_whose_time_in_slurm_is_over_is_put_back(ensemble, cluster, tmp
     wait_for(lambda: list(folder.glob("*.part")), "a member runs")
     job = (folder / "slurm.job").read_text().strip()
     cluster("scancel", "--batch", "--signal=TERM", f"{job}_1")  # as --signal=B:TERM@60 does
-    wait_for(lambda: list(folder.glob("*.chk.h5")), "a checkpoint")
+    wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text(), "a checkpoint")
     state = ("squeue", "--noheader", "--format=%T")
     wait_for(lambda: cluster(*state).strip() == "PENDING", "the job waits again")
     wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")

@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
 # Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
-# `outcome.exit=N` fails with N.
+# `outcome.exit=N` fails with N; after 4 it has broken off, and does not resume.
 PROGRAM = """#!/usr/bin/env bash
 while (($#)); do
   case $1 in
@@ -41,11 +41,14 @@ while (($#)); do
   esac
   shift
 done
-trap 'echo TERM >>"$out.signals"; touch "$out.chk.h5"; exit 75' TERM INT
+trap 'echo TERM >>"$out.signals"; touch "$out.h5.part"; exit 75' TERM INT
 echo "${resumed:-anew} $sets" >>"$out.starts"
+[[ -z ${resumed:-} || ! -e $out.broken ]] ||
+  { echo "$out.h5.part: its run broke off and cannot go on" >&2; exit 3; }
+[[ ${outcome:-} != 4 ]] || touch "$out.h5.part" "$out.broken"
 [[ -z ${outcome:-} ]] || { echo "reason of the failure" >&2; exit "$outcome"; }
 while [[ -e ${HOLD:-} ]]; do sleep 0.05; done
-rm -f -- "$out.chk.h5"
+rm -f -- "$out.h5.part"
 [[ ! -e $out.h5 ]] || exit 3
 echo data >"$out.h5"
 """
@@ -191,7 +194,7 @@ def test_manifest_of_the_folder_repeats_the_ensemble(lab):
 def test_finished_members_are_skipped_and_checkpoints_resumed(lab):
     (lab / "out").mkdir()
     (lab / "out" / "seed_1.h5").write_text("done before")
-    (lab / "out" / "seed_2.chk.h5").touch()
+    (lab / "out" / "seed_2.h5.part").touch()
     result = ensemble(lab, "--seeds", "1-3")
     assert result.returncode == 0
     assert starts(lab) == {"seed_2": ["resumed run.seed=2|"], "seed_3": ["anew run.seed=3|"]}
@@ -211,6 +214,13 @@ def test_one_failure_does_not_stop_the_others(lab):
     assert starts(lab)["b"] == ["anew outcome.exit=4|"], "tried once, not by every worker"
 
 
+def test_a_member_that_broke_off_starts_over(lab):
+    for _ in range(2):
+        assert ensemble(lab, "--scan", "outcome.exit=4").returncode == 1
+    words = [line.split()[0] for line in starts(lab)["exit_4"]]
+    assert words == ["anew", "resumed", "anew"]
+
+
 def test_failed_members_are_tried_once_by_several_workers(lab):
     ensemble(lab, "--scan", "outcome.exit=4", "--seeds", "1-6", "-j", "3")
     assert all(len(lines) == 1 for lines in starts(lab).values())
@@ -227,7 +237,7 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     with started(lab, "--seeds", "1-6", "-j", "2", members=2) as process:
         os.killpg(process.pid, how)  # as a terminal does
         assert process.wait() == 75
-    assert len(list((lab / "out").glob("*.chk.h5"))) == 2
+    assert len(list((lab / "out").glob("*.h5.part"))) == 2
     assert [p.read_text() for p in (lab / "out").glob("*.signals")] == ["TERM\n"] * 2
     (lab / "hold").unlink()
     assert ensemble(lab, "--seeds", "1-6").returncode == 0
@@ -378,9 +388,7 @@ def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):
     assert message in result.stderr and result.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    "name", ["", "  ", "-x", ".x", "a/b", "a\x01b", "x ", "x.chk", "slurm", "n" * 201]
-)
+@pytest.mark.parametrize("name", ["", "  ", "-x", ".x", "a/b", "a\x01b", "x ", "slurm", "n" * 201])
 def test_what_cannot_name_a_member_is_one_line(lab, name):
     (lab / "members.txt").write_text(f"{name}\t--set run.seed=1\n")
     result = ensemble(lab, "--manifest", str(lab / "members.txt"))
@@ -496,7 +504,7 @@ def test_a_signal_stops_all_members_soon_and_it_is_said(real, tmp_path, how):
     said = ended_soon(process, how, 2, its)
     assert process.returncode == 75 and members_in(tmp_path / "stopped") == []
     assert "0 of 6 members finished" in said and "stopped: the same command goes on" in said
-    assert len(list((tmp_path / "stopped").glob("*.chk.h5"))) == 2
+    assert len(list((tmp_path / "stopped").glob("*.h5.part"))) == 2
 
 
 def test_dry_run_starts_nothing(lab):
@@ -581,19 +589,22 @@ def test_a_disturbed_ensemble_equals_an_undisturbed_one(real, tmp_path, times):
     assert differences_of(tmp_path / "calm", tmp_path / "rough") == []
 
 
-def test_a_member_killed_without_a_checkpoint_is_made_anew(real, tmp_path):
+def test_a_member_that_was_killed_goes_on(real, tmp_path):
+    """Also one that was killed before its first checkpoint."""
+
     def start(end):
         changes = ("--set", "output.checkpoint_every=", "--set", f"stop.time={end}")
         return real("rough", *changes, members=("--seeds", "1"))
 
     part = tmp_path / "rough" / "seed_1.h5.part"
-    launcher = start(1e6)
+    launcher = start("1e6")
     wait_for(lambda: frames_in(part) > 5)
-    for process in members_in(tmp_path / "rough"):
-        os.kill(process, signal.SIGKILL)
-    assert finish(launcher) == 1
-    assert part.exists() and not list(tmp_path.glob("rough/*.chk.h5"))
-    assert finish(start(4)) == 0
+    (process,) = members_in(tmp_path / "rough")
+    os.kill(process, signal.SIGKILL)
+    assert finish(launcher) == 1 and part.exists()
+    manifest = tmp_path / "rough" / "manifest.txt"
+    manifest.write_text(manifest.read_text().replace("1e6", "4"))
+    assert finish(start("4")) == 0
 
 
 def test_members_depend_neither_on_order_nor_on_jobs_nor_on_company(real, ricochet, tmp_path):
