@@ -2,7 +2,7 @@
 module input_words
   use kinds, only: int64, real64
   use input_problems, only: problem_list_t
-  use namelist_scanner, only: scanner_t, statement_t, token_t
+  use namelist_tokens, only: assignment_t, content, token_t
   use input_groups, only: value_t, text_length
   use variables, only: allowed, largest, variable_t, smallest, table, words_of
   use texts, only: counted, digits, lower_case, nearest_word, shown, written
@@ -18,40 +18,40 @@ contains
 
   !> Stores the values of an assignment in `slot`. A value that is wrong is reported; the slot is then
   !> faulty and keeps the value that it had.
-  subroutine store_values(slot, scanner, statement, problems)
+  subroutine store_values(slot, text, assignment, problems)
     type(value_t), intent(inout) :: slot
-    type(scanner_t), intent(in) :: scanner
-    type(statement_t), intent(in) :: statement
+    character(len=*), intent(in) :: text                 !! that of which tokens are places
+    type(assignment_t), intent(in) :: assignment
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
     character(len=:), allocatable :: problem
     integer(int64) :: total
     integer :: k, n
 
-    slot%line = statement%line
+    slot%line = assignment%line
     slot%given = .true.
     slot%faulty = .true.
-    if (.not. statement%sound) return
-    associate (row => table(slot%row), tokens => statement%tokens)
+    if (.not. assignment%sound) return
+    associate (row => table(slot%row), tokens => assignment%tokens)
       total = sum(int(tokens%repeats, int64))
       call check_number(row)
       if (problem /= "") then
-        call problems%add(statement%line, statement%where, problem)
+        call problems%add(assignment%line, assignment%where, problem)
         return
       end if
       new = slot
       new%faulty = .false.
-      n = max(statement%element - 1, 0)
-      if (statement%element == 0) then
+      n = max(assignment%element - 1, 0)
+      if (assignment%element == 0) then
         call new%clear()
         if (slot%kind == "real") allocate (new%reals(total))
         if (slot%kind /= "real") allocate (new%texts(total))
       end if
       do k = 1, size(tokens)
-        call store_token(row, tokens(k), scanner%content(tokens(k)))
+        call store_token(row, tokens(k), content(text, tokens(k)))
         n = n + tokens(k)%repeats
         if (problem == "") cycle
-        call problems%add(merge(tokens(k)%line, statement%line, statement%line > 0), statement%where, problem)
+        call problems%add(merge(tokens(k)%line, assignment%line, assignment%line > 0), assignment%where, problem)
         new%faulty = .true.
         if (problems%is_full()) exit
       end do
@@ -65,15 +65,15 @@ contains
       type(variable_t), intent(in) :: row
 
       problem = ""
-      if (statement%element > 0) then
-        if (statement%element > row%size .or. .not. slot%is_set()) then
+      if (assignment%element > 0) then
+        if (assignment%element > row%size .or. .not. slot%is_set()) then
           problem = "it is set as a whole: name = "//trim(row%value)
         else if (total /= 1) then
           problem = counted(total, "value")//" for one element; allowed: "//allowed(row)
         end if
       else if (row%size > 0 .and. total /= row%size) then
         problem = counted(total, "value")//" instead of "//written(row%size)//"; allowed: "//allowed(row)
-        if (row%kind == "real" .and. size(statement%tokens) == 2*row%size) problem = problem//decimal_hint()
+        if (row%kind == "real" .and. size(assignment%tokens) == 2*row%size) problem = problem//decimal_hint()
       else if (total > most_values) then
         problem = counted(total, "value")//"; allowed: up to "//written(most_values)
       end if
@@ -84,12 +84,12 @@ contains
       character(len=:), allocatable :: hint
 
       hint = ""
-      associate (tokens => statement%tokens)
+      associate (tokens => assignment%tokens)
         do k = 1, size(tokens), 2
           if (tokens(k + 1)%first /= tokens(k)%last + 2) return     ! more than a comma between them
-          if (verify(scanner%content(tokens(k + 1)), digits) > 0) return
+          if (verify(content(text, tokens(k + 1)), digits) > 0) return
         end do
-        hint = "; did you mean "//scanner%content(tokens(1))//"."//scanner%content(tokens(2))// &
+        hint = "; did you mean "//content(text, tokens(1))//"."//content(text, tokens(2))// &
           "? the decimal sign is a point"
       end associate
     end function decimal_hint
@@ -102,7 +102,9 @@ contains
       character(len=:), allocatable :: normal        ! the word as it is kept
       integer(int64) :: whole
       real(real64) :: number
+      logical :: quoted
 
+      quoted = scan(token%kind, "'""") > 0
       normal = word
       number = 0
       problem = ""
@@ -118,11 +120,11 @@ contains
         if (any(lower_case(word) == yes)) normal = ".true."
         if (all(lower_case(word) /= [yes, no])) problem = "is neither true nor false"
       case default
-        call check_text(word, row, statement%line <= 0 .or. token%quote /= " ", problem)
+        call check_text(word, row, assignment%line <= 0 .or. quoted, problem)
       end select
       if (row%kind /= "text") then
         if (problem == "" .and. (number < row%range%lower .or. number > row%range%upper)) problem = "is out of range"
-        if (token%quote /= " ") problem = "is in quotes"
+        if (quoted) problem = "is in quotes"
         if (problem /= "") problem = shown(word)//" "//problem//"; allowed: "//allowed(row)
       end if
       if (problem /= "") return

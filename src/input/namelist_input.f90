@@ -1,17 +1,18 @@
-!> Reads input text and the `--set` overrides: text to statements to values. Every problem is collected.
+!> Reads input text and the `--set` overrides: tokens to assignments to values. Every problem is collected.
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: problem_list_t
   use input_text, only: unix_lines
   use input_words, only: store_values
-  use namelist_scanner, only: group_start, plain, scanner_t, setting, statement_t, token_t
-  use texts, only: joined, lower_case, place_of, shown, suggestion, text_t, written
+  use namelist_tokens, only: assignment_t, content, cut, ending, plain, token_t, unclosed, word
+  use texts, only: digits, joined, lower_case, place_of, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none
   private
   public :: read_groups
 
   integer, parameter :: most_instances = 5000           !! of each of the repeated groups
+  integer, parameter :: most_repeats = 10000000
   character(len=*), parameter :: eol = new_line("a")
 
 contains
@@ -23,18 +24,31 @@ contains
     type(group_t), allocatable, intent(out) :: groups(:)            !! in the order of the table, those of one name side by side
     type(problem_list_t), intent(out) :: problems
     logical, intent(out) :: complete                                !! .false.: parts of the text were skipped
+    type(value_t) :: defaults(size(table))
     type(group_t), allocatable :: found(:)                          ! in the order of the text
-    integer :: n, instances(size(group_names)), i, j, k             ! n: groups found; instances: of each name
+    integer :: n, i, j, k                                           ! n: groups found
+    character(len=:), allocatable :: source                         ! what is being read: a default, the text, an override
+    type(token_t), allocatable :: token(:)                          ! of the source
+    integer :: at                                                   ! the next of them
+    character(len=:), allocatable :: own                            ! name of the open group, for messages
+    integer :: group                                                ! to which assignments belong; 0: its name is unknown
+    integer :: opened                                               ! line of the open group; 0: none is open
+    logical :: quote_open                                           ! in this group: its / may be part of a text
 
     complete = .true.
     n = 0
-    instances = 0
+    do k = 1, size(table)
+      defaults(k) = value_t(row=k, name=table(k)%name, kind=table(k)%kind)
+      if (table(k)%status == "default" .or. table(k)%status == "fallback") call assign_text(defaults(k), trim(table(k)%value), 0)
+      defaults(k)%given = .false.
+    end do
     allocate (found(size(group_names) + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
     do k = 1, size(group_names)                                     ! groups that cannot be repeated exist from the start
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0)
     end do
-    call read_statements(unix_lines(text))
+    call open_source(unix_lines(text))
+    call read_text()
     do k = 1, n
       call name_instance(found(k))
     end do
@@ -53,6 +67,24 @@ contains
 
   contains
 
+    !> Begins to read another source.
+    subroutine open_source(text)
+      character(len=*), intent(in) :: text
+
+      source = text
+      call cut(source, token)
+      at = 1
+    end subroutine open_source
+
+    !> Whether the next tokens are of these kinds.
+    function follow(kinds)
+      character(len=*), intent(in) :: kinds
+      logical :: follow
+      integer :: i
+
+      follow = all([(token(at + i - 1)%kind == kinds(i:i), i=1, len(kinds))])
+    end function follow
+
     !> Adds a group with the defaults of the table.
     subroutine add_group(name, line)
       character(len=*), intent(in) :: name
@@ -62,121 +94,254 @@ contains
 
       n = n + 1
       rows = pack([(v, v=1, size(table))], table%group == name)
-      associate (group => found(n), number => instances(place_of(name, group_names)))
-        number = number + 1
+      associate (group => found(n))
         group%name = name
-        group%number = number
+        group%number = count(found(:n)%name == name)
         group%line = line
         allocate (group%values(size(rows)))
         do v = 1, size(rows)
-          group%values(v)%row = rows(v)
-          call reset(group%values(v))
+          group%values(v) = defaults(rows(v))
         end do
       end associate
     end subroutine add_group
-
-    !> Leaves a variable as if it were not in the file.
-    subroutine reset(slot)
-      type(value_t), intent(inout) :: slot
-
-      associate (row => table(slot%row))
-        slot = value_t(row=slot%row, name=row%name, kind=row%kind)
-        if (row%status == "default" .or. row%status == "fallback") call assign_text(slot, trim(row%value), 0)
-        slot%given = .false.
-      end associate
-    end subroutine reset
 
     !> Stores a value that is not from the file: a default, or that of an override, where text needs no quotes.
     subroutine assign_text(slot, text, line)
       type(value_t), intent(inout) :: slot
       character(len=*), intent(in) :: text
       integer, intent(in) :: line                         !! -k: override k; 0: a default
-      type(scanner_t) :: scanner
-      type(statement_t) :: statement
+      type(assignment_t) :: assignment
 
-      scanner%text = text//eol
-      statement%line = line
-      statement%where = trim(table(slot%row)%group)//"."//slot%name
+      call open_source(text//eol)
+      assignment%line = line
+      assignment%where = trim(table(slot%row)%group)//"."//slot%name
       if (slot%kind == "text" .and. table(slot%row)%size == 1 .and. scan(text, "'""") /= 1) then
-        statement%tokens = [token_t(first=1, last=len(text))]
+        assignment%tokens = [token_t(word, 1, len(text), 0, 1)]
       else
-        call scanner%read_values(statement, problems)
-        if (statement%sound .and. scanner%at <= len(text)) then
-          call problems%add(line, statement%where, "unexpected "//shown(text(scanner%at:)))
-          statement%sound = .false.
-        end if
+        call read_values(assignment)
+        if (assignment%sound .and. token(at)%kind /= ending) call complain(assignment, "unexpected "//shown(rest_of_line()))
       end if
-      call store_values(slot, scanner, statement, problems)
+      call store_values(slot, source, assignment, problems)
     end subroutine assign_text
 
     !> Reads the whole text.
-    subroutine read_statements(text)
-      character(len=*), intent(in) :: text
-      type(scanner_t) :: scanner
-      type(statement_t) :: statement
-      integer :: group                                    ! to which assignments belong; 0: its name is unknown
-
-      scanner%text = text
-      group = 0
+    subroutine read_text()
+      opened = 0
       do while (.not. problems%is_full())
-        call scanner%next_statement(statement, problems)
-        if (group > 0 .and. statement%kind /= setting) found(group)%last = scanner%closed
-        if (statement%kind == group_start) then
-          call enter_group(statement, group)
-        else if (statement%kind /= setting) then
-          exit                                            ! the end of the text
-        else if (group > 0) then
-          call take_assignment(found(group), scanner, statement)
+        if (opened == 0) then
+          if (token(at)%kind == ending) return
+          call between_groups()
+          cycle
         end if
+        select case (token(at)%kind)
+        case ("/")
+          if (group > 0) found(group)%last = token(at)%first
+          at = at + 1
+          opened = 0
+        case ("&", ending)
+          if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
+            call problems%add(token(at)%line, own, "a group ends with /, not with &end")
+            at = at + 2
+          else if (.not. quote_open) then                 ! else it may have swallowed the end
+            call problems%add(opened, own, "the closing / is missing")
+          end if
+          opened = 0
+        case (word)
+          call read_assignment()
+        case default
+          call problems%add(token(at)%line, own, "unexpected "//shown(rest_of_line())//"; a variable is set as name = value")
+          call skip_line()
+        end select
       end do
-      if (scanner%lost) complete = .false.
-    end subroutine read_statements
+    end subroutine read_text
+
+    !> Outside groups only `&name` is allowed; anything else is skipped up to a line that begins with &.
+    subroutine between_groups()
+      character(len=:), allocatable :: problem
+
+      problem = "text outside a group; a group is &name ... /, a comment begins with !"
+      if (token(at)%kind == "&") problem = "the name of a group follows directly after &, without quotes"
+      if (follow("&"//word) .and. token(at)%last + 1 == token(at + 1)%first) then
+        opened = token(at)%line
+        call enter_group(lower_case(content(source, token(at + 1))))
+        quote_open = .false.
+        at = at + 2
+        return
+      end if
+      call problems%add(token(at)%line, shown(rest_of_line()), problem)
+      do
+        call skip_line()
+        if (scan(token(at)%kind, "&"//ending) > 0) return
+      end do
+    end subroutine between_groups
+
+    !> Skips the rest of the line, of which nothing is understood.
+    subroutine skip_line()
+      integer :: line
+
+      complete = .false.
+      line = token(at)%line
+      do while (token(at)%line == line .and. token(at)%kind /= ending)
+        at = at + 1
+      end do
+    end subroutine skip_line
+
+    !> From the next token to the end of its line.
+    function rest_of_line() result(text)
+      character(len=:), allocatable :: text
+
+      associate (first => token(at)%first)
+        text = source(first:first + index(source(first:), eol) - 2)
+      end associate
+    end function rest_of_line
+
+    !> Reads `name = values`.
+    subroutine read_assignment()
+      type(assignment_t) :: assignment
+      character(len=:), allocatable :: name
+
+      name = lower_case(content(source, token(at)))
+      assignment%line = token(at)%line
+      assignment%where = own//"."//plain(name)
+      at = at + 1
+      if (token(at)%kind == "(") call read_element(assignment)
+      if (.not. assignment%sound) then
+        call skip_line()
+      else if (token(at)%kind /= "=") then
+        call problems%add(assignment%line, assignment%where, "= is missing after the name; a comment begins with !")
+        complete = .false.
+        if (token(at)%line == assignment%line) call skip_line()
+      else
+        at = at + 1
+        call read_values(assignment)
+        if (group > 0) call take_assignment(found(group), name, assignment)
+      end if
+    end subroutine read_assignment
+
+    !> Reads the `(2)` of `name(2) = value`.
+    subroutine read_element(assignment)
+      type(assignment_t), intent(inout) :: assignment
+      integer :: status
+
+      if (follow("("//word//")")) then
+        associate (number => source(token(at + 1)%first:token(at + 1)%last))
+          if (verify(number, digits) == 0) read (number, *, iostat=status) assignment%element
+        end associate
+      end if
+      if (assignment%element > 0) then
+        at = at + 3
+      else
+        call complain(assignment, "brackets hold the number of one value, as in name(2) = value")
+      end if
+    end subroutine read_element
+
+    !> Reports what is wrong with an assignment.
+    subroutine complain(assignment, what)
+      type(assignment_t), intent(inout) :: assignment
+      character(len=*), intent(in) :: what
+
+      call problems%add(merge(token(at)%line, assignment%line, assignment%line > 0), assignment%where, what)
+      assignment%sound = .false.
+    end subroutine complain
+
+    !> Reads the values after `=`, up to the next name, `/`, `&` or the end.
+    subroutine read_values(assignment)
+      type(assignment_t), intent(inout) :: assignment
+      logical :: after_comma
+      integer :: first
+
+      first = at
+      after_comma = .true.
+      do while (scan(token(at)%kind, "/&"//ending) == 0 .and. .not. (follow(word//"=") .or. follow(word//"("//word//")=")))
+        select case (token(at)%kind)
+        case (",")
+          if (after_comma) call complain(assignment, "a value is missing before the comma")
+        case (word)
+          call read_repeats(assignment)
+        case (unclosed)
+          call complain(assignment, "the closing quote "//source(token(at)%first:token(at)%first)//" is missing")
+          quote_open = .true.
+          complete = .false.
+        case ("'", """")
+        case default
+          call complain(assignment, "unexpected "//shown(content(source, token(at))))
+        end select
+        after_comma = token(at)%kind == ","
+        at = at + 1
+      end do
+      if (all(token(first:at - 1)%kind == ",") .and. assignment%sound) call complain(assignment, "it has no value")
+      assignment%tokens = pack(token(first:at - 1), token(first:at - 1)%kind /= ",")
+    end subroutine read_values
+
+    !> Reads the repeat count of `3*value`; the value may be text in quotes.
+    subroutine read_repeats(assignment)
+      type(assignment_t), intent(inout) :: assignment
+      integer :: star, status
+
+      associate (own => token(at), next => token(at + 1))
+        star = index(source(own%first:own%last), "*")
+        if (star < 2) return
+        associate (count => source(own%first:own%first + star - 2))
+          if (verify(count, digits) > 0) return
+          status = 1
+          if (len(count) <= 8) read (count, *, iostat=status) own%repeats
+        end associate
+        if (status /= 0 .or. own%repeats < 1 .or. own%repeats > most_repeats) call complain(assignment, &
+          "the repeat count of "//shown(source(own%first:own%last))//" is out of range")
+        own%first = own%first + star
+        if (own%first <= own%last) return
+        if (scan(next%kind, "'"""//unclosed) > 0 .and. next%first == own%first) then
+          next%repeats = own%repeats
+          own%kind = ","                                  ! the count is taken
+        else
+          call complain(assignment, "a value is missing after the *")
+        end if
+      end associate
+    end subroutine read_repeats
 
     !> Finds the group to which the following assignments belong.
-    subroutine enter_group(statement, group)
-      type(statement_t), intent(in) :: statement
-      integer, intent(out) :: group
+    subroutine enter_group(name)
+      character(len=*), intent(in) :: name
 
-      associate (name => statement%name, line => statement%line)
-        group = 0
-        if (all(group_names /= name)) then
-          complete = .false.
-          call problems%add(line, "&"//plain(name), "unknown group; "//suggestion(name, group_names))
-        else if (.not. is_repeated(name)) then
-          group = place_of(name, found(:n)%name)
-          if (found(group)%line > 0) call problems%add(line, name, &
-            "a second group of this name; the first is in line "//written(found(group)%line))
-          if (found(group)%line == 0) found(group)%line = line
-        else if (instances(place_of(name, group_names)) == most_instances) then
-          call problems%add(line, name, "more than "//written(most_instances)//" groups of this name")
-        else
-          call add_group(name, line)
-          group = n
-        end if
-        if (group > 0) found(group)%first = statement%first
-      end associate
+      own = plain(name)
+      group = 0
+      if (all(group_names /= name)) then
+        complete = .false.
+        call problems%add(opened, "&"//own, "unknown group; "//suggestion(name, group_names))
+      else if (.not. is_repeated(name)) then
+        group = place_of(name, found(:n)%name)
+        if (found(group)%line > 0) call problems%add(opened, name, &
+          "a second group of this name; the first is in line "//written(found(group)%line))
+        if (found(group)%line == 0) found(group)%line = opened
+      else if (count(found(:n)%name == name) == most_instances) then
+        call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name")
+      else
+        call add_group(name, opened)
+        group = n
+      end if
+      if (group > 0) found(group)%first = token(at)%first
     end subroutine enter_group
 
     !> Stores the values of one assignment.
-    subroutine take_assignment(group, scanner, statement)
+    subroutine take_assignment(group, name, assignment)
       type(group_t), intent(inout) :: group
-      type(scanner_t), intent(in) :: scanner
-      type(statement_t), intent(in) :: statement
+      character(len=*), intent(in) :: name
+      type(assignment_t), intent(in) :: assignment
       integer :: row, elements
 
-      row = row_of(group%name, statement%name)
+      row = row_of(group%name, name)
       if (row == 0) then
-        call report_unknown(group%name, statement%name, statement%line)
+        call report_unknown(group%name, name, assignment%line)
         return
       end if
       elements = -1
-      if (statement%element > 0) elements = ibset(0, min(statement%element, 30))
+      if (assignment%element > 0) elements = ibset(0, min(assignment%element, 30))
       associate (slot => group%values(row))
         if (iand(slot%elements, elements) /= 0) then
-          call problems%add(statement%line, statement%where, "is set twice; the first time in line "//written(slot%line))
+          call problems%add(assignment%line, assignment%where, "is set twice; the first time in line "//written(slot%line))
         else
           slot%elements = ior(slot%elements, elements)
-          call store_values(slot, scanner, statement, problems)
+          call store_values(slot, source, assignment, problems)
         end if
       end associate
     end subroutine take_assignment
@@ -229,7 +394,7 @@ contains
         call find_group(group, instance, line, g)
         if (g == 0) return
         if (equals == len(text)) then
-          call reset(found(g)%values(row))
+          found(g)%values(row) = defaults(found(g)%values(row)%row)
         else
           call assign_text(found(g)%values(row), text(equals + 1:), line)
           call replace_cadence(found(g), name)
@@ -247,7 +412,8 @@ contains
       if (track_of(name) == "") return
       do v = 1, size(group%values)
         associate (slot => group%values(v))
-          if (slot%line > 0 .and. slot%name /= name .and. track_of(slot%name) == track_of(name)) call reset(slot)
+          if (slot%line > 0 .and. slot%name /= name .and. track_of(slot%name) == track_of(name)) &
+            slot = defaults(slot%row)
         end associate
       end do
     end subroutine replace_cadence
