@@ -10,14 +10,13 @@ import shutil
 import signal
 import socket
 import subprocess
-import time
 from pathlib import Path
 
 import h5py
 import pytest
 
 from synthetic_run import ROOT
-from whole_runs import PATIENCE
+from whole_runs import PATIENCE, frames_in, wait_for
 
 # Daemons, ports and signals across hosts: a minute that `.ci/run` and `make check` have.
 pytestmark = pytest.mark.check
@@ -50,7 +49,7 @@ def daemon(folder: Path, *command, ready, **options):
     log = (folder / f"{name}.out").open("w")
     process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, **options)
     try:
-        wait_for(ready, f"{name} is up", lambda: process.poll() is None)
+        wait_for(lambda: ready() or process.poll() is not None)
         yield process
     finally:
         process.terminate()
@@ -59,18 +58,6 @@ def daemon(folder: Path, *command, ready, **options):
         process.kill()
         process.wait()
         log.close()
-
-
-def wait_for(condition, what: str, alive=lambda: True):
-    """Poll until `condition()`; its value."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        if value := condition():
-            return value
-        assert alive(), f"ended before: {what}"
-        time.sleep(0.1)
-    pytest.fail(f"not within {PATIENCE} s: {what}")
-    return None
 
 
 def answers(port: int) -> bool:
@@ -212,8 +199,7 @@ def test_parallel_reports_a_member_that_fails(ensemble):
 def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
     """A signal while members run; then the same command ends well."""
     running = ensemble(*arguments, *LONG, start=True)
-    wait_for(lambda: len(list(folder.glob("*.part"))) == 2, "two members run")
-    time.sleep(0.5)
+    wait_for(lambda: sum(frames_in(path) > 0 for path in folder.glob("*.part")) == 2)
     running.send_signal(by)
     _, errors = running.communicate(timeout=PATIENCE)
     assert running.returncode == 75, errors
@@ -227,12 +213,6 @@ def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
 def test_a_closed_terminal_stops_like_term(ensemble, tmp_path):
     arguments = ("-j", 2, "--seeds", "1-2")
     stops_and_goes_on(ensemble, tmp_path / "members", *arguments, by=signal.SIGHUP)
-
-
-def test_parallel_passes_term_on_and_goes_on(ensemble, tmp_path):
-    need("parallel")
-    arguments = ("--engine", "parallel", "-j", 2, "--seeds", "1-2")
-    stops_and_goes_on(ensemble, tmp_path / "members", *arguments)
 
 
 def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
@@ -307,7 +287,7 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
         )
         yield slurm
         slurm("scancel", "--quiet", "--user", getpass.getuser())
-        wait_for(lambda: not slurm("squeue", "--noheader").strip(), "the queue is empty")
+        wait_for(lambda: not slurm("squeue", "--noheader").strip())
 
 
 def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
@@ -316,8 +296,8 @@ def test_slurm_runs_all_members(ensemble, cluster, tmp_path):
     first = ensemble(*arguments, **settings)
     assert first.returncode == 75 and "submitted" in first.stderr, first.stderr
     folder = tmp_path / "members"
-    wait_for(lambda: len(list(folder.glob("seed_*.h5"))) == 4, "four members finish")
-    wait_for(lambda: not cluster("squeue", "--noheader").strip(), "the queue is empty")
+    wait_for(lambda: len(list(folder.glob("seed_*.h5"))) == 4)
+    wait_for(lambda: not cluster("squeue", "--noheader").strip())
     last = ensemble(*arguments, **settings)
     assert last.returncode == 0 and "4 of 4 members finished" in last.stderr
 
@@ -327,36 +307,28 @@ def test_slurm_is_not_given_the_same_work_twice_and_keeps_the_limit(ensemble, cl
     settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
     ensemble(*arguments, **settings)
     folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
+    wait_for(lambda: list(folder.glob("*.part")))
     again = ensemble(*arguments, **settings)
     assert again.returncode == 75 and "goes on: 0 of 2 members finished" in again.stderr
     assert len(list(folder.glob("*.part"))) == 1  # %1, though there are two processors
     assert len(cluster("squeue", "--noheader", "--array").splitlines()) == 2
 
 
-def test_a_member_that_slurm_puts_back_goes_on(ensemble, cluster, tmp_path):
-    """Slurm starts such a job again when `cred_expire` seconds are over."""
+@pytest.mark.parametrize(
+    "how",
+    [
+        ("scontrol", "requeue"),  # Slurm starts it again when `cred_expire` seconds are over
+        ("scancel", "--batch", "--signal=TERM"),  # as --signal=B:TERM@60 does when time is over
+    ],
+)
+def test_a_member_that_is_put_back_goes_on(ensemble, cluster, tmp_path, how):
     arguments = ("--engine", "slurm", "-j", 1, "--seeds", "1-1", *LONG)
     settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
     ensemble(*arguments, **settings)
     folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
+    wait_for(lambda: list(folder.glob("*.part")))
     job = (folder / "slurm.job").read_text().strip()
-    cluster("scontrol", "requeue", f"{job}_1")
-    wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text(), "a checkpoint")
+    cluster(*how, f"{job}_1")
+    wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text())
     assert not list(folder.glob("seed_?.h5"))
-    wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")
-
-
-def test_a_member_whose_time_in_slurm_is_over_is_put_back(ensemble, cluster, tmp_path):
-    arguments = ("--engine", "slurm", "-j", 1, "--seeds", "1-1", *LONG)
-    settings = {"SLURM_CONF": str(tmp_path / "slurm" / "slurm.conf")}
-    ensemble(*arguments, **settings)
-    folder = tmp_path / "members"
-    wait_for(lambda: list(folder.glob("*.part")), "a member runs")
-    job = (folder / "slurm.job").read_text().strip()
-    cluster("scancel", "--batch", "--signal=TERM", f"{job}_1")  # as --signal=B:TERM@60 does
-    wait_for(lambda: "stopped" in (folder / "seed_1.log").read_text(), "a checkpoint")
-    state = ("squeue", "--noheader", "--format=%T")
-    wait_for(lambda: cluster(*state).strip() == "PENDING", "the job waits again")
-    wait_for(lambda: list(folder.glob("seed_1.h5")), "the member goes on and ends")
+    wait_for(lambda: list(folder.glob("seed_1.h5")))
