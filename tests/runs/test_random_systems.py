@@ -2,12 +2,13 @@
 
 Each runs plainly; on several threads; with another search and queue; in parts, that end by the
 clock, by TERM and by kill -9, each resumed in another way; to an earlier end, from which it is
-continued; and with other samples. All must end alike: with the same exit code, the same message
-and the same bytes; and what the plain run has written obeys `run_laws`.
+continued; with other samples; and in other units. All must end alike: with the same exit code, the
+same message and the same bytes; and what the plain run has written obeys `run_laws`.
 
 `SYSTEMS=200 SEED=20270131` takes other systems and more of them, as `make check` does each day.
 """
 
+import functools
 import itertools
 import json
 import os
@@ -23,7 +24,7 @@ import h5py
 import numpy as np
 import pytest
 
-from random_systems import CADENCES, System, random_system
+from random_systems import CADENCES, System, numbers, random_system
 from run_laws import laws_broken
 from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED, contents, unlike, within
 
@@ -55,13 +56,13 @@ class Case:
         self.program, self.folder, self.rng = program, folder, random.Random(seed)
         self.system = accepted(program, folder, self.rng)
 
-    def begin(self, name: str, *options: str) -> subprocess.Popen:
-        command = [*within(SECONDS), f"--as={BYTES}", self.program, "case.nml", "-o", f"{name}.h5"]
+    def begin(self, name: str, *options: str, text: str = "case.nml") -> subprocess.Popen:
+        command = [*within(SECONDS), f"--as={BYTES}", self.program, text, "-o", f"{name}.h5"]
         pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
         return subprocess.Popen([*command, "--quiet", *options], cwd=self.folder, **pipes)
 
-    def whole(self, name: str, *options: str) -> End:
-        return end_of(self.begin(name, *options))
+    def whole(self, name: str, *options: str, **more: str) -> End:
+        return end_of(self.begin(name, *options, **more))
 
     def result(self, name: str) -> Path:
         """What a run left: its finished file, or that of one that broke off."""
@@ -117,6 +118,59 @@ class Case:
             words.append(f"{track}_events={self.system.events // self.rng.randint(3, 20) + 1}")
         return self.whole(name, *self.way(), *(f"--set=output.{word}" for word in words))
 
+    def in_other_units(self, name: str, _seconds: float) -> End:
+        """Lengths, velocities and masses times powers of two, which change no digit."""
+        length, speed, mass = (2.0 ** self.rng.randint(-30, 30) for _ in range(3))
+        self.units = {"length": length, "velocity": speed, "mass": mass, "s": 1}
+        self.units |= {"time": length / speed, "energy": mass * speed**2}
+        lines = self.system.text.replace("start.txt", "other.txt").splitlines()
+        table = table_of(self.program)
+        lines = [rescaled(line, self.units, table) for line in lines]
+        (self.folder / "other.nml").write_text("\n".join(lines) + "\n")
+        names, *rows = self.system.start.splitlines() or [""]
+        factors = [eval(COLUMNS[column], {}, self.units) for column in names.split()]
+        rows = [[float(word) for word in row.split(", ")] for row in rows]
+        rows = [numbers(*(a * b for a, b in zip(row, factors, strict=True))) for row in rows]
+        (self.folder / "other.txt").write_text("\n".join([names, *rows]) + "\n")
+        return self.whole(name, *self.way(), text="other.nml")
+
+
+#: Units of what a frame and the observables have, and of columns of starting files.
+UNITS = {
+    "/particles/disks/position/value": "length",
+    "/particles/disks/position/time": "time",
+    "/particles/disks/velocity/value": "velocity",
+    "/particles/disks/angular_velocity/value": "1 / time",
+    "/particles/disks/orientation/value": "1",
+    "/particles/disks/collisions/value": "1",
+    "/observables/total_energy/value": "energy",
+    "/observables/dissipated_energy/value": "energy",
+    "/observables/momentum/value": "mass * velocity",
+}
+COLUMNS = {"x": "length", "y": "length", "vx": "velocity", "vy": "velocity", "radius": "length"}
+COLUMNS |= {"mass": "mass", "omega": "1 / time", "angle": "1"}
+
+
+@functools.cache
+def table_of(program: Path) -> dict:
+    """The program's own table of variables."""
+    done = subprocess.run([program, "--print-variables"], capture_output=True, check=True)
+    return json.loads(done.stdout)
+
+
+def rescaled(line: str, units: dict, table: dict) -> str:
+    """A group of the input in other units; sizes that are relative to others have none."""
+    group = re.match(r"&?(\w*)", line)[1]
+
+    def value(match: re.Match) -> str:
+        unit = table[group].get(match[1], {}).get("unit")
+        if not unit or ("relative_to" in line and match[1] in ("radius", "mass")):
+            return match[0]
+        factor = eval(unit, {}, units)
+        return f"{match[1]} = {numbers(*(factor * float(word) for word in match[2].split(',')))}"
+
+    return re.sub(r"(\w+) = (-?\d[-+.\de]*(?:, -?\d[-+.\de]*)*)", value, line)
+
 
 def end_of(process: subprocess.Popen) -> End:
     """How a process ends."""
@@ -162,7 +216,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
     said = [f"breaks a law: {law}" for law in laws_broken(found)]
     ways = [case.on_threads, case.another_way, case.in_parts, case.with_other_samples]
     if plain.code == FINISHED:
-        ways.append(case.continued)
+        ways += [case.continued, case.in_other_units]
     for way in ways:
         name = way.__name__
         end = way(name, seconds)
@@ -172,6 +226,10 @@ def faults(program: Path, folder: Path, seed: str) -> str:
         own, other = found, contents(case.result(name))
         if way == case.with_other_samples:
             own, other = last_samples(own), last_samples(other)
+        elif way == case.in_other_units:
+            scales = {path: eval(unit, {}, case.units) for path, unit in UNITS.items()}
+            own = {path: own[path] * scale for path, scale in scales.items() if path in own}
+            other = {path: other[path] for path in own}
         different = [name for name in unlike(own, other) if not ASIDE.match(name)]
         if different:
             said.append(f"differs: {name}, {len(different)} {different[:6]}")
@@ -204,8 +262,7 @@ APART = [
 
 def test_the_systems_draw_every_variable(program, tmp_path):
     """If chance leaves one out, another SEED has it."""
-    done = subprocess.run([program, "--print-variables"], capture_output=True, check=True)
-    table = json.loads(done.stdout)
+    table = table_of(program)
     known = {f"{group}.{name}" for group in table for name in table[group]}
     rngs = (random.Random(seed) for seed in SEEDS)
     drawn = set().union(*(accepted(program, tmp_path, rng).features() for rng in rngs))
@@ -228,7 +285,9 @@ def test_many_systems_draw_every_pair_of_features_that_goes_together():
     assert never == apart
 
 
-@pytest.mark.parametrize("when", ["queue=heap", "resume", "threads=2", "output.frames"])
+@pytest.mark.parametrize(
+    "when", ["queue=heap", "resume", "threads=2", "output.frames", "other.nml"]
+)
 def test_a_program_whose_result_depends_on_the_way_is_found_out(program, tmp_path, when):
     liar = tmp_path / "liar"
     liar.write_text(

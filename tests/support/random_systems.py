@@ -262,7 +262,8 @@ class Draw:
         x = [self.place((k + 0.5) / count, self.rng.choice([0.5, 0.52])) for k in range(count)]
         radius = 0.5 * min(self.edges[0] / count, 0.9 * self.edges[1])
         radius *= self.rng.choice([0.99, 0.5, 0.1])
-        words = f"radius = {radius!r} position = {numbers(*np.ravel(x))}{self.motion(count)}"
+        words = f"radius = {radius!r} mass = {10.0 ** self.rng.randint(-4, 4)!r}"
+        words += f" position = {numbers(*np.ravel(x))}{self.motion(count)}"
         return f"&species name = 's0' {words} /"
 
     def from_file(self) -> str:
