@@ -20,7 +20,7 @@ while read -r packing interval placement; do
     --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" \
     --set species.disks.count=256 --set stop.collisions_per_disk=8000 \
     --set "output.frames_every_time=$interval" --set output.precision=single \
-    --set output.event_log=true --set output.virial_tensor=true "$@"
+    --set output.event_log=true "$@"
   transport+=("$data/transport_$packing"/*.h5)
 done <<'TABLE'
 0.05 0.13 random

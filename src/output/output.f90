@@ -191,7 +191,7 @@ contains
       self%track(values)%planned = self%progress%observables%planned(rule%limits)
       if (.not. settings%event_log) return
       self%track(events)%counter = event_counter
-      self%track(events)%series = event_series(input%settings%with%stress)
+      self%track(events)%series = event_series()
     end associate
   end subroutine plan
 

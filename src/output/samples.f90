@@ -135,13 +135,12 @@ contains
   end function observable_sample
 
   !> The series of the event log; its records come from the log.
-  pure function event_series(detailed) result(series)
-    logical, intent(in) :: detailed               !! with the change of momentum
-    type(series_t), allocatable :: series(:)
+  pure function event_series() result(series)
+    type(series_t) :: series(5)
 
     series = [series_t(events_group//"time", double_precision), series_t(events_group//"i", short_integer), &
-      series_t(events_group//"j", short_integer), series_t(events_group//"impulse", double_precision)]
-    if (detailed) series = [series, series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
+      series_t(events_group//"j", short_integer), series_t(events_group//"impulse", double_precision), &
+      series_t(events_group//"momentum_change", double_precision, 1, [2, 1])]
   end function event_series
 
   !> Fails if a count of a simulation is too large for samples, which hold it as a real.
