@@ -3,11 +3,10 @@
 python docs/input_page.py build/ricochet > docs/input.md
 """
 
+import json
+import subprocess
 import sys
 from pathlib import Path
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "post" / "ricochet"))
-from variables import explained
 
 LAW = "the law of a wall"
 GROUPS = {
@@ -41,27 +40,54 @@ mass. What has no default has an example instead: *e.g.*
 """
 
 
-def row(entry: dict) -> str:
+def said(program: Path, *words: str) -> str:
+    """What the program answers to an option."""
+    return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
+
+
+def variables(program: Path) -> dict[str, dict[str, dict]]:
+    """Group of `GROUPS` -> variable -> all about it, numbers as the program writes them.
+
+    What all kinds of walls share stands there once.
+    """
+    table = json.loads(said(program, "--print-variables"), parse_float=str, parse_int=str)
+    walls = [table[group] for group in ("side", "obstacle", "wall")]
+    law = {
+        name: entry
+        for name, entry in walls[0].items()
+        if all(wall.get(name) == entry for wall in walls)
+    }
+    for wall in walls:
+        for name in law:
+            del wall[name]
+    return {group: law if group == LAW else table[group] for group in GROUPS}
+
+
+def written(entry: dict) -> str:
+    """The default of a variable, or its example, as an input file has it."""
+    value = entry["example"] if entry["default"] is None else entry["default"]
+    words = value if isinstance(value, list) else [value]
+    words = [str(word).lower() if isinstance(word, bool) else word for word in words]
+    how = {"text": "'{}'", "logical": ".{}."}.get(entry["type"], "{}")
+    return ", ".join(how.format(word.replace("'", "''")) for word in words)
+
+
+def row(name: str, entry: dict) -> str:
     """A line of the table."""
-    value = f"`{entry['value']}`" if entry["kind"] == "default" else f"e.g. `{entry['value']}`"
-    name = entry["name"].split(".")[-1]
+    value = "e.g. " * (entry["default"] is None) + f"`{written(entry)}`"
     meaning = entry["help"] + (f" [{entry['unit']}]" if entry["unit"] else "")
     cells = (f"`{name}`", meaning, entry["allowed"], value)
     return "| " + " | ".join(cell.replace("|", "\\|").replace("**", "^") for cell in cells) + " |"
 
 
 def page(program: Path) -> str:
-    """The whole page. What all kinds of walls share stands there once."""
-    rows = {group: list(map(row, explained(program, group))) for group in GROUPS if group != LAW}
-    walls = "side", "obstacle", "wall"
-    rows[LAW] = [entry for entry in rows["side"] if all(entry in rows[group] for group in walls)]
-    for group in walls:
-        rows[group] = [entry for entry in rows[group] if entry not in rows[LAW]]
+    """The whole page."""
     lines = [HEAD]
-    for group, words in GROUPS.items():
-        lines += [f"## {group.capitalize() if group == LAW else '&' + group}", "", words, ""]
+    for group, entries in variables(program).items():
+        title = group.capitalize() if group == LAW else f"&{group}"
+        lines += [f"## {title}", "", GROUPS[group], ""]
         lines += ["| variable | meaning [unit] | allowed | default |", "|---|---|---|---|"]
-        lines += [*rows[group], ""]
+        lines += [*(row(*one) for one in entries.items()), ""]
     return "\n".join(lines)
 
 

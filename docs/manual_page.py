@@ -10,8 +10,7 @@ import sys
 from pathlib import Path
 from textwrap import dedent
 
-from input_page import GROUPS
-from variables import explained, said
+from input_page import GROUPS, LAW, said, variables, written
 
 #: What a paragraph of --help is about, by the word before the colon at its beginning.
 SECTIONS = {
@@ -41,7 +40,7 @@ They need the packages in requirements.txt there.
 README.md, which leads to all pages.
 .TP
 .I OUT.h5
-Results, in the format H5MD. Until the run has finished: OUT.h5.part, and the checkpoint OUT.chk.h5.
+Results, in the format H5MD. Until the run has finished: OUT.h5.part.
 .SH SEE ALSO
 .BR ricochet (1),
 .BR ricochet\\-ensemble (1),
@@ -65,7 +64,7 @@ def section(paragraph: str) -> list[str]:
     return [f".SH {heading}", ".nf", roff(dedent(paragraph).strip("\n")), ".fi"]
 
 
-def variables(program: Path) -> list[str]:
+def inputs(program: Path) -> list[str]:
     """The groups of the input and their variables."""
     lines = [
         ".SH INPUT",
@@ -73,14 +72,16 @@ def variables(program: Path) -> list[str]:
         ".B &name ... /",
         "with lines variable = value; only what differs from the default is needed.",
     ]
-    for group, words in GROUPS.items():
-        purpose = re.sub(LINK, r"PREFIX/share/doc/ricochet/docs/\1", words)
-        lines += [f'.SS "&{group}"', roff(purpose)]
-        for entry in explained(program, group):
+    for group, entries in variables(program).items():
+        purpose = re.sub(LINK, r"PREFIX/share/doc/ricochet/docs/\1", GROUPS[group])
+        title, prefix = (LAW, "") if group == LAW else (f"&{group}", f"{group}.")
+        lines += [f'.SS "{title}"', roff(purpose)]
+        for name, entry in entries.items():
             unit = f" [{entry['unit']}]" if entry["unit"] else ""
+            kind = "example" if entry["default"] is None else "default"
             meaning = f"{entry['help'].rstrip('.')}{unit}. Allowed: {entry['allowed']};"
-            meaning += f" {entry['kind']}: {entry['value']}."
-            lines += [".TP", f".B {roff(entry['name'])}", roff(meaning)]
+            meaning += f" {kind}: {written(entry)}."
+            lines += [".TP", f".B {roff(prefix + name)}", roff(meaning)]
     return lines
 
 
@@ -98,7 +99,7 @@ def page(command: Path, prefix: str) -> str:
     for paragraph in paragraphs:
         lines += section(re.sub(r"(?<!\S)input/", "PREFIX/share/ricochet/input/", paragraph))
     if command == program:
-        lines += variables(program)
+        lines += inputs(program)
     text = "\n".join(lines) + "\n"
     return text.replace("PREFIX/", f"{roff(prefix)}/") + FILES.format(prefix=roff(prefix))
 

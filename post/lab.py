@@ -14,12 +14,7 @@ import tempfile
 import threading
 import time
 import webbrowser
-from argparse import (
-    ArgumentTypeError,
-    BooleanOptionalAction,
-    Namespace,
-    RawDescriptionHelpFormatter,
-)
+from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace, RawTextHelpFormatter
 from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote
@@ -27,10 +22,8 @@ from urllib.parse import unquote
 from player import LIVE_ROOM, chosen_film, enclosed, filled, page, policy, text_of, texts
 from ricochet import Run, RunError
 from ricochet.drawing import disk_collection, draw_box, species_colours
-from ricochet.experiment import Refused
-from ricochet.laboratory import Laboratory
+from ricochet.lab import Lab, Refused, edited
 from ricochet.live import HTML, JSON, LOOK, NOT_FOUND, Handler, serving
-from ricochet.namelists import edited
 from ricochet.script import Parser, launch
 
 from matplotlib.figure import Figure
@@ -44,7 +37,7 @@ class Answers(Handler):
     """Answers the requests of the laboratory's pages."""
 
     frames = "'self'"
-    lab: Laboratory
+    lab: Lab
 
     def found(self, path: str, query: str) -> tuple[int, str, bytes]:
         try:
@@ -73,8 +66,7 @@ class Answers(Handler):
                 return 200, JSON, self.lab.film(number, run, query.removeprefix("known="))
             case [number, run, "input"]:
                 own = self.lab.run(number, run)
-                text = edited(own.text, own.settings, self.lab.table)
-                return 200, "application/octet-stream", text.encode()
+                return 200, "application/octet-stream", edited(own.input, own.settings)
             case [number, run, "output"]:
                 path = self.lab.run(number, run).opened().path
                 return 200, "application/octet-stream", path.read_bytes()
@@ -82,8 +74,8 @@ class Answers(Handler):
 
     def do_POST(self) -> None:
         """A wish of a page of this very server; pages of others are refused."""
-        actions = {"/check": self.lab.check, "/start": self.lab.start, "/stop": self.lab.stop}
-        actions["/leave"] = lambda wish: self.lab.leave(wish.get("page")) or {}
+        names = ("check", "start", "stop", "leave")
+        actions = {f"/{name}": getattr(self.lab, name) for name in names}
         host, length = self.headers.get_all("Host"), self.headers.get("Content-Length", "")
         if host not in ([own] for own in self.hosts) or self.headers.get_all("Origin") != [
             f"http://{host[0]}"
@@ -105,7 +97,7 @@ class Answers(Handler):
         return self.reply(200, JSON, body)
 
 
-def lab_page(lab: Laboratory) -> str:
+def lab_page(lab: Lab) -> str:
     """The page, with a number of its own."""
     style = text_of("style.css") + text_of("lab.css")
     script = text_of("lab.js")
@@ -115,25 +107,19 @@ def lab_page(lab: Laboratory) -> str:
     return filled("lab.html", fillings | {"data": enclosed(data)})
 
 
-def picture(lab: Laboratory, name: str) -> bytes:
-    """The last frame of an input, as PNG."""
+def picture(lab: Lab, name: str) -> bytes:
+    """The last frame of an input in a square, as PNG."""
     with drawing:  # one at a time: a form must not wait long
         run = lab.sample(name) if name in lab.inputs else None
         if run is None:
             raise Refused("there is no picture")
-        return drawn(run)
-
-
-def drawn(run: Run) -> bytes:
-    """The last frame in a square."""
-    figure = Figure(figsize=(1.6, 1.6), layout="none")
-    axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
-    draw_box(axes, run)
-    axes.set_axis_off()
-    disk_collection(axes, run, run.position[-1], facecolors=species_colours(run))
-    file = io.BytesIO()
-    figure.savefig(file, format="png")
-    return file.getvalue()
+        figure, file = Figure(figsize=(1.6, 1.6), layout="none"), io.BytesIO()
+        axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
+        draw_box(axes, run)
+        axes.set_axis_off()
+        disk_collection(axes, run, run.position[-1], facecolors=species_colours(run))
+        figure.savefig(file, format="png")
+        return file.getvalue()
 
 
 def filmed(run: Run) -> dict:
@@ -151,7 +137,7 @@ def port(text: str) -> int:
 
 def options() -> Namespace:
     """The command line."""
-    raw = RawDescriptionHelpFormatter
+    raw = RawTextHelpFormatter
     parser = Parser(description=__doc__, formatter_class=raw, allow_abbrev=False)
     parser.add_argument("inputs", nargs="*", type=Path, metavar="INPUT.nml", help="more inputs")
     parser.add_argument(
@@ -173,7 +159,7 @@ def input_files(own: list[Path]) -> list[Path]:
 def main() -> None:
     args = options()
     with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
-        lab = Laboratory(input_files(args.inputs), Path(folder), filmed)
+        lab = Lab(input_files(args.inputs), Path(folder), filmed)
         try:
             with (
                 suppress(KeyboardInterrupt),

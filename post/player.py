@@ -28,13 +28,14 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from ricochet import Run, RunError, read_run
+from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
 from ricochet.files import destination
 from ricochet.live import serve
 from ricochet.paths import MOST_AT_ONCE, Paths
 from ricochet.reader import span
 from ricochet.script import chosen_disks, command_line, film_frames, launch, report
+from ricochet.thermodynamics import SIDES, has_log
 
 import numpy as np
 from matplotlib.colors import to_hex
@@ -47,10 +48,11 @@ LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
 TURN = (20 + 8 / 2) * 4 / 3  # bytes of a collision of a disk between two frames, and half its time
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
-FEW_DISKS = 20  # up to here every digit is in the page, which predicts collisions
+FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
 BINS = 40  # of the speed histogram
 FEWEST = 10  # disks of a species that has a histogram, samples of a plot
 MOST_SAMPLES = 500  # of a plot
+MOST_EVENTS = 20000  # to come
 RESTING = 0.02  # of the disks at rest at the end: no gas
 DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 
@@ -74,37 +76,27 @@ def quantities(run: Run) -> list[str]:
     return ["speed", "displacement"] + ["collisions"] * (run.collisions is not None)
 
 
-def coded_positions(run: Run, frames: list[int]) -> np.ndarray:
-    """(T, N, 2) positions in units of the box: 16-bit integers, of few disks every digit."""
+def moving(run: Run, frames: list[int], before: int, tops: dict) -> dict[str, np.ndarray]:
+    """(T, N, ...) what differs from frame to frame; `before` is the frame before them.
+
+    Positions in units of the box, as 16-bit integers, of few disks with every digit; colours as
+    places 0 to 255 on their scales; periods crossed along x and y since the frame before, four bits
+    each; angles.
+    """
     inside = (run.position[frames] - run.lower) / run.edges
-    if run.count <= FEW_DISKS:
-        return inside.astype("<f8")
-    return np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
-
-
-def coded(values: np.ndarray, top: float, log: bool) -> np.ndarray:
-    """Values from 0 to `top` as places 0 to 255 on the colour scale; log: of 1 + value."""
-    if log:
-        values, top = np.log1p(values), np.log1p(top)
-    return np.round(255 * np.clip(values / top, 0, 1)).astype(np.uint8)
-
-
-def coded_shifts(run: Run, frames: list[int], before: int) -> np.ndarray:
-    """(T, N) periods crossed along x and y since the frame before, four bits each."""
-    crossed = np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8
-    return (16 * crossed[..., 0] + crossed[..., 1]).astype(np.uint8)
-
-
-def coded_origins(run: Run, first: int) -> np.ndarray:
-    """(N, 2) where displacements count from, without jumps until the first frame of the film."""
-    shift = run.position[first] - run.unwrapped(first)
-    return ((run.unwrapped(0) + shift - run.lower) / run.edges).astype("<f4")
-
-
-def coded_headings(velocity: np.ndarray) -> bytes:
-    """Directions of velocities (n, 2), a full turn in 256 parts."""
-    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
-    return (np.round(256 * angle / (2 * np.pi)) % 256).astype(np.uint8).tobytes()
+    if run.count > FEW_DISKS:
+        inside = np.round(65535 * np.clip(inside, 0, 1))
+    found = {"positions": inside.astype("<u2" if run.count > FEW_DISKS else "<f8")}
+    for name, top in tops.items():
+        scale = np.log1p if name == "collisions" else np.asarray
+        share = scale(values_of(run, frames, name)) / scale(top)
+        found[name] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
+    if run.image is not None:
+        x, y = np.moveaxis(np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8, -1, 0)
+        found["shifts"] = (16 * x + y).astype("u1")
+    if "orientation" in run.elements:
+        found["angles"] = run.orientation[frames].astype("<f4")
+    return found
 
 
 def coded_turns(
@@ -130,8 +122,9 @@ def coded_turns(
         blocks["gains"] += turns.gain.astype(kind).tobytes()
         blocks["guessed"] += np.packbits(turns.guessed, bitorder="little").tobytes()
         guesses.append(int(turns.guessed.sum()))
-        if guesses[-1]:
-            blocks["headings"] += coded_headings(run.velocity[frames[k]][turns.guessed])
+        if guesses[-1]:  # directions, a full turn in 256 parts
+            angle = np.arctan2(*run.velocity[frames[k]][turns.guessed].T[::-1])
+            blocks["headings"] += (np.round(128 * angle / np.pi) % 256).astype("u1").tobytes()
     return blocks, guesses
 
 
@@ -152,6 +145,20 @@ def counted(run: Run, paths: Paths, frames: list[int], most: float) -> tuple[dic
     hits = None if run.collisions is None else [float(run.collisions[f].mean()) for f in frames]
     walled = bool(not run.periodic.all() or run.obstacles or len(run.walls))
     return {"collisions": hits, "with": "all" if walled else "disks"}, np.zeros(0)
+
+
+def events_of(run: Run, paths: Paths, frames: list[int]) -> dict:
+    """The log of few disks, and what its partners below 0 are called."""
+    sides = [f"the {side} side" for side in SIDES]
+    obstacles = [f"obstacle {k + 1}" for k in range(len(run.obstacles))]
+    surfaces = sides + obstacles + [f"wall {k + 1}" for k in range(len(run.walls))]
+    if paths.log is None or run.count > FEW_DISKS:
+        return {"events": None}
+    time, i, j = paths.log[:3]
+    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
+    some = slice(some.start, min(some.stop, some.start + MOST_EVENTS))
+    parts = {"time": time[some], "i": i[some] - 1, "j": j[some] - 1}
+    return {"events": {name: own.tolist() for name, own in parts.items()}, "surfaces": surfaces}
 
 
 def scale_top(run: Run, frames: list[int], name: str) -> float:
@@ -183,16 +190,6 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
     if len(radii) > MOST_RADII:
         radii = np.geomspace(radii[0], radii[-1], MOST_RADII)
     return radii, np.searchsorted((radii[1:] + radii[:-1]) / 2, run.radius)
-
-
-def mean_energies(run: Run, frames: list[int]) -> tuple[list[list[float]], list[list[float]]]:
-    """Kinetic and potential energy per disk of each species, frame by frame."""
-    kinetic = run.kinetic_energy(frames)
-    potential = -run.mass * (run.unwrapped(frames) @ run.gravity)
-    means = (
-        [e[:, kind.disks].mean(axis=1) for kind in run.by_species] for e in (kinetic, potential)
-    )
-    return tuple([list(map(significant, row)) for row in np.transpose(m)] for m in means)
 
 
 def pressure(run: Run) -> dict | None:
@@ -262,33 +259,26 @@ def film(
     """
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
     bins = speed_bins(run, frames, 1.3 * tops["speed"])
-    blocks = {name: bytearray() for name in ("positions", *tops)}
-    before = frames[0]
-    angles = blocks.setdefault("angles", bytearray()) if "orientation" in run.elements else None
-    shifts = blocks.setdefault("shifts", bytearray()) if run.image is not None else None
-    kinetic, potential, counts = [], [], []
-    at_once = max(1, MOST_AT_ONCE // run.count)
+    parts, kinetic, potential, counts = [], [], [], []
+    before, at_once = frames[0], max(1, MOST_AT_ONCE // run.count)
     for some in watched([frames[k : k + at_once] for k in range(0, len(frames), at_once)]):
-        blocks["positions"] += coded_positions(run, some).tobytes()
-        for name, top in tops.items():
-            values = values_of(run, some, name)
-            blocks[name] += coded(values, top, name == "collisions").tobytes()
-        if shifts is not None:
-            shifts += coded_shifts(run, some, before).tobytes()
-            before = some[-1]
-        if angles is not None:
-            angles += run.orientation[some].astype("<f4").tobytes()
-        means = mean_energies(run, some)
-        kinetic += means[0]
-        potential += means[1]
+        parts.append(moving(run, some, before, tops))
+        before = some[-1]
+        heights = run.unwrapped(some) @ run.gravity
+        for means, energy in (kinetic, run.kinetic_energy(some)), (potential, -run.mass * heights):
+            each = [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
+            means += [list(map(significant, row)) for row in np.transpose(each)]
         counts += speed_counts(run, some, bins)
+    blocks = {name: b"".join(part[name].tobytes() for part in parts) for name in parts[0]}
     most = 0.4 * room // TURN  # the rest of its half is for headings
     paths = Paths(run, most)
     turns, guesses = coded_turns(run, paths, frames)
     counts_of, moments = counted(run, paths, frames, most / 2)
     blocks |= turns | {"moments": moments.astype("<f8").tobytes()}
     blocks["mass"] = run.mass.astype("<f4").tobytes()
-    blocks["origins"] = coded_origins(run, frames[0]).tobytes()
+    # Where displacements count from, without jumps until the first frame of the film.
+    origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
+    blocks["origins"] = ((origin - run.lower) / run.edges).astype("<f4").tobytes()
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
     radii, own = radii_of(run)
     blocks["sizes"] = own.astype("u1").tobytes()
@@ -318,7 +308,8 @@ def film(
         "scales": {name: [LABELS[name], significant(top)] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
-        "logged": bool(run.parameter("output", "event_log", False)),
+        "logged": has_log(run),
+        **events_of(run, paths, frames),
     }
     return facts, blocks
 
@@ -388,7 +379,7 @@ def main() -> None:
     parser.add_argument("--live", action="store_true", help="show the run while it goes on")
     parser.add_argument("--open", action="store_true", help="open the film in the browser")
     args = parser.parse_args()
-    run = read_run(args.run)
+    (run,) = args.runs
     if args.colour == "psi6":
         raise RunError("--colour psi6 is for snapshot.py and animate.py")
     if args.live:
@@ -410,7 +401,7 @@ def main() -> None:
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
     rows = [{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]
-    report(args, [run], "Player", None, rows)
+    report(args, None, rows)
     if args.open:
         webbrowser.open(path.resolve().as_uri())
 

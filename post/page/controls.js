@@ -25,8 +25,7 @@ function usualPace() {
 function prepareFilm() {
   sums = crossings = null;
   counted = kinds.map((_, s) => s).filter(s => film.speeds.counts[0][s].length);
-  coming.shown = film.exact && !film.kicked;
-  $('coming').hidden = !coming.shown;
+  $('coming').hidden = !film.events;
   $('speeds').hidden = !counted.length;
   $('pressures').hidden = !film.pressure;
   $('now').parentElement.hidden = film.speeds.rest;
@@ -51,7 +50,6 @@ let told = 0;  // when words and plots were renewed
 
 function show(time, anew = false) {
   move(time);
-  updateQueue();
   drawStage();
   if (state.playing && !anew && performance.now() - told < 80) return;  // they may come later than disks
   told = performance.now();

@@ -4,6 +4,13 @@
 
 const $ = id => document.getElementById(id);
 const lab = JSON.parse($('data').textContent);  // page: its number; table: group -> variable; inputs: names
+// Of each variable its default or an example as --set has it, what it may be, and from where to where.
+for (const variable of Object.values(lab.table).flatMap(Object.values)) {
+  const { type, choices, above, from, below, to } = variable, value = variable.default ?? variable.example;
+  const words = [value].flat().map(one => type === 'logical' ? `.${one}.` : String(one));
+  Object.assign(variable, { value: words.join(','), low: above ?? from, high: below ?? to, open: above !== null });
+  variable.choices = type === 'logical' ? ['.true.', '.false.'] : choices;
+}
 const state = {
   input: '', groups: [],       // the input file: kind, place, given values of each group
   settings: {}, added: [],     // what the form changes: variable -> text; groups that are not in the file: [kind, name]
@@ -63,7 +70,7 @@ function buildForm() {
   const names = order.filter(isNamed).flatMap(kind => {
     const { choices } = lab.table[kind].name, taken = new Set(all.map(({ place }) => place));
     const free = k => taken.has(`${kind}.${kind}${k}`) ? free(k + 1) : `${kind}${k}`;
-    return (choices.length ? choices : [free(1)]).filter(name => !taken.has(`${kind}.${name}`)).map(name => [kind, name]);
+    return (choices ?? [free(1)]).filter(name => !taken.has(`${kind}.${name}`)).map(name => [kind, name]);
   });
   const option = pair => make('option', { value: pair.join(' '), textContent: '&' + pair.join(' ') });
   $('add').replaceChildren(make('option', { value: '', textContent: 'choose …' }), ...names.map(option));
@@ -71,7 +78,7 @@ function buildForm() {
 
 // Open is where more is given than texts.
 function isOpen({ kind, place, added }) {
-  return added || Object.entries(lab.table[kind]).some(([name, { type }]) => type !== 'text' && valueOf(place, name));
+  return added || Object.entries(lab.table[kind]).some(([name, { type, choices }]) => (type !== 'text' || choices) && valueOf(place, name));
 }
 
 function buildGroup({ kind, place, added }) {
@@ -94,7 +101,7 @@ function buildGroup({ kind, place, added }) {
 function addGroup(kind, name) {
   state.added.push([kind, name]);
   for (const [own, { needed, value }] of Object.entries(lab.table[kind]))
-    if (needed && own !== 'name') state.settings[`${kind}.${name}.${own}`] = value.replaceAll(/,\s+/g, ',').replaceAll("'", '');
+    if (needed && own !== 'name') state.settings[`${kind}.${name}.${own}`] = value;
   buildForm();
   $('groups').querySelector(`[data-place="${kind}.${name}.${Object.keys(lab.table[kind])[1]}"]`)?.scrollIntoView({ block: 'center' });
   changed();
@@ -110,8 +117,8 @@ function removeGroup(place) {
 // A row: name and unit, controls, help, and what the program says against the value.
 function buildVariable(place, variable, name) {
   const key = `${place}.${name}`, given = givenIn(place)[name] ?? '', value = valueOf(place, name);
-  const wanted = variable.value.replaceAll("'", '').split(/,\s*/), parts = split(value, variable);
-  const count = variable.size || (parts.length === 2 ? 2 : 1), few = variable.type === 'choice' || count <= 2;
+  const wanted = split(variable.value, variable), parts = split(value, variable);
+  const count = variable.size || (parts.length === 2 ? 2 : 1), few = variable.choices || count <= 2;
   const controls = few ? Array.from({ length: count }, (_, k) => control(variable, parts[k] ?? '', wanted[k] ?? '')) : [control({ type: 'text' }, value, variable.value)];
   const row = make('div', { className: 'variable' }), reset = make('button', { type: 'button', className: 'reset', textContent: 'reset', title: 'as in the file' });
   const id = 'v.' + key, words = `${variable.help}; allowed: ${variable.allowed}`;
@@ -149,11 +156,11 @@ function buildVariable(place, variable, name) {
   return row;
 }
 
-const split = (value, { size, type }) => size === 1 && type === 'text' ? [value] : value ? value.split(/\s*,\s*|\s+/) : [];
+const split = (value, { size, type, choices }) => size === 1 && type === 'text' && !choices ? [value] : value ? value.split(/\s*,\s*|\s+/) : [];
 
 // A menu for words, a field for text, a field with a slider for a number.
 function control(variable, value, wanted) {
-  if (variable.type === 'choice') {
+  if (variable.choices) {
     const option = word => make('option', { value: word, textContent: word || `(${wanted})`, selected: word === value });
     return { input: make('select', {}, ...['', ...variable.choices].map(option)) };
   }

@@ -217,7 +217,7 @@ function painted(old, colour, covered) {
 // ---------- marks ----------
 
 function drawMarks() {
-  const wanted = state.traced.length || state.arrows || coming.first || film.exact || angles;
+  const wanted = state.traced.length || state.arrows || film.exact || angles;
   if (wanted || marked) marks.clearRect(0, 0, page.width, page.height);
   marked = wanted;
   if (!wanted) return;
@@ -225,7 +225,7 @@ function drawMarks() {
     if (angles) drawRadii();
     state.traced.forEach(drawTrace);
     if (state.arrows) drawArrows();
-    if (coming.first) drawNextEvent(coming.first);
+    if (film.events && moment.known) drawNextEvent();
     if (film.exact) drawNumbers();
   });
 }

@@ -101,7 +101,6 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch)
         assert "KeyboardInterrupt" in python.communicate()[1]
     finally:
         python.kill()
-    assert (tmp_path / "long.chk.h5").exists()
     monkeypatch.setattr(sys, "stderr", Notebook())
     with pytest.raises(KeyboardInterrupt):
         package.run("gas.nml", {"stop.collisions": 10**12}, "long.h5", resume=True)
@@ -122,8 +121,6 @@ NO_VALUE = "run.seed: a value is a number, text, logical, or a list of these, no
     [
         ({"run": 3}, NO_GROUP + "int"),
         ({"run": [{}, 3]}, NO_GROUP + "int"),
-        ({"run": "seed"}, NO_GROUP + "str"),
-        ({"run": np.array(5)}, NO_GROUP + "ndarray"),
         ({"run": {"seed": None}}, NO_VALUE + "NoneType"),
         ({"run": {"seed": [1, {}]}}, NO_VALUE + "dict"),
         ({"run": {"seed": np.array(1j)}}, NO_VALUE + "complex"),
@@ -134,9 +131,6 @@ def test_what_is_no_input_is_refused(groups, words):
     with pytest.raises(TypeError, match=re.escape(words)) as refused:
         package.run(groups)
     assert "\n" not in str(refused.value)
-    if isinstance(value := next(iter(groups.values())), dict):
-        with pytest.raises(TypeError, match=re.escape(words.partition(".")[2])):
-            package.run(GROUPS, {f"run.{name}": one for name, one in value.items()})
 
 
 def test_values_of_numpy_are_numbers():
@@ -163,14 +157,12 @@ def test_file_names_may_begin_with_a_dash(tmp_path):
     assert package.run(Path("-i.nml"), {"run.seed": 3}).seed == 3
 
 
-def test_a_missing_program_is_named(monkeypatch):
+def test_a_missing_program_is_named(monkeypatch, tmp_path):
+    """Where RICOCHET says; outside of a clone on the path."""
     monkeypatch.setenv("RICOCHET", "nowhere")
     with pytest.raises(ProgramError, match="no program ricochet at nowhere: run make"):
         package.run(GROUPS)
-
-
-def test_without_a_clone_the_program_is_looked_for_on_the_path(monkeypatch, tmp_path):
-    monkeypatch.delenv("RICOCHET", raising=False)
+    monkeypatch.delenv("RICOCHET")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(program, "__file__", str(tmp_path / "lib/ricochet/program.py"))
     with pytest.raises(ProgramError, match=r"^no program ricochet on PATH: run make install in a "):
