@@ -10,7 +10,7 @@ the run.  Where the system has no ffmpeg, `.venv/bin/pip install imageio-ffmpeg`
 from contextlib import suppress
 from pathlib import Path
 
-from ricochet import Run, RunError, read_run
+from ricochet import Run, RunError
 from ricochet.drawing import plt
 from ricochet.files import destination
 from ricochet.film import animate
@@ -49,7 +49,7 @@ def main() -> None:
     )
     parser.add_argument("--fps", type=positive, metavar="N", default=25, help="per second [25]")
     args = parser.parse_args()
-    run = read_run(args.run)
+    (run,) = args.runs
     path = film_path(args.output, run)
     frames = film_frames(run, args)
     film = animate(run, frames, args.colour, args.fps)
@@ -58,7 +58,7 @@ def main() -> None:
     )
     with tqdm(total=len(frames), unit="frame", desc=path.name, disable=None) as bar:
         film.save(destination(path), writer, dpi=100, progress_callback=lambda *_: bar.update())
-    report(args, [run], "Film", None, [{"film": path, "frames": len(frames), "of": run.frames}])
+    report(args, None, [{"film": path, "frames": len(frames), "of": run.frames}])
 
 
 if __name__ == "__main__":

@@ -28,43 +28,27 @@ power of r in a hexatic phase, and not at all in a crystal.
 from typing import NamedTuple
 
 from ricochet import Run, RunError, hard_disks
-from ricochet.diffusion import (
+from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, plt
+from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
+from ricochet.statistics import Curve, SeriesMean, combined, estimate, excess_kurtosis, series_mean
+from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
+from ricochet.theory import RELAXATION
+from ricochet.thermodynamics import all_cool, equal_disks, later, loses_energy, mean_free_time
+from ricochet.transport import (
     diffusion,
     diffusion_lag,
     displacement,
+    enskog_by_rate,
     integrated_memory,
     lags,
     velocity_memory,
-)
-from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, plt
-from ricochet.script import command_line, grouped, launch, measured, read_all, report
-from ricochet.statistics import SeriesMean, combined, doubts, estimate, excess_kurtosis, series_mean
-from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
-from ricochet.theory import RELAXATION
-from ricochet.thermodynamics import (
-    after_start,
-    all_cool,
-    equal_disks,
-    free_disks,
-    loses_energy,
-    mean_free_time,
-    packing,
-    start_of_equilibrium,
-    temperature,
 )
 
 import numpy as np
 
 MOST_FRAMES = 50  # for the structure
 BLOCKS = 8  # of the frames of a single run
-
-
-class Curve(NamedTuple):
-    """(P,) each."""
-
-    x: np.ndarray
-    y: np.ndarray
-    error: np.ndarray  # NaN where there is none
+NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
 class Found(NamedTuple):
@@ -88,46 +72,6 @@ def check(run: Run, first: Run) -> None:
         raise RunError(f"{run.path}: needs 10 frames and more{how}")
 
 
-def later(run: Run, skip: float | None, cool: bool) -> slice:
-    """Frames in equilibrium, or after the start, without the last, which may be out of step."""
-    begin = after_start if cool else start_of_equilibrium
-    first = int(np.searchsorted(run.time, begin(run, skip)))
-    if run.frames - 1 - first < 2:
-        raise RunError(f"{run.path}: needs more frames after the start")
-    return slice(first, run.frames - 1)
-
-
-def some(frames: slice) -> list[int]:
-    """At most `MOST_FRAMES` of them."""
-    return np.unique(np.linspace(frames.start, frames.stop - 1, MOST_FRAMES).astype(int)).tolist()
-
-
-def kurtosis(run: Run, frames: int) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of the first frames."""
-    a2 = np.array([excess_kurtosis(run.speed(k)) for k in range(frames)])
-    return run.collisions_per_disk_at(run.time[:frames]), a2
-
-
-def enskog(run: Run) -> tuple[float, float]:
-    """Diffusion coefficient and kinematic viscosity of equal disks, with the Z of their rate."""
-    diameter, kt, mass = 2 * run.radius[0], temperature(run), run.mass[0]
-    unit = hard_disks.collision_rate(2.0, diameter, free_disks(run), kt, mass)
-    state = (1 + 1 / (mean_free_time(run) * unit), packing(run), diameter, kt, mass)
-    return hard_disks.enskog_diffusion(*state), hard_disks.enskog_viscosity(*state)
-
-
-def numbers(
-    run: Run, frames: slice, psi: list[np.ndarray], lag: int | None
-) -> dict[str, SeriesMean]:
-    """What one run says with an error."""
-    found = {}
-    if run.periodic.all() and lag is not None:
-        found["D_displacement"], found["D_velocities"] = diffusion(run, frames, lag)
-    found["psi6_local"] = series_mean([np.abs(one).mean() for one in psi])
-    found["psi6_global"] = series_mean([abs(one.mean()) for one in psi])
-    return found
-
-
 def bins(run: Run) -> dict[str, np.ndarray]:
     """Of distances and wave numbers, in mean diameters."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
@@ -148,10 +92,23 @@ def shapes(run: Run, frames: list[int], psi: list[np.ndarray]) -> dict[str, np.n
     return found
 
 
-def way(runs: list[Run], until: int) -> Curve:
-    """a2 against collisions per disk in the first frames."""
-    x, a2 = np.moveaxis([kurtosis(run, until) for run in runs], 1, 0)
-    return Curve(x.mean(axis=0), *estimate(a2))
+def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
+    """psi6 of each run, and the means of the curves; of a single run over blocks of its frames."""
+    members, forms = {"psi6_local": [], "psi6_global": []}, []
+    for run, own in zip(runs, frames, strict=True):
+        some = np.unique(np.linspace(own.start, own.stop - 1, MOST_FRAMES).astype(int)).tolist()
+        psi = [bond_order(run, k) for k in some]
+        members["psi6_local"].append(series_mean([np.abs(one).mean() for one in psi]))
+        members["psi6_global"].append(series_mean([abs(one.mean()) for one in psi]))
+        blocks = min(BLOCKS, len(some)) if len(runs) == 1 else 1
+        for part in np.array_split(np.arange(len(some)), blocks):
+            forms.append(shapes(run, [some[k] for k in part], [psi[k] for k in part]))
+    curves = {}
+    for name, edges in bins(runs[0]).items():
+        y, error = estimate([form[name] for form in forms])
+        known = np.isfinite(y)
+        curves[name] = Curve(((edges[1:] + edges[:-1]) / 2)[known], y[known], error[known])
+    return members, curves
 
 
 def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
@@ -160,12 +117,14 @@ def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
     at = lags(min(f.stop - f.start for f in frames))
     time, diameter = at * (first.time[1] - first.time[0]), 2 * first.radius.mean()
     wt = time / np.mean([mean_free_time(run) for run in runs])
-    vacf = estimate([velocity_memory(*one, at) for one in pairs])
     msd = np.array([displacement(*one, at) for one in pairs])
-    curves = {"vacf": Curve(wt, *vacf), "msd": Curve(wt, *estimate(msd / diameter**2))}
+    curves = {
+        "vacf": Curve(wt, *estimate([velocity_memory(*one, at) for one in pairs])),
+        "msd": Curve(wt, *estimate(msd / diameter**2)),
+    }
     if equal_disks(first):
         density = first.count / np.prod(first.edges)
-        tail = hard_disks.long_time_tail(time, density, *enskog(first))
+        tail = hard_disks.long_time_tail(time, density, *enskog_by_rate(first))
         curves["vacf_tail"] = Curve(wt, tail, np.full_like(tail, np.nan))
     if first.periodic.all():
         memory = estimate([integrated_memory(*one, at) for one in pairs])
@@ -176,71 +135,57 @@ def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
     return curves
 
 
-def structure(run: Run, frames: list[int], psi: list[np.ndarray], alone: bool) -> list[dict]:
-    """`shapes` of a run, or of blocks of its frames if it is alone, for an error."""
-    parts = np.array_split(np.arange(len(frames)), min(BLOCKS, len(frames)) if alone else 1)
-    return [shapes(run, [frames[k] for k in part], [psi[k] for k in part]) for part in parts]
+def kurtosis(runs: list[Run], until: int) -> Curve:
+    """a2 against collisions per disk in the first frames."""
+    tau = np.mean([run.collisions_per_disk_at(run.time[:until]) for run in runs], axis=0)
+    a2 = [[excess_kurtosis(run.speed(k)) for k in range(until)] for run in runs]
+    return Curve(tau, *estimate(a2))
 
 
 def analysed(runs: list[Run], skip: float | None, cool: bool) -> Found:
     """All that runs at one packing fraction say."""
     frames = [later(run, skip, cool) for run in runs]
-    lag, members, forms = None if cool else diffusion_lag(runs, frames), [], []
-    for run, own in zip(runs, frames, strict=True):
-        psi = [bond_order(run, k) for k in some(own)]
-        members.append(numbers(run, own, psi, lag))
-        forms += structure(run, some(own), psi, len(runs) == 1)
-    until = min(run.frames for run in runs) if cool else max(own.start for own in frames) + 1
-    curves = {} if cool else motion(runs, frames)
-    curves["a2"] = way(runs, until)
-    for name, edges in bins(runs[0]).items():
-        y, error = estimate([form[name] for form in forms])
-        known = np.isfinite(y)
-        curves[name] = Curve(((edges[1:] + edges[:-1]) / 2)[known], y[known], error[known])
-    named = {name: [one[name] for one in members] for name in members[0]}
-    if lag is not None:
+    curves, members, lag = {}, {}, None
+    if cool:
+        curves["a2"] = kurtosis(runs, min(run.frames for run in runs))
+    else:
+        curves = motion(runs, frames)
+        curves["a2"] = kurtosis(runs, max(own.start for own in frames) + 1)
+        lag = diffusion_lag(runs, frames)
+        if runs[0].periodic.all():
+            both = [diffusion(*one, lag) for one in zip(runs, frames, strict=True)]
+            members = dict(zip(NUMBERS, map(list, zip(*both, strict=True)), strict=False))
         step = runs[0].time[1] - runs[0].time[0]
         lag *= float(step / np.mean([mean_free_time(run) for run in runs]))
-    return Found(named, curves, lag)
+    orders, shown = structure(runs, frames)
+    return Found(members | orders, curves | shown, lag)
 
 
-def table(groups: list, results: list[Found]) -> list[dict]:
-    """A row per packing fraction."""
-    rows = []
+def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
+    """A row per packing fraction; and what speaks against it."""
+    rows, notes = [], []
     for (eta, runs), found in zip(groups, results, strict=True):
         row = {"packing": eta, "runs": len(runs), "D_time": found.lag}
-        for name in ("D_displacement", "D_velocities", "psi6_local", "psi6_global"):
-            members = found.members.get(name)
-            row |= measured(name, combined(members) if members else None)
+        for name in NUMBERS:
+            if name in found.members:
+                row |= over_runs(name, found.members[name], notes, f"η = {eta:g}, {name}")
+            else:
+                row |= measured(name, None)
         known = equal_disks(runs[0]) and found.lag is not None
-        row["D_enskog"] = enskog(runs[0])[0] if known else None
+        row["D_enskog"] = enskog_by_rate(runs[0])[0] if known else None
         rows.append(row | {"g_first_bin": float(found.curves["g"].y[0])})
-    return rows
-
-
-def notes(groups: list, results: list[Found]) -> list[str]:
-    """What speaks against the numbers."""
-    return [
-        note
-        for (eta, _), found in zip(groups, results, strict=True)
-        for name, members in found.members.items()
-        for note in doubts(f"η = {eta:g}, {name}", members)
-    ]
+    return rows, notes
 
 
 def curves(groups: list, results: list[Found]) -> list[dict]:
     """What has an error, then all curves, one below the other."""
-    rows = []
+    names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():
             mean, error, *_ = combined(members)
             x = found.lag if what.startswith("D_") else None
-            rows.append({"what": what, "packing": eta, "x": x, "y": mean, "error": error})
-        rows += [
-            {"what": what, "packing": eta, "x": float(x), "y": float(y), "error": float(error)}
-            for what, curve in found.curves.items()
-            for x, y, error in zip(*curve, strict=True)
-        ]
+            rows.append(dict(zip(names, (what, eta, x, mean, error), strict=True)))
+        rows += points(names, {(what, eta): curve for what, curve in found.curves.items()})
     return rows
 
 
@@ -262,38 +207,31 @@ def draw_group(
     panels: dict[str, plt.Axes], found: Found, row: dict, colour: str, count: int
 ) -> None:
     """One packing fraction in all panels; `count` disks in all of its runs."""
-    line, label = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}"
+    line, label, shown = {"color": colour, "lw": 1}, f"η = {row['packing']:.3g}", found.curves
+
+    def positive(curve: Curve) -> Curve:
+        return Curve(*(part[curve.y > 0] for part in curve))
+
     if "vacf" in panels:
-        draw_motion(panels, found, row, label, line)
-    for name in ("a2", "S", "g"):
-        if name in found.curves:
-            band(panels[name], *found.curves[name], **line)
-    noise_band(panels["a2"], count, colour)
-    g6 = found.curves["g6"]
-    order = f"{label},  ψ₆ {row['psi6_local']:.2f} of a disk, {row['psi6_global']:.2f} of all"
-    above = Curve(*(part[g6.y > 0] for part in g6))
-    band(panels["g6"], *above, marker=".", label=order, **line)
-
-
-def draw_motion(
-    panels: dict[str, plt.Axes], found: Found, row: dict, label: str, line: dict
-) -> None:
-    """Memory and diffusion at one packing fraction."""
-    vacf = found.curves["vacf"]
-    band(panels["vacf"], *vacf, marker=".", label=label, **line)
-    band(panels["tail"], *(part[vacf.y > 0] for part in vacf), marker=".", **line)
-    if "vacf_tail" in found.curves:
-        late = vacf.x > 3
-        panels["tail"].plot(vacf.x[late], found.curves["vacf_tail"].y[late], ls="--", **line)
-    spread = ""
-    if row["D_displacement"]:
-        spread = f"{label},  D = {row['D_displacement']:.4g} ± {row['D_displacement_error']:.2g}"
-    band(panels["msd"], *found.curves["msd"], marker=".", label=spread, **line)
+        band(panels["vacf"], *shown["vacf"], marker=".", label=label, **line)
+        band(panels["tail"], *positive(shown["vacf"]), marker=".", **line)
+        if "vacf_tail" in shown:
+            wt, tail, _ = shown["vacf_tail"]
+            panels["tail"].plot(wt[wt > 3], tail[wt > 3], ls="--", **line)
+        mean, error = row["D_displacement"], row["D_displacement_error"]
+        spread = f"{label},  D = {mean:.4g} ± {error:.2g}" if mean else ""
+        band(panels["msd"], *shown["msd"], marker=".", label=spread, **line)
     for name, marker in (("D_displacement(t)", "."), ("D_velocities(t)", "x")):
-        if name in found.curves:
-            x, y, error = found.curves[name]
+        if name in shown:
+            x, y, error = shown[name]
             unit = row["D_enskog"] or y.max()
             band(panels["D"], x, y / unit, error / unit, marker=marker, ms=4, **line)
+    for name in ("a2", "S", "g"):
+        if name in shown:
+            band(panels[name], *shown[name], **line)
+    noise_band(panels["a2"], count, colour)
+    order = f"{label},  ψ₆ {row['psi6_local']:.2f} of a disk, {row['psi6_global']:.2f} of all"
+    band(panels["g6"], *positive(shown["g6"]), marker=".", label=order, **line)
 
 
 def draw(
@@ -323,7 +261,7 @@ def draw(
     for name in panels.keys() - {"g", "S"}:
         if panels[name].get_legend_handles_labels()[0]:
             panels[name].legend()
-    figure.suptitle(caption([run for _, runs in groups for run in runs]), fontsize=10)
+    figure.suptitle(caption([run for _, runs in groups for run in runs]))
     return figure
 
 
@@ -342,17 +280,15 @@ def draw_theory(panels: dict[str, plt.Axes], first: float, equal: bool) -> None:
 
 def main() -> None:
     args = command_line(__doc__, "correlations.png", skip=None).parse_args()
-    runs = read_all(args.runs)
-    for run in runs:
-        check(run, runs[0])
-    cool, groups = all_cool(runs), grouped(runs, lambda run: round(packing(run), 6))
+    for run in args.runs:
+        check(run, args.runs[0])
+    cool, groups = all_cool(args.runs), by_packing(args.runs)
     results = [analysed(members, args.skip, cool) for _, members in groups]
-    rows = table(groups, results)
-    title = "Correlations in a gas of hard disks"
-    data, said = curves(groups, results), notes(groups, results)
+    rows, notes = table(groups, results)
     if cool:
-        said.append("the gas loses energy, no equilibrium: no memory and no diffusion coefficient")
-    report(args, runs, title, draw(groups, results, rows, cool), rows, data=data, notes=said)
+        notes.append("the gas loses energy, no equilibrium: no memory and no diffusion coefficient")
+    figure = draw(groups, results, rows, cool)
+    report(args, figure, rows, data=curves(groups, results), notes=notes)
 
 
 if __name__ == "__main__":

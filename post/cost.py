@@ -10,7 +10,7 @@ caches.
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
-from ricochet.script import command_line, launch, read_all, report
+from ricochet.script import command_line, launch, report
 from ricochet.statistics import PowerLaw, fit_power_law
 from ricochet.thermodynamics import packing
 
@@ -53,26 +53,24 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
 
 
 def draw(
-    measured: dict, laws: dict[str, PowerLaw], low: float, high: float, title: str
+    runs: list[Run], measured: dict, laws: dict[str, PowerLaw], low: float, high: float
 ) -> plt.Figure:
     """Doubly logarithmic; the fits are dotted outside their range."""
     figure, axes = plt.subplots(figsize=(7, 5.5))
     for search, colour, marker in zip(LABELS, COLOURS, "osD", strict=False):
-        if search not in measured:
-            continue
-        n, cost = measured[search]
-        axes.loglog(
-            n, cost, ls="", marker=marker, color=colour, label=f"{search}: {LABELS[search]}"
-        )
-        if search not in laws:
-            continue
-        law = laws[search]
-        style = {"color": colour, "lw": 1}
-        axes.plot(n, law(n), ls=":", **style)
-        fitted = n[(n >= low) & (n <= high)]
-        label = f"$\\propto N^{{{law.exponent:.3f} \\pm {law.exponent_error:.3f}}}$"
-        axes.plot(fitted, law(fitted), label=label, **style)
-    axes.set(xlabel="number of disks N", ylabel="time per collision (µs)", title=title)
+        if search in measured:
+            n, cost = measured[search]
+            label = f"{search}: {LABELS[search]}"
+            axes.loglog(n, cost, ls="", marker=marker, color=colour, label=label)
+        if search in laws:
+            law, style = laws[search], {"color": colour, "lw": 1}
+            label = f"$\\propto N^{{{law.exponent:.3f} \\pm {law.exponent_error:.3f}}}$"
+            fitted = n[(n >= low) & (n <= high)]
+            axes.plot(n, law(n), ls=":", **style)
+            axes.plot(fitted, law(fitted), label=label, **style)
+    eta = ", ".join(f"{value:g}" for value in sorted({round(packing(run), 3) for run in runs}))
+    axes.set(xlabel="number of disks N", ylabel="time per collision (µs)")
+    axes.set_title(f"packing fraction {eta}")
     axes.legend()
     return figure
 
@@ -83,21 +81,18 @@ def main() -> None:
         "--fit", type=float, nargs=2, default=[128, 1e4], metavar="N", help="[128 1e4]"
     )
     args = parser.parse_args()
-    runs = read_all(args.runs)
-    measured = costs(runs)
+    measured = costs(args.runs)
     laws = fits(measured, *args.fit)
-    table = {
-        "search": [search for search, (n, _) in measured.items() for _ in n],
-        "N": [int(k) for n, _ in measured.values() for k in n],
-        "microseconds": [float(c) for _, cost in measured.values() for c in cost],
-    }
+    table = [
+        {"search": search, "N": int(n), "microseconds": float(cost)}
+        for search, points in measured.items()
+        for n, cost in zip(*points, strict=True)
+    ]
     exponents = [
         {"search": search, "exponent": law.exponent, "exponent_error": float(law.exponent_error)}
         for search, law in laws.items()
     ]
-    eta = ", ".join(f"{value:g}" for value in sorted({round(packing(run), 3) for run in runs}))
-    figure = draw(measured, laws, *args.fit, f"packing fraction {eta}")
-    report(args, runs, "Cost of a collision", figure, table, exponents)
+    report(args, draw(args.runs, measured, laws, *args.fit), table, exponents)
 
 
 if __name__ == "__main__":

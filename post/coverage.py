@@ -10,9 +10,8 @@ For comparison: the error that takes every sample of the observables for indepen
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
-from ricochet.script import command_line, grouped, launch, read_all, report
-from ricochet.statistics import SeriesMean
-from ricochet.thermodynamics import packing, steps, temperature, z_virial
+from ricochet.script import by_packing, command_line, launch, report
+from ricochet.thermodynamics import steps, temperature, z_virial
 
 import numpy as np
 import scipy
@@ -27,56 +26,38 @@ def naive_error(run: Run, skip: float | None) -> float:
     return float(scipy.stats.sem(rest) / np.mean(s.time) / (2 * run.count * temperature(run)))
 
 
-def table(groups: list, means: list[list[SeriesMean]], skip: float | None) -> list[dict]:
-    """A row per packing fraction."""
-    rows = []
-    for (eta, runs), members in zip(groups, means, strict=True):
-        if len(runs) < 10:
-            raise RunError(f"{runs[0].path}: needs at least 10 seeds per packing fraction")
-        z, error = np.array([(one.mean, one.error) for one in members]).T
-        off = np.abs(z - z.mean())
-        naive = np.array([naive_error(run, skip) for run in runs])
-        rows.append(
-            {
-                "packing": eta,
-                "runs": len(runs),
-                "Z": float(z.mean()),
-                "scatter": float(z.std(ddof=1)),
-                "error": float(error.mean()),
-                "within_%": float(100 * np.mean(off < error)),
-                "naive_error": float(naive.mean()),
-                "naive_within_%": float(100 * np.mean(off < naive)),
-            }
-        )
-    return rows
-
-
-def draw(groups: list, means: list[list[SeriesMean]], rows: list[dict]) -> plt.Figure:
-    """Per packing fraction the runs in order of their mean, with error bars."""
-    figure, panels = plt.subplots(
-        1, len(groups), squeeze=False, figsize=(max(5, 3.6 * len(groups)), 4.2)
-    )
-    for axes, members, row in zip(panels[0], means, rows, strict=True):
-        ordered = sorted(members[:SHOWN], key=lambda one: one.mean)
-        for k, one in enumerate(ordered):
-            holds = abs(one.mean - row["Z"]) < one.error
-            style = {"color": COLOURS[0] if holds else COLOURS[1], "ms": 2.5, "lw": 1}
-            axes.errorbar(k, one.mean, one.error, marker="o", **style)
-        axes.axhline(row["Z"], color="black", lw=1)
-        axes.set_title(f"η = {row['packing']:g}: {row['within_%']:.0f} % of {row['runs']} hold it")
-        axes.set(xticks=[], xlabel=f"{len(ordered)} runs, in order of their mean")
-    panels[0, 0].set_ylabel("$Z = P\\,/\\,(n\\,kT)$ of a run")
-    figure.suptitle(caption([run for _, runs in groups for run in runs]), fontsize=10)
-    return figure
+def draw_runs(axes: plt.Axes, row: dict, z: np.ndarray, error: np.ndarray) -> None:
+    """The first runs in order of their mean, with error bars."""
+    first = np.argsort(z[:SHOWN])
+    for k, (mean, reach) in enumerate(zip(z[first], error[first], strict=True)):
+        style = {"color": COLOURS[0 if abs(mean - row["Z"]) < reach else 1], "ms": 2.5, "lw": 1}
+        axes.errorbar(k, mean, reach, marker="o", **style)
+    axes.axhline(row["Z"], color="black", lw=1)
+    axes.set_title(f"η = {row['packing']:g}: {row['within_%']:.0f} % of {row['runs']} hold it")
+    axes.set(xticks=[], xlabel=f"{len(first)} runs, in order of their mean")
 
 
 def main() -> None:
     args = command_line(__doc__, "coverage.png", skip=None).parse_args()
-    runs = read_all(args.runs)
-    groups = grouped(runs, lambda run: round(packing(run), 6))
-    means = [[z_virial(run, args.skip) for run in members] for _, members in groups]
-    rows = table(groups, means, args.skip)
-    report(args, runs, "How often an error bar holds the truth", draw(groups, means, rows), rows)
+    groups, rows = by_packing(args.runs), []
+    figure, panels = plt.subplots(
+        1, len(groups), squeeze=False, figsize=(max(5, 3.6 * len(groups)), 4.2)
+    )
+    for (eta, runs), axes in zip(groups, panels[0], strict=True):
+        if len(runs) < 10:
+            raise RunError(f"{runs[0].path}: needs at least 10 seeds per packing fraction")
+        z, error = np.array([z_virial(run, args.skip)[:2] for run in runs]).T
+        naive = np.array([naive_error(run, args.skip) for run in runs])
+        row = {"packing": eta, "runs": len(runs), "Z": float(z.mean())}
+        row |= {"scatter": float(z.std(ddof=1)), "error": float(error.mean())}
+        row |= {"within_%": float(100 * np.mean(np.abs(z - z.mean()) < error))}
+        row |= {"naive_error": float(naive.mean())}
+        row |= {"naive_within_%": float(100 * np.mean(np.abs(z - z.mean()) < naive))}
+        draw_runs(axes, row, z, error)
+        rows.append(row)
+    panels[0, 0].set_ylabel("$Z = P\\,/\\,(n\\,kT)$ of a run")
+    figure.suptitle(caption(args.runs))
+    report(args, figure, rows)
 
 
 if __name__ == "__main__":

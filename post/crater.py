@@ -24,7 +24,7 @@ from ricochet.crater import (
     projectile,
 )
 from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
-from ricochet.script import command_line, launch, read_all, report
+from ricochet.script import command_line, launch, report
 
 import numpy as np
 import scipy
@@ -76,12 +76,8 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
     twin.set(ylabel="pair collisions", ylim=(0, None))
     twin.spines["right"].set_visible(True)
     axes.set_box_aspect(0.9)
-    axes.legend(
-        handles=[axes.lines[0], twin.lines[0]],
-        loc="upper center",
-        bbox_to_anchor=(0.5, 1.14),
-        ncols=2,
-    )
+    lines = [axes.lines[0], twin.lines[0]]
+    axes.legend(handles=lines, loc="upper center", bbox_to_anchor=(0.5, 1.14), ncols=2)
 
 
 def draw(run: Run, size: Crater) -> plt.Figure:
@@ -93,65 +89,45 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     draw_hull(before, run)
     draw_state(after, run, -1, moved, limits)
     draw_cavity(after, run)
+    below = {"location": "bottom", "pad": 0.02}
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
-    figure.colorbar(
-        scale,
-        ax=[before, after],
-        location="bottom",
-        shrink=0.6,
-        aspect=40,
-        extend="max",
-        pad=0.02,
-        label=f"{LABELS['displacement']} at the end",
-    )
+    label = f"{LABELS['displacement']} at the end"
+    style = {"shrink": 0.6, "aspect": 40, "extend": "max", "label": label, **below}
+    figure.colorbar(scale, ax=[before, after], **style)
     count = np.log10(1.0 + run.collisions[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
     draw_state(hits, run, 0, count, (0, top))
     hits.set_title("collisions of each disk, drawn at its first position")
     scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
-    bar = figure.colorbar(
-        scale, ax=hits, location="bottom", shrink=0.8, aspect=30, pad=0.02, label="collisions"
-    )
-    ticks = [0, *(10**k for k in range(int(top) + 1))]
-    bar.set_ticks(np.log10(1.0 + np.array(ticks[:-1])), labels=ticks[:-1])
+    bar = figure.colorbar(scale, ax=hits, shrink=0.8, aspect=30, label="collisions", **below)
+    ticks = np.array([0, *(10**k for k in range(int(top)))])
+    bar.set_ticks(np.log10(1.0 + ticks), labels=ticks)
     draw_energy(energy, run)
-    tip = projectile(run)
-    lying = np.flatnonzero(bed(run))[0]
+    tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
     figure.suptitle(
         f"{caption([run])},  projectile: mass {run.mass[tip] / run.mass[lying]:.4g} m, radius "
         f"{run.radius[tip] / run.radius[lying]:.4g} r, speed {run.speed(0)[tip]:.4g}\n"
         f"crater: {size.hit} disks hit, {size.displaced} displaced by more than r, width "
-        f"{size.width:.3f}, depth {size.depth:.3f}",
-        fontsize=10,
+        f"{size.width:.3f}, depth {size.depth:.3f}"
     )
     return figure
 
 
-def marks(run: Run, size: Crater) -> dict[str, int]:
-    """What cut the crater short, as in `crater_scan.py`."""
-    return {
-        "ended_by_time": int(ended_by_time(run, size)),
-        "box_takes_part": int(box_takes_part(run, size.wall_collisions)),
-    }
-
-
-def notes(run: Run, size: Crater) -> list[str]:
-    """The same in words."""
-    found, name = marks(run, size), run.path.name
-    wanted = f"not the {100 * energy_fraction(run):g} % of stop.energy_fraction"
-    left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, {wanted}"
-    box = f"{name}: the crater reaches the floor or the sides, {size.wall_collisions} wall hits"
-    return [left] * found["ended_by_time"] + [box] * found["box_takes_part"]
-
-
 def main() -> None:
     args = command_line(__doc__, "crater.png").parse_args()
-    runs = read_all(args.runs)
-    sizes = [crater(run) for run in runs]
-    figure = draw(runs[0], sizes[0]) if len(runs) == 1 else None
-    members = list(zip(runs, sizes, strict=True))
-    table = [{"run": run.path.name, **size._asdict(), **marks(run, size)} for run, size in members]
-    report(args, runs, "Crater", figure, table, notes=[n for one in members for n in notes(*one)])
+    rows, notes = [], []
+    for run in args.runs:
+        size, name = crater(run), run.path.name
+        by_time, box = ended_by_time(run, size), box_takes_part(run, size.wall_collisions)
+        marks = {"ended_by_time": int(by_time), "box_takes_part": int(box)}
+        rows.append({"run": name, **size._asdict(), **marks})
+        left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, not the "
+        left += f"{100 * energy_fraction(run):g} % of stop.energy_fraction"
+        walls = f"{size.wall_collisions} wall hits"
+        walls = f"{name}: the crater reaches the floor or the sides, {walls}"
+        notes += [left] * by_time + [walls] * box
+    figure = draw(args.runs[0], size) if len(args.runs) == 1 else None
+    report(args, figure, rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -12,21 +12,14 @@ disks), or some of the runs ended by time, with more energy left than `stop.ener
 """
 
 import hashlib
+from itertools import chain
 from typing import NamedTuple
 
 from ricochet import Run, RunError
-from ricochet.crater import (
-    Crater,
-    bed,
-    box_takes_part,
-    crater,
-    ended_by_time,
-    energy_fraction,
-    projectile,
-)
+from ricochet.crater import bed, box_takes_part, crater, ended_by_time, energy_fraction, projectile
 from ricochet.drawing import COLOURS, colours, panel_grid, plt
 from ricochet.reader import span
-from ricochet.script import command_line, launch, measured, read_all, report
+from ricochet.script import command_line, grouped, launch, measured, report
 from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law, to_error
 
 import numpy as np
@@ -45,7 +38,7 @@ EXTENTS = {"width": "width", "depth": "depth"}
 class Point(NamedTuple):
     """The craters of runs that differ by their seed."""
 
-    x: float
+    values: dict[str, float]  # of AXES
     runs: int
     sizes: dict[str, Estimate]
     energy_left: float
@@ -54,84 +47,65 @@ class Point(NamedTuple):
     free: bool  # neither time nor walls cut it short
 
 
-class Curve(NamedTuple):
-    """Against one parameter, the others being the same."""
-
-    others: dict[str, float]
-    points: list[Point]  # in ascending order
+Scans = dict[str, list[list[Point]]]  # by parameter: curves of points in ascending order
 
 
-Key = tuple[float, ...]  # a value for each of AXES
-
-
-def key_of(run: Run) -> Key:
+def key_of(run: Run) -> tuple[float, ...]:
     """Mass ratio, speed, radius ratio, restitution."""
     if np.isnan(run.restitution):
         raise RunError(f"{run.path}: has several restitutions, which are no parameter of a scan")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
-    values = (
-        run.mass[tip] / run.mass[lying],
-        run.speed(0)[tip],
-        run.radius[tip] / run.radius[lying],
-        run.restitution,
-    )
+    ratios = run.mass[tip] / run.mass[lying], run.radius[tip] / run.radius[lying]
+    values = ratios[0], run.speed(0)[tip], ratios[1], run.restitution
     return tuple(float(f"{value:.9g}") for value in values)
 
 
 def distinct(runs: list[Run]) -> list[Run]:
     """The same run once: scans share points.  It ends with the same digits."""
+
+    def ending(run: Run) -> bytes:
+        return hashlib.blake2b(run.position[-1].tobytes()).digest()
+
     return list({(key_of(run), run.seed, ending(run)): run for run in runs}.values())
 
 
-def ending(run: Run) -> bytes:
-    """Of the last frame."""
-    return hashlib.blake2b(run.position[-1].tobytes()).digest()
-
-
-def point(x: float, runs: list[Run], craters: list[Crater]) -> Point:
+def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     """The mean over runs."""
+    craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in SIZES | EXTENTS}
     left, hits = (
         np.array([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
     )
     by_time = any(ended_by_time(*one) for one in zip(runs, craters, strict=True))
     free = not by_time and not box_takes_part(runs[0], hits.mean())
-    return Point(x, len(runs), sizes, left.mean(), hits.mean(), by_time, free)
+    values = dict(zip(AXES, key, strict=True))
+    return Point(values, len(runs), sizes, left.mean(), hits.mean(), by_time, free)
 
 
-def curves(keys: list[Key], runs: list[Run], craters: list[Crater], axis: str) -> list[Curve]:
-    """One for each combination of the other parameters, also if it has a single point."""
-    names, found = list(AXES), {}
-    for key, *one in sorted(zip(keys, runs, craters, strict=True), key=lambda item: item[0]):
-        values = dict(zip(names, key, strict=True))
-        x = values.pop(axis)
-        found.setdefault(tuple(values.items()), {}).setdefault(x, []).append(one)
-    return [
-        Curve(dict(others), [point(x, *zip(*members, strict=True)) for x, members in own.items()])
-        for others, own in sorted(found.items())
-    ]
+def others(axis: str, curve: list[Point]) -> dict[str, float]:
+    """The parameters that the points of a curve share."""
+    return {name: value for name, value in curve[0].values.items() if name != axis}
 
 
-def scanned(keys: list[Key], runs: list[Run], craters: list[Crater]) -> dict[str, list[Curve]]:
-    """The curves that have more than a point, by parameter; else the largest of the points."""
-    every = {axis: curves(keys, runs, craters, axis) for axis in AXES}
-    scans = {axis: [curve for curve in own if len(curve.points) > 1] for axis, own in every.items()}
-    largest = max(every["mass"], key=lambda curve: curve.points[0].runs)
-    return {axis: own for axis, own in scans.items() if own} or {"mass": [largest]}
+def scanned(points: list[Point]) -> Scans:
+    """The curves that have more than a point; else the largest of the points."""
+    scans = {}
+    for axis in AXES:
+        families = grouped(points, lambda p, axis=axis: tuple(others(axis, [p]).values()))
+        curves = [sorted(own, key=lambda p, axis=axis: p.values[axis]) for _, own in families]
+        if long := [curve for curve in curves if len(curve) > 1]:
+            scans[axis] = long
+    return scans or {"mass": [[max(points, key=lambda p: p.runs)]]}
 
 
-def unused(keys: list[Key], scans: dict[str, list[Curve]]) -> list[str]:
+def unused(points: list[Point], scans: Scans) -> list[str]:
     """The runs that are on no curve."""
-    drawn = {
-        tuple({**curve.others, axis: p.x}[name] for name in AXES)
-        for axis, own in scans.items()
-        for curve in own
-        for p in curve.points
-    }
+    drawn = [p.values for scan in scans.values() for curve in scan for p in curve]
     return [
-        f"not drawn: {listed(dict(zip(AXES, key, strict=True)))} (runs: {keys.count(key)}), from "
-        "which no other run differs in one parameter alone"
-        for key in sorted(set(keys) - drawn)
+        f"not drawn: {listed(p.values)} (runs: {p.runs}), from which no other run differs in one "
+        "parameter alone"
+        for p in points
+        if p.values not in drawn
     ]
 
 
@@ -145,16 +119,11 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
     return 1 - np.square(x) if axis == "restitution" else np.asarray(x, dtype=float)
 
 
-def fits_of(axis: str, points: list[Point]) -> dict[str, PowerLaw | None]:
-    """A power law for each size."""
-    points = [p for p in points if p.free]
-    x = abscissa(axis, [p.x for p in points])
-    return {
-        name: fit_power_law(
-            x, [p.sizes[name].mean for p in points], [p.sizes[name].error for p in points]
-        )
-        for name in SIZES | EXTENTS
-    }
+def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
+    """A power law for a size."""
+    free = [p for p in curve if p.free]
+    x = abscissa(axis, [p.values[axis] for p in free])
+    return fit_power_law(x, *np.array([p.sizes[name] for p in free]).reshape(-1, 2).T)
 
 
 def power(axis: str, fit: PowerLaw | None) -> str:
@@ -166,11 +135,11 @@ def power(axis: str, fit: PowerLaw | None) -> str:
 
 
 def draw_size(
-    axes: plt.Axes, axis: str, curve: Curve, name: str, fit: PowerLaw | None, **style
+    axes: plt.Axes, axis: str, curve: list[Point], name: str, fit: PowerLaw | None, **style
 ) -> None:
     """One size with its fit."""
-    x, y, error = np.array([(p.x, *p.sizes[name]) for p in curve.points]).T
-    error, free = np.nan_to_num(error), np.array([p.free for p in curve.points])
+    x, y, error = np.array([(p.values[axis], *p.sizes[name]) for p in curve]).T
+    error, free = np.nan_to_num(error), np.array([p.free for p in curve])
     if fit:
         inside = np.linspace(x[free].min(), x[free].max(), 200)
         inside = inside[abscissa(axis, inside) > 0]
@@ -181,23 +150,24 @@ def draw_size(
     axes.errorbar(x[~free], y[~free], error[~free], ls="", **{**style, "label": ""}, mfc="white")
 
 
-def draw_sizes(axes: plt.Axes, axis: str, scan: list[Curve], names: dict, own: list) -> None:
+def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, own: list) -> None:
     """Some of the sizes: of a single curve each has a colour, of a family each curve."""
-    varying = [name for name in scan[0].others if len({c.others[name] for c in scan}) > 1]
-    for curve, shade in zip(scan, colours(len(scan)), strict=True):
-        fits = fits_of(axis, curve.points)
+    shared = [others(axis, curve) for curve in scan]
+    varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
+    for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
         for (name, title), colour, marker in zip(names.items(), own, "os", strict=True):
-            label = "" if varying else title + power(axis, fits[name])
+            fit = fit_of(axis, curve, name)
+            label = "" if varying else title + power(axis, fit)
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
-            draw_size(axes, axis, curve, name, fits[name], **style)
+            draw_size(axes, axis, curve, name, fit, **style)
         if varying:
-            axes.plot([], [], color=shade, label=listed({n: curve.others[n] for n in varying}))
+            axes.plot([], [], color=shade, label=listed({n: values[n] for n in varying}))
     if varying:
         for title, marker in zip(names.values(), "os", strict=True):
             axes.plot([], [], ls="", color="0.4", marker=marker, label=title)
 
 
-def draw(scans: dict[str, list[Curve]], runs: list[Run]) -> plt.Figure:
+def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     """Panels for each parameter: numbers of disks above, width and depth below."""
     rows, columns = panel_grid(len(scans), 1)
     figure = plt.figure(figsize=(5.5 * max(columns, 1.3), 5.5 * rows))
@@ -210,74 +180,52 @@ def draw(scans: dict[str, list[Curve]], runs: list[Run]) -> plt.Figure:
         draw_sizes(numbers, axis, scan, SIZES, COLOURS[:2])
         draw_sizes(lengths, axis, scan, EXTENTS, COLOURS[2:4])
         if axis == "mass":
-            x = np.array(sorted({p.x for curve in scan for p in curve.points}))
+            x = np.array(sorted({p.values["mass"] for p in chain(*scan)}))
             label = f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$"
             numbers.plot(x, x * (1 / fraction - 1), color="0.4", lw=1, ls=":", label=label)
-        same = set.intersection(*(set(curve.others.items()) for curve in scan))
-        title = listed(
-            {name: value for name, value in scan[0].others.items() if (name, value) in same}
-        )
+        same = set.intersection(*(set(others(axis, curve).items()) for curve in scan))
+        title = listed({name: v for name, v in others(axis, scan[0]).items() if (name, v) in same})
         numbers.set(ylabel="number of disks", title=title)
         numbers.tick_params(labelbottom=False)
         lengths.set(xlabel=AXES[axis], ylabel="length (box = 1)")
         for axes in (numbers, lengths):
             axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
             axes.legend(loc="upper left", fontsize=8, ncols=1 + (len(scan) > 2))
-    points = [p for scan in scans.values() for curve in scan for p in curve.points]
+    points = [p for scan in scans.values() for p in chain(*scan)]
     number = "-".join(map(str, sorted({f([p.runs for p in points]) for f in (min, max)})))
     count = span(np.array([run.count for run in runs]))
     figure.suptitle(
         f"N = {count},  {number} run{'s' * (number != '1')} per point,"
         f"  ended at {100 * fraction:g} % of the energy"
-        + (" (open: the box takes part, or ended by time)" * any(not p.free for p in points)),
-        fontsize=10,
+        + (" (open: the box takes part, or ended by time)" * any(not p.free for p in points))
     )
     return figure
 
 
-def table(scans: dict[str, list[Curve]]) -> list[dict]:
-    """A row per point of each curve."""
-    rows = []
-    for axis, others, p in (
-        (axis, curve.others, p)
-        for axis, own in scans.items()
-        for curve in own
-        for p in curve.points
-    ):
-        values = {**others, axis: p.x}
-        row = {"scan": axis, **{name: values[name] for name in AXES}, "runs": p.runs}
-        for name, size in p.sizes.items():
-            row |= measured(name, size)
-        row |= {"energy_left": float(p.energy_left)}
-        row |= {"wall_collisions": float(p.wall_collisions)}
-        rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
-    return rows
-
-
-def exponents(scans: dict[str, list[Curve]]) -> list[dict]:
-    """A row per fit."""
-    return [
-        {
-            "scan": axis,
-            **{name: curve.others.get(name) for name in AXES},
-            "size": size,
-            **measured("exponent", Estimate(fit.exponent, fit.exponent_error)),
-        }
-        for axis, scan in scans.items()
-        for curve in scan
-        for size, fit in fits_of(axis, curve.points).items()
-        if fit
-    ]
+def tables(scans: Scans) -> tuple[list[dict], list[dict]]:
+    """A row per point of each curve, and a row per fit."""
+    rows, fits = [], []
+    for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
+        for p in curve:
+            row = {"scan": axis, **p.values, "runs": p.runs}
+            for name, size in p.sizes.items():
+                row |= measured(name, size)
+            row |= {"energy_left": float(p.energy_left)}
+            row |= {"wall_collisions": float(p.wall_collisions)}
+            rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
+        for size in SIZES | EXTENTS:
+            if fit := fit_of(axis, curve, size):
+                row = {"scan": axis, **curve[0].values, axis: None, "size": size}
+                exponent = Estimate(fit.exponent, fit.exponent_error)
+                fits.append(row | measured("exponent", exponent))
+    return rows, fits
 
 
 def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
-    runs = distinct(read_all(args.runs))
-    keys, craters = [key_of(run) for run in runs], [crater(run) for run in runs]
-    scans = scanned(keys, runs, craters)
-    figure, left_out = draw(scans, runs), unused(keys, scans)
-    title = "Crater size"
-    report(args, runs, title, figure, table(scans), exponents(scans), notes=left_out)
+    points = [point(*one) for one in grouped(distinct(args.runs), key_of)]
+    scans = scanned(points)
+    report(args, draw(args.runs, scans), *tables(scans), notes=unused(points, scans))
 
 
 if __name__ == "__main__":

@@ -17,12 +17,8 @@ error over runs of one input, and its ratio to the theory.  Pictures: the end of
 each input, or of a single input its start and its end.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
-
-from ricochet import Run, RunError, hard_disks, theory
+from ricochet import Run, RunError
 from ricochet.drawing import (
-    caption,
     colours,
     disk_collection,
     draw_box,
@@ -30,100 +26,23 @@ from ricochet.drawing import (
     plt,
     species_colours,
     species_legend,
+    titled,
 )
-from ricochet.script import command_line, launch, measured, one_of, read_all, report
+from ricochet.driven import cluster, demon_law, fuller, height, noise_law, share, temperature
+from ricochet.script import command_line, launch, measured, one_of, report
 from ricochet.statistics import Estimate, estimate, windows
-from ricochet.structure import largest_cluster
-from ricochet.thermodynamics import equal_disks, packing
 
 import numpy as np
 
-GAP = 0.1  # of a cluster, in mean diameters
 MOST_PICTURES = 3
 POINTS = 60  # of a curve
 HEIGHT = 4.5  # of a picture in inches
-Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, '' for all of them
-
-
-class Quantity(NamedTuple):
-    """What a figure shows."""
-
-    label: str
-    curves: Callable[[Run], Curves]
-    law: Callable[[Run], float | None]  # what `late` should be; None where no law is known
-    late: Callable[[float], float] = float  # what is compared, from the mean of a curve
-
-
-def temperature(run: Run) -> Curves:
-    """At the observables."""
-    return {"": run.observable("all/temperature")}
-
-
-def noise_law(run: Run) -> float | None:
-    """The temperature at which noise and collisions balance."""
-    drive = run.parameters.get("drive", {})
-    alone = run.periodic.all() and not run.obstacles and not run.shear_rate
-    smooth = "angular_velocity" not in run.elements and run.restitution < 1
-    if not (alone and smooth and equal_disks(run)) or drive.get("species"):
-        return None
-    if drive.get("kind") != "noise":
-        return None
-    gas = packing(run), 2 * run.radius[0], run.mass[0]
-    return hard_disks.noise_temperature(float(drive["strength"]), run.restitution, *gas)
-
-
-def share(run: Run) -> Curves:
-    """Of the disks in the left half, at the frames."""
-    middle = run.lower[0] + run.edges[0] / 2
-    return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
-
-
-def fuller(mean: float) -> float:
-    """The share in the half that has more."""
-    return max(mean, 1 - mean)
-
-
-def demon_law(run: Run) -> float | None:
-    """The share in the fuller half that lasts; a wall from the floor up parts the halves."""
-    floor = run.parameters.get("side", {}).get("bottom", {})
-    middle = run.lower[0] + run.edges[0] / 2
-    parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
-    heights = [w[:, 1].max() for w in parting if np.isclose(w[:, 1].min(), run.lower[1])]
-    across, down = run.gravity
-    alike = equal_disks(run) and np.isfinite(run.restitution)
-    if floor.get("motion") != "sawtooth" or not heights or across != 0 or not alike:
-        return None
-    hole, diameter = float(heights[0] - run.lower[1]), 2 * run.radius[0]
-    layers = run.count * diameter / (run.edges[0] / 2 - diameter)
-    climb = max(0.0, -down) * hole / float(floor["velocity"]) ** 2
-    return theory.demon_share(climb, layers, run.restitution)
-
-
-def height(run: Run) -> Curves:
-    """Mean height above the floor of each species, at the frames."""
-    y = run.position[:][..., 1] - run.lower[1]
-    several = len(run.names) > 1
-    return {
-        kind.name * several: (run.time, y[:, kind.disks].mean(axis=1)) for kind in run.by_species
-    }
-
-
-def cluster(run: Run) -> Curves:
-    """Share of the disks in the largest cluster, at the frames."""
-    gap = GAP * 2 * float(run.radius.mean())
-    shares = [largest_cluster(run, frame, gap) / run.count for frame in range(run.frames)]
-    return {"": (run.time, np.array(shares))}
-
-
-def no_law(_: Run) -> None:
-    """Nothing is known."""
-
-
+#: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
-    "temperature": Quantity("T (reduced units)", temperature, noise_law),
-    "share": Quantity("share of the disks in the left half", share, demon_law, fuller),
-    "height": Quantity("mean height (reduced units)", height, no_law),
-    "cluster": Quantity("share of the disks in the largest cluster", cluster, no_law),
+    "temperature": ("T (reduced units)", temperature, noise_law, float),
+    "share": ("share of the disks in the left half", share, demon_law, fuller),
+    "height": ("mean height (reduced units)", height, lambda run: None, float),
+    "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, float),
 }
 
 
@@ -136,21 +55,6 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
         label = ", ".join(f"{name} = {numbers[name]:g}" for name in names if name in numbers)
         groups.setdefault(label, []).append(run)
     return groups
-
-
-def late_mean(time: np.ndarray, value: np.ndarray) -> float:
-    """Over the second half of the time."""
-    return float(np.mean(value[time >= (time[0] + time[-1]) / 2]))
-
-
-def labelled(groups: dict[str, list[Run]], shown: Quantity) -> dict[tuple[str, str], list]:
-    """(time, value) of each run, by input and species."""
-    found: dict[tuple[str, str], list] = {}
-    for name, runs in groups.items():
-        for run in runs:
-            for species, curve in shown.curves(run).items():
-                found.setdefault((name, species), []).append(curve)
-    return found
 
 
 def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict) -> None:
@@ -168,66 +72,57 @@ def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict)
     axes.legend()
 
 
-def draw(groups: dict[str, list[Run]], shown: Quantity, tracks: dict) -> plt.Figure:
+def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> plt.Figure:
     """The curves, and pictures."""
-    first = {name: runs[0] for name, runs in groups.items()}
-    pictures = [(run, -1, name) for name, run in first.items()][:MOST_PICTURES]
-    if len(first) == 1:
-        pictures = [(run, frame, "") for run in first.values() for frame in (0, -1)]
-    run = next(iter(first.values()))
-    width = HEIGHT * min(1.0, run.edges[0] / run.edges[1])
+    runs = [run for own in groups.values() for run in own]
+    pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
+    if len(groups) == 1:
+        pictures = [(runs[0], frame, "") for frame in (0, -1)]
+    width = HEIGHT * min(1.0, runs[0].edges[0] / runs[0].edges[1])
     figure, (axes, *panels) = plt.subplots(
         1,
         1 + len(pictures),
         figsize=(1.5 * HEIGHT + width * len(pictures) + 1, HEIGHT + 1),
         width_ratios=[1.5 * HEIGHT, *[width] * len(pictures)],
     )
-    laws = {}
-    for name, one in first.items():
-        law = shown.law(one)
-        laws[name] = set() if law is None else {law, 1 - law} if shown.late is fuller else {law}
     draw_curves(axes, tracks, laws)
-    axes.set_ylabel(shown.label)
+    axes.set_ylabel(label)
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         draw_box(panel, run)
         disk_collection(panel, run, run.position[frame], facecolors=species_colours(run))
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
     if not any(species for _, species in tracks):  # else the curves name them, in their colours
-        species_legend(figure, run)
-    title = str(run.parameter("run", "title", ""))
-    everything = [run for runs in groups.values() for run in runs]
-    figure.suptitle("\n".join(filter(None, (title, caption(everything)))), fontsize=10)
+        species_legend(figure, runs[0])
+    figure.suptitle(titled(runs))
     return figure
-
-
-def table(groups: dict[str, list[Run]], shown: Quantity, tracks: dict) -> list[dict]:
-    """A row for each input and species: the mean of the second half, and what it should be."""
-    rows = []
-    for (name, species), curves in tracks.items():
-        late = estimate([shown.late(late_mean(*curve)) for curve in curves])
-        law = shown.law(groups[name][0])
-        row = {"input": name or None, "species": species or None, "runs": len(curves)}
-        row |= {**measured("late", late), "theory": law}
-        rows.append(row | measured("ratio", law and Estimate(late.mean / law, late.error / law)))
-    return rows
 
 
 def main() -> None:
     parser = command_line(__doc__, "driven.png")
-    known = one_of(*QUANTITIES)
-    choices = ", ".join(QUANTITIES)
-    parser.add_argument(
-        "--show", type=known, default="temperature", metavar="WHAT", help=f"{choices} [temperature]"
-    )
+    known, words = one_of(*QUANTITIES), f"{', '.join(QUANTITIES)} [temperature]"
+    parser.add_argument("--show", type=known, default="temperature", metavar="WHAT", help=words)
     args = parser.parse_args()
-    runs = read_all(args.runs)
-    for run in runs:
+    for run in args.runs:
         if run.frames < 2 or not run.time[-1] > run.time[0]:
             raise RunError(f"{run.path}: has one frame; it takes two")
-    groups, shown = by_input(runs), QUANTITIES[args.show]
-    tracks = labelled(groups, shown)
-    rows = table(groups, shown, tracks)
-    report(args, runs, f"Driven disks: {args.show}", draw(groups, shown, tracks), rows)
+    label, curves_of, law_of, compared = QUANTITIES[args.show]
+    groups, tracks, rows = by_input(args.runs), {}, []
+    for name, runs in groups.items():
+        for run in runs:
+            for species, curve in curves_of(run).items():
+                tracks.setdefault((name, species), []).append(curve)
+    expected = {name: law_of(runs[0]) for name, runs in groups.items()}
+    for (name, species), curves in tracks.items():
+        late = [value[time >= (time[0] + time[-1]) / 2] for time, value in curves]
+        late, law = estimate([compared(float(np.mean(half))) for half in late]), expected[name]
+        row = {"input": name or None, "species": species or None, "runs": len(curves)}
+        row |= {**measured("late", late), "theory": law}
+        rows.append(row | measured("ratio", law and Estimate(late.mean / law, late.error / law)))
+    laws = {
+        name: set() if law is None else {law, 1 - law} if compared is fuller else {law}
+        for name, law in expected.items()
+    }
+    report(args, draw(groups, tracks, laws, label), rows)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ the standard deviation from that line; and the largest change.
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, colours, plt
-from ricochet.script import command_line, launch, read_all, report
+from ricochet.script import command_line, launch, report
 
 import numpy as np
 
@@ -30,12 +30,6 @@ def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
     if len(time) < 2:
         raise RunError(f"{run.path}: has one sample of the energies so far; nothing has changed")
     return time, energy / energy[0] - 1
-
-
-def drift_and_spread(time: np.ndarray, change: np.ndarray) -> tuple[float, float]:
-    """Rise of the straight line through a series from its first to its last time; scatter."""
-    line = np.polynomial.Polynomial.fit(time, change, 1)
-    return float(line(time[-1]) - line(time[0])), float(np.std(change - line(time)))
 
 
 def means_of_windows(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -82,29 +76,18 @@ def draw(runs: list[Run]) -> plt.Figure:
     return figure
 
 
-def table(runs: list[Run]) -> list[dict]:
-    """A row per run."""
-    rows = []
-    for run in runs:
-        time, change = total_change(run)
-        drift, spread = drift_and_spread(time, change)
-        rows.append(
-            {
-                "run": run.path.name,
-                "method": method(run),
-                "total_energy": float(run.observable("total_energy").value[0]),
-                "drift": drift,
-                "spread": spread,
-                "largest_change": float(np.abs(change).max()),
-            }
-        )
-    return rows
-
-
 def main() -> None:
     args = command_line(__doc__, "energy.png").parse_args()
-    runs = read_all(args.runs)
-    report(args, runs, "Energy", draw(runs), table(runs))
+    rows = []
+    for run in args.runs:
+        time, change = total_change(run)
+        line = np.polynomial.Polynomial.fit(time, change, 1)
+        row = {"run": run.path.name, "method": method(run)}
+        row |= {"total_energy": float(run.observable("total_energy").value[0])}
+        row |= {"drift": float(line(time[-1]) - line(time[0]))}
+        row |= {"spread": float(np.std(change - line(time)))}
+        rows.append(row | {"largest_change": float(np.abs(change).max())})
+    report(args, draw(args.runs), rows)
 
 
 if __name__ == "__main__":

@@ -13,77 +13,50 @@ left out for others.
 
 from ricochet import Run, RunError, hard_disks
 from ricochet.drawing import COLOURS, caption, plt
-from ricochet.script import columns, command_line, grouped, launch, measured, read_all, report
-from ricochet.statistics import SeriesMean, combined, doubts
-from ricochet.thermodynamics import packing, z_rate, z_virial, z_wall
+from ricochet.script import by_packing, columns, command_line, launch, measured, over_runs, report
+from ricochet.statistics import combined
+from ricochet.thermodynamics import z_ways
 
 import numpy as np
 
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
-def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Z by virial, rate, walls, where they apply."""
-    if run.gravity.any():
-        raise RunError(f"{run.path}: falls, it has no equation of state")
-    equal = np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0
-    empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
-    walled = empty and np.ptp(run.radius) == 0
-    ways = {"virial": (z_virial, True), "rate": (z_rate, equal), "walls": (z_wall, walled)}
-    return {name: way(run, skip) for name, (way, applies) in ways.items() if applies}
-
-
-def reference(eta: float, count: int, periodic: bool) -> float:
-    """What simulations of others found: fluid to 0.65, crystal beyond 0.72; NaN between."""
-    if eta <= 0.5:
-        return float(
-            hard_disks.simulated_finite(eta, count) if periodic else hard_disks.simulated(eta)
-        )
-    return float(hard_disks.crystal(eta, count) if eta >= 0.72 else hard_disks.simulated(eta))
-
-
 def one_radius(runs: list[Run]) -> bool:
     """Whether the curves apply: to all runs, or to none."""
     equal = [bool(np.ptp(run.radius) == 0) for run in runs]
-    for run, own in zip(runs, equal, strict=True):
-        if own != equal[0]:
-            raise RunError(f"{run.path}: not of one radius, or of several, as {runs[0].path} is")
+    if len(set(equal)) > 1:
+        other = runs[equal.index(not equal[0])].path
+        raise RunError(f"{other}: not of one radius, or of several, as {runs[0].path} is")
     return equal[0]
 
 
-def table(
-    groups: list[tuple[float, list[Run]]], skip: float | None
-) -> tuple[list[dict], list[str]]:
+def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """A row per packing fraction, empty where a way does not apply; and what speaks against it."""
-    rows, notes = [], []
-    for eta, runs in groups:
-        row = {"packing": eta, "runs": len(runs)}
-        found = [pressures(run, skip) for run in runs]
-        for name in WAYS:
-            members = [one[name] for one in found if name in one]
-            row |= measured(f"Z_{name}", combined(members) if len(members) == len(runs) else None)
-            notes += doubts(f"η = {eta:g}, {WAYS[name]}", members) if members else []
+    rows, notes, known = [], [], one_radius(runs)
+    for eta, same in by_packing(runs):
+        row = {"packing": eta, "runs": len(same)}
+        found = [z_ways(run, skip) for run in same]
+        for name, way in WAYS.items():
+            members, about = [one[name] for one in found if name in one], f"η = {eta:g}, {way}"
+            cells = over_runs(f"Z_{name}", members, notes, about) if members else {}
+            row |= cells if len(members) == len(same) else measured(f"Z_{name}", None)
         row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
-        periodic = bool(runs[0].periodic.all())
-        expected = reference(eta, runs[0].count, periodic) if one_radius(runs) else np.nan
-        rows.append(row | {"Z_reference": expected if np.isfinite(expected) else None})
+        z = hard_disks.published(eta, same[0].count, bool(same[0].periodic.all()))
+        rows.append(row | {"Z_reference": z if known and np.isfinite(z) else None})
     return rows, notes
 
 
 def draw_curves(above: plt.Axes, below: plt.Axes) -> None:
     """Published equations of state, and the deviation of one of them from the reference."""
     fluid, solid = np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
+    published = hard_disks.simulated(fluid)
+    label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
     above.plot(fluid, hard_disks.henderson(fluid), color="0.6", label="Henderson 1975")
-    above.plot(
-        fluid, hard_disks.simulated(fluid), color="black", lw=1,
-        label="Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985",
-    )  # fmt: skip
-    above.plot(
-        solid, hard_disks.crystal(solid), color="black", lw=1, ls="--",
-        label="crystal, Alder, Hoover and Young 1968",
-    )  # fmt: skip
-    henderson = 100 * (hard_disks.henderson(fluid) / hard_disks.simulated(fluid) - 1)
-    below.plot(fluid, henderson, color="0.6")
+    above.plot(fluid, published, color="black", lw=1, label=label)
+    label = "crystal, Alder, Hoover and Young 1968"
+    above.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
+    below.plot(fluid, 100 * (hard_disks.henderson(fluid) / published - 1), color="0.6")
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
@@ -99,31 +72,23 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):
         z, error = found[f"Z_{name}"], found[f"Z_{name}_error"]
-        if np.isnan(z).all():
-            continue
-        style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6}
-        above.errorbar(eta, z, error, label=f"by {way}", **style)
-        below.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
+        if not np.isnan(z).all():
+            style = {"ls": "", "marker": marker, "mfc": "none", "color": colour, "ms": 6}
+            above.errorbar(eta, z, error, label=f"by {way}", **style)
+            below.errorbar(eta, 100 * (z / expected - 1), 100 * error / expected, **style)
     below.axhline(0, color="black", lw=1, zorder=0)
-    largest = np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
-    below.set(
-        xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-3 * largest, 3 * largest)
-    )
-    above.set(
-        yscale="log", ylabel="$Z = P\\,/\\,(n\\,kT)$", ylim=(0.9, None),
-        title=caption(runs), xlim=(0, 0.05 + max(eta)),
-    )  # fmt: skip
+    largest = 3 * np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
+    below.set(xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-largest, largest))
+    above.set(yscale="log", ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(eta)))
+    above.set(ylim=(0.9, None), title=caption(runs))
     above.legend()
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "equation_of_state.png", skip=None).parse_args()
-    runs = read_all(args.runs)
-    one_radius(runs)  # refuses a mixture among others
-    rows, notes = table(grouped(runs, lambda run: round(packing(run), 6)), args.skip)
-    title = "Equation of state of hard disks"
-    report(args, runs, title, draw(rows, runs), rows, notes=notes)
+    rows, notes = table(args.runs, args.skip)
+    report(args, draw(rows, args.runs), rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ricochet import Run
 from ricochet.drawing import caption, colours, plt
-from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.script import command_line, grouped, launch, measured, report
 from ricochet.statistics import Estimate, estimate, windows
 from ricochet.thermodynamics import lightest_and_heaviest, start_of_equilibrium
 
@@ -56,16 +56,6 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     return Approach(time, light, heavy, gap, thermalisation_time(time, gap, within))
 
 
-def doubt(gap: Estimate, within: float) -> str:
-    """Why two energies do not agree."""
-    known = 2 * np.median(gap.error) <= within
-    return (
-        f"the energies never agree within {100 * within:g} %"
-        if known
-        else f"the difference of the energies is not known to {100 * within:g} %, take more runs"
-    )
-
-
 def late_energy(runs: list[Run], which: int, skip: float | None) -> Estimate:
     """Mean over runs of K in equilibrium; 0 the lightest, 1 the heaviest."""
     means = []
@@ -74,26 +64,6 @@ def late_energy(runs: list[Run], which: int, skip: float | None) -> Estimate:
         time, value = run.observable(f"{name}/kinetic_energy")
         means.append(value[time >= start_of_equilibrium(run, skip)].mean())
     return estimate(means)
-
-
-def energy_per_disk(runs: list[Run]) -> Estimate:
-    """Total energy at the start over the number of disks."""
-    return estimate([run.observable("total_energy").value[0] / run.count for run in runs])
-
-
-def table(groups: list, results: list[Approach], skip: float | None) -> list[dict]:
-    """A row per v0."""
-    return [
-        {
-            "v0": v0,
-            "runs": len(runs),
-            "T_therm": result.thermalisation,
-            **measured("energy", energy_per_disk(runs)),
-            **measured("K_light", late_energy(runs, 0, skip)),
-            **measured("K_heavy", late_energy(runs, 1, skip)),
-        }
-        for (v0, runs), result in zip(groups, results, strict=True)
-    ]
 
 
 def start_width(run: Run) -> float:
@@ -107,22 +77,16 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
     figure, panels = plt.subplots(
         len(groups), 1, sharex=True, squeeze=False, figsize=(8, 1.2 + 2.1 * len(groups))
     )
-    names = groups[0][1][0].names
-    order, shades = lightest_and_heaviest(groups[0][1][0]), colours(len(names))
-    for axes, (v0, runs), result in zip(panels.flat, groups, results, strict=True):
-        for k, energy in zip(order, (result.light, result.heavy), strict=True):
-            axes.errorbar(
-                result.time, energy.mean, energy.error, color=shades[k], marker=".", label=names[k]
-            )
-        if np.isfinite(result.thermalisation):
-            axes.axvline(
-                result.thermalisation,
-                color="0.5",
-                ls="--",
-                lw=1,
-                label=f"means differ by less than {100 * within:g} % "
-                f"for three windows from t = {result.thermalisation:.3g}",
-            )
+    first = groups[0][1][0]
+    order, shades = lightest_and_heaviest(first), colours(len(first.names))
+    for axes, (v0, runs), found in zip(panels.flat, groups, results, strict=True):
+        for k, energy in zip(order, (found.light, found.heavy), strict=True):
+            style = {"color": shades[k], "marker": ".", "label": first.names[k]}
+            axes.errorbar(found.time, *energy, **style)
+        if np.isfinite(found.thermalisation):
+            label = f"means differ by less than {100 * within:g} % for three windows from t = "
+            label += f"{found.thermalisation:.3g}"
+            axes.axvline(found.thermalisation, color="0.5", ls="--", lw=1, label=label)
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)
         axes.legend(ncols=3, loc="lower right")
@@ -136,17 +100,21 @@ def main() -> None:
     parser.add_argument("--within", type=float, default=0.1, help="relative difference [0.1]")
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
     args = parser.parse_args()
-    runs = read_all(args.runs)
-    groups = grouped(runs, start_width)
-    results = [approach(members, args.window, args.within) for _, members in groups]
+    groups, rows, notes = grouped(args.runs, start_width), [], []
+    results = [approach(runs, args.window, args.within) for _, runs in groups]
+    for (v0, runs), found in zip(groups, results, strict=True):
+        energy = [run.observable("total_energy").value[0] / run.count for run in runs]
+        row = {"v0": v0, "runs": len(runs), "T_therm": found.thermalisation}
+        row |= measured("energy", estimate(energy))
+        row |= measured("K_light", late_energy(runs, 0, args.skip))
+        rows.append(row | measured("K_heavy", late_energy(runs, 1, args.skip)))
+        if np.isnan(found.thermalisation):
+            known, share = 2 * np.median(found.gap.error) <= args.within, f"{100 * args.within:g} %"
+            why = f"the difference of the energies is not known to {share}, take more runs"
+            why = f"the energies never agree within {share}" if known else why
+            notes.append(f"v0 = {v0:g}: no T_therm; {why}")
     figure = draw(groups, results, args.until, args.within)
-    never = [
-        f"v0 = {v0:g}: no T_therm; {doubt(found.gap, args.within)}"
-        for (v0, _), found in zip(groups, results, strict=True)
-        if np.isnan(found.thermalisation)
-    ]
-    rows = table(groups, results, args.skip)
-    report(args, runs, "Equipartition under gravity", figure, rows, notes=never)
+    report(args, figure, rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -8,29 +8,24 @@ carries velocity, radius, mass, whatever else the disks have (such as their orie
 and the time.  Numbers keep all their digits.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 
-from ricochet import Run, RunError, read_run
+from ricochet import Run, RunError
 from ricochet.files import destination
 from ricochet.script import chosen_frames, command_line, launch, report
 
 from tqdm import tqdm
 
+HEAD = "time,id,species,x,y,vx,vy,radius,mass"
 PROPERTIES = "species:S:1:pos:R:2:velo:R:2:radius:R:1:mass:R:1"
 
 
-def disks(run: Run, frame: int) -> Iterator[tuple]:
-    """Species, x, y, vx, vy, radius, mass, and the elements of each disk."""
-    return zip(
-        (run.names[s - 1] for s in run.species),
-        *run.position[frame].T.tolist(),
-        *run.velocity[frame].T.tolist(),
-        run.radius.tolist(),
-        run.mass.tolist(),
-        *(own[frame].tolist() for own in run.elements.values()),
-        strict=True,
-    )
+def rows(run: Run, frame: int) -> list[list[str]]:
+    """Species, x, y, vx, vy, radius, mass, and the elements of each disk, as words."""
+    species = [run.names[s - 1] for s in run.species]
+    moving = [*run.position[frame].T, *run.velocity[frame].T, run.radius, run.mass]
+    columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.elements.values()))]
+    return [list(map(str, disk)) for disk in zip(species, *columns, strict=True)]
 
 
 def xyz_frame(run: Run, frame: int) -> str:
@@ -43,40 +38,35 @@ def xyz_frame(run: Run, frame: int) -> str:
         f"Time={run.time[frame]} Properties={properties}"
     )
     lines = [
-        " ".join(map(str, (species.replace(" ", "_"), *numbers, k)))
-        for k, (species, *numbers) in enumerate(disks(run, frame), start=1)
+        " ".join((species.replace(" ", "_"), *numbers, str(k)))
+        for k, (species, *numbers) in enumerate(rows(run, frame), start=1)
     ]
     return "\n".join([str(run.count), head, *lines, ""])
 
 
 def csv_frame(run: Run, frame: int) -> str:
     """One frame as comma-separated lines."""
+    time = str(run.time[frame])
     return "".join(
-        ",".join(map(str, (run.time[frame], k, *disk))) + "\n"
-        for k, disk in enumerate(disks(run, frame), start=1)
+        ",".join((time, str(k), *disk)) + "\n" for k, disk in enumerate(rows(run, frame), start=1)
     )
-
-
-def exported(run: Run, suffix: str, frames: list[int]) -> Iterator[str]:
-    """The text of the whole file, piece by piece."""
-    if suffix == ".csv":
-        yield ",".join(["time,id,species,x,y,vx,vy,radius,mass", *run.elements]) + "\n"
-    one = csv_frame if suffix == ".csv" else xyz_frame
-    for frame in tqdm(frames, unit="frame", desc="export", disable=None):
-        yield one(run, frame)
 
 
 def main() -> None:
     parser = command_line(__doc__, "RUN.xyz", one=True, csv=False, frames=None, count=None)
     args = parser.parse_args()
-    run = read_run(args.run)
+    (run,) = args.runs
     path = args.output or Path(run.path.name).with_suffix(".xyz")
     if path.suffix not in (".xyz", ".csv"):
         raise RunError(f"{path}: export ends in .xyz or .csv")
     frames = chosen_frames(run, args.frames, args.count)
+    one = csv_frame if path.suffix == ".csv" else xyz_frame
     with destination(path).open("w") as file:
-        file.writelines(exported(run, path.suffix, frames))
-    report(args, [run], "Export", None, [{"export": path, "frames": len(frames), "of": run.frames}])
+        if path.suffix == ".csv":
+            file.write(",".join([HEAD, *run.elements]) + "\n")
+        for frame in tqdm(frames, unit="frame", desc="export", disable=None):
+            file.write(one(run, frame))
+    report(args, None, [{"export": path, "frames": len(frames), "of": run.frames}])
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ their errors come from ten blocks of time.
 
 from typing import NamedTuple
 
-from ricochet import Run, RunError, read_run, thermodynamics
+from ricochet import Run, RunError, thermodynamics
 from ricochet.drawing import bars, caption, colours, plt
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
@@ -55,12 +55,6 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
         return float("nan")
     middle = (edges[1:] + edges[:-1]) / 2
     return -float(np.polyfit(middle[good], np.log(counts[good]), 1, w=np.sqrt(counts[good]))[0])
-
-
-def slope_estimate(values: np.ndarray, limits: tuple[float, float]) -> Estimate:
-    """Slope of all values with an error from blocks of time."""
-    parts = [log_slope(part, limits) for part in np.array_split(values, BLOCKS)]
-    return Estimate(log_slope(values, limits), estimate(parts).error)
 
 
 def sharing(energy: np.ndarray, temperature: float, count: int) -> np.ndarray:
@@ -115,29 +109,25 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
 
 def table(run: Run, species: list[Samples], temperature: float) -> list[dict]:
     """Fitted slopes over those of the exponential laws, and the same for the dashed laws."""
-    g = float(np.abs(run.gravity[1]))
     grid, crowded = heights(run, species, temperature)
     rows = []
     for name, s, density in zip(run.names, species, crowded, strict=True):
-        v_law, h_law = s.mass / (2 * temperature), s.mass * g / temperature
-        v_limits = tuple(np.array(SPEED_RANGE) / v_law)
-        h_limits = tuple(np.array(HEIGHT_RANGE) / h_law)
-        speed, height = slope_estimate(s.square, v_limits), slope_estimate(s.height, h_limits)
+        v_law, h_law = s.mass / (2 * temperature), s.mass * np.abs(run.gravity[1]) / temperature
         squares = np.linspace(0, 20 / v_law, 4001)
         shared = sharing(0.5 * s.mass * squares, temperature, run.count)
-        rows.append(
-            {
-                "species": name,
-                "mass": s.mass,
-                "kT": temperature,
-                "K": float(0.5 * s.mass * s.square.mean()),
-                "K_x": float(0.5 * s.mass * s.square_x.mean()),
-                **measured("speed_slope", Estimate(speed.mean / v_law, speed.error / v_law)),
-                "speed_shared": law_slope(squares, shared, v_limits, s.square.size) / v_law,
-                **measured("height_slope", Estimate(height.mean / h_law, height.error / h_law)),
-                "height_crowded": law_slope(grid, density, h_limits, s.height.size) / h_law,
-            }
-        )
+        row = {"species": name, "mass": s.mass, "kT": temperature}
+        row |= {"K": float(0.5 * s.mass * s.square.mean())}
+        row |= {"K_x": float(0.5 * s.mass * s.square_x.mean())}
+        for kind, other, law, values, reach, x, weight in (
+            ("speed", "shared", v_law, s.square, SPEED_RANGE, squares, shared),
+            ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density),
+        ):
+            limits = tuple(np.array(reach) / law)
+            error = estimate([log_slope(part, limits) for part in np.array_split(values, BLOCKS)])
+            slope = Estimate(log_slope(values, limits) / law, error.error / law)
+            row |= measured(f"{kind}_slope", slope)
+            row[f"{kind}_{other}"] = law_slope(x, weight, limits, values.size) / law
+        rows.append(row)
     return rows
 
 
@@ -151,37 +141,32 @@ def draw_histogram(panels, values: np.ndarray, top: float, colour: str, label: s
         bars(axes, height, bins, color=colour, fill=True, alpha=0.3, label=label)
 
 
-def draw_laws(panels, x: np.ndarray, solid: np.ndarray, dashed: np.ndarray, colour: str) -> None:
-    """Exponential law and the one for disks of finite number and size."""
-    for axes in panels:
-        axes.plot(x, solid, color=colour, lw=1.4)
-        axes.plot(x, dashed, color="black", lw=1.0, ls="--")
-
-
-def slopes(run: Run, result: list[dict], kind: str, other: str) -> list[str]:
-    """Labels: fitted over exponential slope."""
-    return [
-        f"{species.label}: {row[f'{kind}_slope']:.3f} ± {row[f'{kind}_slope_error']:.3f}"
-        f" (dashed: {row[f'{kind}_{other}']:.3f})"
-        for species, row in zip(run.by_species, result, strict=True)
-    ]
-
-
 def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> plt.Figure:
     """Squared speeds above, heights below; linear left, logarithmic right."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
     grid, crowded = heights(run, species, kt)
-    v_labels = slopes(run, result, "speed", "shared")
-    h_labels = slopes(run, result, "height", "crowded")
-    for k, (s, colour) in enumerate(zip(species, colours(len(species)), strict=True)):
+    for k, (s, row, colour) in enumerate(zip(species, result, colours(len(species)), strict=True)):
         v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
-        draw_histogram(panels[0], s.square, squares[-1], colour, v_labels[k])
         shared = sharing(0.5 * s.mass * squares, kt, run.count) * v_law * (1 - 0.5 / run.count)
-        draw_laws(panels[0], squares, v_law * np.exp(-v_law * squares), shared, colour)
-        draw_histogram(panels[1], s.height, grid[-1], colour, h_labels[k])
-        draw_laws(panels[1], grid, normalised(grid, np.exp(-h_law * grid)), crowded[k], colour)
+        laws = (v_law * np.exp(-v_law * squares), normalised(grid, np.exp(-h_law * grid)))
+        for axes, x, values, law, dashed, kind, other in zip(
+            panels,
+            (squares, grid),
+            (s.square, s.height),
+            laws,
+            (shared, crowded[k]),
+            ("speed", "height"),
+            ("shared", "crowded"),
+            strict=True,
+        ):
+            fitted = f"{row[f'{kind}_slope']:.3f} ± {row[f'{kind}_slope_error']:.3f}"
+            label = f"{run.by_species[k].label}: {fitted} (dashed: {row[f'{kind}_{other}']:.3f})"
+            draw_histogram(axes, values, x[-1], colour, label)
+            for one in axes:
+                one.plot(x, law, color=colour, lw=1.4)
+                one.plot(x, dashed, color="black", lw=1.0, ls="--")
     titles = (
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
         "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
@@ -198,23 +183,21 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
         axes.set_xlabel("$v^2$ (reduced units)")
     for axes in panels[1]:
         axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
-    figure.suptitle(
-        f"{caption([run])},  t = {start:.4g} to {run.time[-1]:g},  kT = {kt:.4f}", fontsize=10
-    )
+    when = f"t = {start:.4g} to {run.time[-1]:g}"
+    figure.suptitle(f"{caption([run])},  {when},  kT = {kt:.4f}")
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
-    run = read_run(args.run)
+    (run,) = args.runs
     start = thermodynamics.start_of_equilibrium(run, args.skip)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
     result = table(run, species, thermodynamics.temperature(run, frames))
-    figure = draw(run, species, result, run.time[frames[0]])
-    report(args, [run], "Gas under gravity", figure, result)
+    report(args, draw(run, species, result, run.time[frames[0]]), result)
 
 
 if __name__ == "__main__":

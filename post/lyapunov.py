@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
-from ricochet.script import command_line, launch, measured, read_all, report
+from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
 
 import numpy as np
@@ -84,18 +84,16 @@ def main() -> None:
         "--fit-from", type=float, default=0.2, metavar="SHARE", help="of the time [0.2]"
     )
     args = parser.parse_args()
-    runs = read_all(args.runs)
-    if len(runs) % 2:
-        raise RunError(f"{len(runs)} runs: not pairs")
-    apart = [distance(*pair) for pair in zip(runs[::2], runs[1::2], strict=True)]
+    if len(args.runs) % 2:
+        raise RunError(f"{len(args.runs)} runs: not pairs")
+    apart = [distance(*pair) for pair in zip(args.runs[::2], args.runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])
-    found = divergence(runs[0].time[:frames], apart, args.largest, args.fit_from)
+    found = divergence(args.runs[0].time[:frames], apart, args.largest, args.fit_from)
     row = {"pairs": len(found.slope), "from": found.begin, "to": found.end}
     row |= measured("lyapunov_exponent", found.exponent)
     tracks = {f"pair_{k + 1}": track for k, track in enumerate(apart)}
-    title = "Divergence of neighbouring trajectories"
-    report(args, runs, title, draw(found), [row], data={"time": found.time, **tracks})
+    report(args, draw(found), [row], data={"time": found.time, **tracks})
 
 
 if __name__ == "__main__":

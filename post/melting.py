@@ -13,22 +13,22 @@ warnings.
 from ricochet import Run, RunError
 from ricochet.drawing import caption, colours, plt
 from ricochet.hard_disks import MELTING
-from ricochet.script import command_line, grouped, launch, measured, read_all, report
-from ricochet.statistics import combined, doubts
-from ricochet.thermodynamics import equal_disks, packing, z_virial
+from ricochet.script import by_packing, command_line, grouped, launch, over_runs, report
+from ricochet.statistics import combined
+from ricochet.thermodynamics import equal_disks, z_virial
 
 import numpy as np
 
 
-def table(groups: list, skip: float | None) -> tuple[list[dict], list[str]]:
+def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """A row per number of disks and packing fraction; and what speaks against it."""
     rows, notes = [], []
-    for (count, eta), runs in groups:
-        members = [z_virial(run, skip).scaled(4 * eta / np.pi) for run in runs]
-        whole = combined(members)
-        row = {"N": count, "packing": eta, "runs": len(runs), **measured("P", whole)}
-        rows.append(row | {"samples": round(whole.samples, 1)})
-        notes += doubts(f"N = {count}, η = {eta:g}", members)
+    for count, own in grouped(runs, lambda run: run.count):
+        for eta, same in by_packing(own):
+            members = [z_virial(run, skip).scaled(4 * eta / np.pi) for run in same]
+            row = {"N": count, "packing": eta, "runs": len(same)}
+            row |= over_runs("P", members, notes, f"N = {count}, η = {eta:g}")
+            rows.append(row | {"samples": round(combined(members).samples, 1)})
     return rows, notes
 
 
@@ -41,22 +41,19 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     for (count, own), colour in zip(sizes, colours(len(sizes)), strict=True):
         x, y, error = ([row[name] for row in own] for name in ("packing", "P", "P_error"))
         axes.errorbar(x, y, error, marker="o", lw=0.8, color=colour, label=f"N = {count}")
-    axes.set(
-        xlabel="packing fraction $\\eta$", ylabel="$P^* = P\\,d^2\\,/\\,kT$", title=caption(runs)
-    )
+    axes.set(xlabel="packing fraction $\\eta$", ylabel="$P^* = P\\,d^2\\,/\\,kT$")
+    axes.set_title(caption(runs))
     axes.legend()
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "melting.png", skip=None).parse_args()
-    runs = read_all(args.runs)
-    for run in runs:
+    for run in args.runs:
         if not run.periodic.all() or run.gravity.any() or not equal_disks(run):
             raise RunError(f"{run.path}: needs equal disks in a periodic box without gravity")
-    groups = grouped(runs, lambda run: (run.count, round(packing(run), 6)))
-    rows, notes = table(groups, args.skip)
-    report(args, runs, "Melting of hard disks", draw(rows, runs), rows, notes=notes)
+    rows, notes = table(args.runs, args.skip)
+    report(args, draw(rows, args.runs), rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -22,28 +22,16 @@ are their scale heights.
 
 from itertools import combinations_with_replacement
 from math import comb
-from typing import NamedTuple
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
-from ricochet.script import command_line, grouped, launch, measured, read_all, report
+from ricochet.script import command_line, grouped, launch, measured, report
 from ricochet.statistics import Estimate, estimate
 from ricochet.thermodynamics import free_disks, kinds_of_disks, start_of_equilibrium
 
 import numpy as np
 
 SPEEDS = np.linspace(0, 12, 2001)  # in units of sqrt(kT / mu)
-
-
-class Missed(NamedTuple):
-    """Of all runs with one step."""
-
-    dt: float
-    runs: int
-    temperature: float
-    rate: Estimate  # pair collisions per disk and time
-    share: Estimate  # 1 - rate by steps / rate by events
-    expected: float
 
 
 def missed_share(q: np.ndarray) -> np.ndarray:
@@ -57,13 +45,6 @@ def missed_share(q: np.ndarray) -> np.ndarray:
     return np.where(q < 1e-3, q**2 / 6, share)
 
 
-def missed_by_pair(step: float, temperature: float, reduced: float, diameter: float) -> float:
-    """P averaged over the colliding pairs of one kind in equilibrium."""
-    weight = SPEEDS**2 * np.exp(-(SPEEDS**2) / 2)
-    q = np.sqrt(temperature / reduced) * SPEEDS * step / diameter
-    return float(np.average(missed_share(q), weights=weight))
-
-
 def expected_share(run: Run, step: float, temperature: float) -> float:
     """P averaged over all kinds of pairs of a dilute gas in equilibrium, by their rates."""
     shares, rates = [], []
@@ -73,7 +54,8 @@ def expected_share(run: Run, step: float, temperature: float) -> float:
         pairs = comb(a.disks.sum(), 2) if a is b else a.disks.sum() * b.disks.sum()
         height = temperature / pull * (1 / a.mass + 1 / b.mass) if pull else 1.0
         rates.append(pairs * diameter / np.sqrt(reduced) / height)
-        shares.append(missed_by_pair(step, temperature, reduced, diameter))
+        q = np.sqrt(temperature / reduced) * SPEEDS * step / diameter
+        shares.append(np.average(missed_share(q), weights=SPEEDS**2 * np.exp(-(SPEEDS**2) / 2)))
     return float(np.average(shares, weights=rates))
 
 
@@ -88,14 +70,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
     return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(kt)
 
 
-def unpaired(runs: list[Run]) -> list[Run]:
-    """Runs by time steps whose seed no event-driven run has."""
-    seeds = {run.seed for run in runs if run.time_step == 0}
-    return [run for run in runs if run.seed not in seeds]
-
-
-def compare(runs: list[Run], skip: float | None) -> list[Missed]:
-    """A row per step; the event-driven runs come first, with dt = 0."""
+def compare(runs: list[Run], skip: float | None) -> list[dict]:
+    """A row per step, shares in percent; the event-driven runs come first, with dt = 0."""
     groups = grouped(runs, lambda run: run.time_step)
     if groups[0][0] != 0 or len(groups) < 2:
         raise RunError("event-driven runs and runs by time steps are needed")
@@ -106,59 +82,29 @@ def compare(runs: list[Run], skip: float | None) -> list[Missed]:
         if not pairs:
             raise RunError(f"no seed of dt = {step:g} has an event-driven run")
         rates, temperatures = np.array([rate_and_temperature(run, skip) for run in pairs]).T
-        share = 1 - rates / [exact[run.seed] for run in pairs]
+        share = estimate(1 - rates / [exact[run.seed] for run in pairs])
         kt = float(np.mean(temperatures))
-        expected = expected_share(pairs[0], step, kt)
-        rows.append(Missed(step, len(pairs), kt, estimate(rates), estimate(share), expected))
+        row = {"dt": step, "runs": len(pairs), "kT": kt, "rate": float(estimate(rates).mean)}
+        row |= measured("missed_percent", Estimate(*(100 * part for part in share)))
+        rows.append(row | {"expected_percent": 100 * expected_share(pairs[0], step, kt)})
     return rows
 
 
-def table(rows: list[Missed]) -> list[dict]:
-    """A row per step, shares in percent."""
-    return [
-        {
-            "dt": row.dt,
-            "runs": row.runs,
-            "kT": row.temperature,
-            "rate": float(row.rate.mean),
-            **measured("missed_percent", Estimate(100 * row.share.mean, 100 * row.share.error)),
-            "expected_percent": 100 * row.expected,
-        }
-        for row in rows
-    ]
-
-
-def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
+def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
     """The share that is missed against dt, measured and expected."""
     figure, axes = plt.subplots(figsize=(6.5, 4.5))
-    steps = rows[1:]
-    dt = np.array([row.dt for row in steps])
-    kt = float(np.mean([row.temperature for row in steps]))
+    names = ("dt", "missed_percent", "missed_percent_error")
+    dt, share, error = (np.array([row[name] for row in rows[1:]]) for name in names)
+    kt, size = float(np.mean([row["kT"] for row in rows[1:]])), rows[1]["runs"]
     curve = np.geomspace(dt.min() / 1.5, dt.max() * 1.5, 50)
-    axes.plot(
-        curve,
-        [100 * expected_share(runs[0], step, kt) for step in curve],
-        color="black",
-        lw=1.2,
-        label="expected: noticed only after the closest approach",
-    )
-    axes.errorbar(
-        dt,
-        [100 * row.share.mean for row in steps],
-        [100 * row.share.error for row in steps],
-        ls="",
-        marker="o",
-        color=COLOURS[0],
-        capsize=3,
-        label=f"measured, {steps[0].runs} pair{'s' * (steps[0].runs > 1)} of runs",
-    )
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="Δt (reduced units)",
-        ylabel="pair collisions missed [%]",
-        title=caption(runs),
-    )
+    expected = [100 * expected_share(runs[0], step, kt) for step in curve]
+    label = "expected: noticed only after the closest approach"
+    axes.plot(curve, expected, color="black", lw=1.2, label=label)
+    label = f"measured, {size} pair{'s' * (size > 1)} of runs"
+    style = {"ls": "", "marker": "o", "color": COLOURS[0], "capsize": 3, "label": label}
+    axes.errorbar(dt, share, error, **style)
+    axes.set(xscale="log", yscale="log", xlabel="Δt (reduced units)", title=caption(runs))
+    axes.set_ylabel("pair collisions missed [%]")
     axes.set_xticks(dt, [f"{step:g}" for step in dt], minor=False)
     axes.set_xticks([], minor=True)
     axes.legend(loc="upper left")
@@ -167,11 +113,11 @@ def draw(runs: list[Run], rows: list[Missed]) -> plt.Figure:
 
 def main() -> None:
     args = command_line(__doc__, "missed.png", skip=None).parse_args()
-    runs = read_all(args.runs)
-    rows = compare(runs, args.skip)
-    alone = ", ".join(str(run.path) for run in unpaired(runs))
+    rows = compare(args.runs, args.skip)
+    seeds = {run.seed for run in args.runs if run.time_step == 0}
+    alone = ", ".join(str(run.path) for run in args.runs if run.seed not in seeds)
     notes = [f"left out, as no event-driven run has their seeds: {alone}"] if alone else []
-    report(args, runs, "Missed collisions", draw(runs, rows), table(rows), notes=notes)
+    report(args, draw(args.runs, rows), rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -11,28 +11,19 @@ the share of the disk in the mass of all.
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, bars, caption, plt
-from ricochet.script import command_line, late_frames, launch, measured, read_all, report
-from ricochet.statistics import Estimate, binned, estimate, hold_against, series_mean
+from ricochet.script import command_line, late_frames, launch, measured, report
+from ricochet.speeds import means, speeds_of
+from ricochet.statistics import binned, hold_against
 from ricochet.theory import maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
 import numpy as np
 
 
-def means(run: Run, frames: list[int], name: str) -> np.ndarray:
-    """(F, 2) mean speed and mean kinetic energy of a species in each frame."""
-    mask = run.of_species(name)
-    return np.array(
-        [(run.speed(k)[mask].mean(), run.kinetic_energy(k)[mask].mean()) for k in frames]
-    )
-
-
-def over_members(members: list[np.ndarray]) -> Estimate:
-    """Mean and error over runs; over the frames of the only run, which remember each other."""
-    if len(members) > 1:
-        return estimate([m.mean(axis=0) for m in members])
-    means = [series_mean(column) for column in members[0].T]
-    return Estimate(*np.array([(one.mean, one.error) for one in means]).T)
+def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
+    """All speeds of a species in these frames."""
+    each = [speeds_of(run, own, name) for run, own in zip(runs, frames, strict=True)]
+    return np.concatenate(each)
 
 
 def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
@@ -40,38 +31,17 @@ def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
     rows = []
     for kind in kinds_of_disks(runs[0]):
         name, mass = kind.name, kind.mass
-        start = np.mean([means(run, [0], name)[0] for run in runs], axis=0)
-        late = over_members([means(r, f, name) for r, f in zip(runs, frames, strict=True)])
-        energy = float(np.mean([mean_energy(run, mass) for run in runs]))
-        u = pooled_speeds(runs, frames, name) * np.sqrt(mass / (2 * energy))
+        start = np.mean([np.ravel(means([run], [[0]], name)) for run in runs], axis=0)
+        speed, energy = means(runs, frames, name)
+        expected = float(np.mean([mean_energy(run, mass) for run in runs]))
+        u = pooled(runs, frames, name) * np.sqrt(mass / (2 * expected))
         test = hold_against(u, maxwell_cdf)
-        rows.append(
-            {
-                "species": name,
-                "mass": mass,
-                "v_start": float(start[0]),
-                "K_start": float(start[1]),
-                **measured("v", Estimate(late.mean[0], late.error[0])),
-                "v_theory": float(np.sqrt(np.pi * energy / (2 * mass))),
-                **measured("K", Estimate(late.mean[1], late.error[1])),
-                "K_theory": energy,
-                "speeds": test.n,
-                "KS_D": test.ks,
-                "KS_p": test.ks_p,
-            }
-        )
+        row = {"species": name, "mass": mass, "v_start": float(start[0])}
+        row |= {"K_start": float(start[2]), **measured("v", speed)}
+        row |= {"v_theory": float(np.sqrt(np.pi * expected / (2 * mass))), **measured("K", energy)}
+        row |= {"K_theory": expected, "speeds": test.n, "KS_D": test.ks, "KS_p": test.ks_p}
+        rows.append(row)
     return rows
-
-
-def pooled_speeds(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
-    """All speeds of a species in these frames."""
-    return np.concatenate(
-        [
-            run.speed(k)[run.of_species(name)]
-            for run, chosen in zip(runs, frames, strict=True)
-            for k in chosen
-        ]
-    )
 
 
 def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
@@ -80,58 +50,41 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
     figure, panels = plt.subplots(
         len(names), 2, sharex=True, squeeze=False, figsize=(10, 3.2 * len(names))
     )
-    start = [[0]] * len(runs)
-    top = max(np.quantile(pooled_speeds(runs, frames, name), 0.9995) for name in names)
-    bins = (np.arange(61) - 0.5) * top / 60
+    top = max(np.quantile(pooled(runs, frames, name), 0.9995) for name in names)
+    bins, v = (np.arange(61) - 0.5) * top / 60, np.linspace(0, top, 301)
     for k, (kind, found, row) in enumerate(zip(runs[0].by_species, result, panels, strict=True)):
-        colour = COLOURS[k % len(COLOURS)]
-        for axes, chosen in zip(row, (start, frames), strict=True):
-            v = pooled_speeds(runs, chosen, kind.name)
-            bars(
-                axes,
-                binned(v, bins),
-                bins,
-                fill=True,
-                alpha=0.45,
-                color=colour,
-                label=f"{kind.label}: {len(v)} speeds",
-            )
-            axes.set_ylabel("probability density $P(v)$")
+        colour, sides = COLOURS[k % len(COLOURS)], ([[0]] * len(runs), frames)
         thermal = np.sqrt(2 * found["K_theory"] / kind.mass)
-        v = np.linspace(0, top, 301)
-        row[1].plot(
-            v,
-            maxwell_pdf(v / thermal) / thermal,
-            color="black",
-            lw=1.2,
-            label=f"Maxwell: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}",
-        )
-        for when, axes in zip(("_start", ""), row, strict=True):
-            axes.plot([], [], ls="", label=moments(found, when))
-            axes.set_ylim(0, 1.4 * axes.get_ylim()[1])
+        label = f"Maxwell: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}"
+        law = maxwell_pdf(v / thermal) / thermal
+        row[1].plot(v, law, color="black", lw=1.2, label=label, zorder=3)
+        for axes, chosen, words in zip(row, sides, moments(found), strict=True):
+            speeds = pooled(runs, chosen, kind.name)
+            style = {"color": colour, "label": f"{kind.label}: {len(speeds)} speeds"}
+            bars(axes, binned(speeds, bins), bins, fill=True, alpha=0.45, **style)
+            axes.plot([], [], ls="", label=words)
+            axes.set(ylabel="probability density $P(v)$", ylim=(0, 1.4 * axes.get_ylim()[1]))
             axes.legend(loc="upper right")
     panels[0, 0].set_title("Start")
     panels[0, 1].set_title("Equilibrium")
     for axes in panels[-1]:
         axes.set(xlabel="speed v (reduced units)", xlim=(0, top))
-    figure.suptitle(caption(runs), fontsize=10)
+    figure.suptitle(caption(runs))
     return figure
 
 
-def moments(row: dict, when: str) -> str:
-    """Mean speed and energy for the legend."""
-    v, energy = row[f"v{when}"], row[f"K{when}"]
-    if when:
-        return f"⟨v⟩ = {v:.4g},  ⟨K⟩ = {energy:.4g}"
+def moments(row: dict) -> tuple[str, str]:
+    """Mean speed and energy at the start and in equilibrium, for the legend."""
     return (
-        f"⟨v⟩ = {v:.4f} ± {row['v_error']:.4f} (theory {row['v_theory']:.4f})\n"
-        f"⟨K⟩ = {energy:.4f} ± {row['K_error']:.4f} (theory {row['K_theory']:.4f})"
+        f"⟨v⟩ = {row['v_start']:.4g},  ⟨K⟩ = {row['K_start']:.4g}",
+        f"⟨v⟩ = {row['v']:.4f} ± {row['v_error']:.4f} (theory {row['v_theory']:.4f})\n"
+        f"⟨K⟩ = {row['K']:.4f} ± {row['K_error']:.4f} (theory {row['K_theory']:.4f})",
     )
 
 
 def main() -> None:
     args = command_line(__doc__, "mixture.png", frames=None, skip=None, apart=5.0).parse_args()
-    runs = read_all(args.runs)
+    runs = args.runs
     for run in runs:
         if run.names != runs[0].names or len(run.names) < 2:
             raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
@@ -139,7 +92,7 @@ def main() -> None:
             raise RunError(f"{run.path}: falls; see equipartition.py and gravity.py")
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames)
-    report(args, runs, "Speeds of a mixture", draw(runs, frames, result), result)
+    report(args, draw(runs, frames, result), result)
 
 
 if __name__ == "__main__":

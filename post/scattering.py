@@ -9,100 +9,69 @@ last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, ka
     tan theta = 2 kappa s c / (1 - 2 kappa c^2);   M infinite and xi = 1:  theta = 2 acos(s).
 """
 
-from typing import NamedTuple
-
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
-from ricochet.script import command_line, launch, read_all, report
+from ricochet.script import command_line, launch, report
 from ricochet.theory import scattering_angle
 
 import numpy as np
 
 
-class Scattering(NamedTuple):
-    """What one run says."""
-
-    impact: float  # b / R12, with its sign
-    angle: float  # [rad]
-    speed_change: float  # speed' / speed - 1
-    mass_ratio: float  # at rest over moving
-
-
-def scattering(run: Run) -> Scattering:
-    """Impact parameter and deflection of the disk that moves at the start."""
-    before, after = run.velocity[0], run.velocity[-1]
-    moving = np.flatnonzero(np.any(before != 0, axis=1))
+def moving_and_resting(run: Run) -> tuple[int, int]:
+    """Which disk moves at the start, and which does not."""
+    moving = np.flatnonzero(run.speed(0))
     if run.count != 2 or len(moving) != 1:
         raise RunError(f"{run.path}: needs two disks, one of them at rest")
-    i, k = moving[0], 1 - moving[0]
-    v, w = before[i], after[i]
+    return moving[0], 1 - moving[0]
+
+
+def scattering(run: Run) -> dict[str, float]:
+    """Impact parameter and deflection of the disk that moves at the start."""
+    i, k = moving_and_resting(run)
+    v, w = run.velocity[0][i], run.velocity[-1][i]
     gap = run.position[0][k] - run.position[0][i]
     impact = (v[1] * gap[0] - v[0] * gap[1]) / np.hypot(*v) / run.radius.sum()
     angle = np.arctan2(abs(v[0] * w[1] - v[1] * w[0]), v @ w)
-    change = np.hypot(*w) / np.hypot(*v) - 1
-    return Scattering(impact, angle, change, run.mass[k] / run.mass[i])
+    exact = scattering_angle(impact, run.mass[k] / run.mass[i], run.restitution)
+    return {
+        "b_over_R12": impact,
+        "angle_degrees": float(np.degrees(angle)),
+        "exact_degrees": float(np.degrees(exact)),
+        "error_degrees": float(np.degrees(abs(angle - exact))),
+        "speed_change": np.hypot(*w) / np.hypot(*v) - 1,
+    }
 
 
-def draw(points: list[Scattering], restitution: float) -> plt.Figure:
-    """The angle above, its difference from the exact one below."""
-    s, angle = np.array([(p.impact, p.angle) for p in points]).T
-    ratio = points[0].mass_ratio
-    figure, (top, bottom) = plt.subplots(
-        2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1), constrained_layout=True
-    )
+def draw(rows: list[dict], ratio: float, restitution: float) -> plt.Figure:
+    """The angle above, its difference from the exact one below; `ratio` of the masses."""
+    names = ("b_over_R12", "angle_degrees", "error_degrees")
+    s, angle, error = (np.array([row[name] for row in rows]) for name in names)
+    figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(6, 6), height_ratios=(3, 1))
     end = max(1.2, np.abs(s).max())
     fine = np.linspace(-end if s.min() < 0 else 0, end, 2401)
-    exact = f"exact, $m_1/m_2$ = {ratio:,.7g}, ξ = {restitution:g}"
-    top.plot(
-        fine,
-        np.degrees(scattering_angle(fine, ratio, restitution)),
-        color="black",
-        lw=1.2,
-        label=exact,
-    )
+    label = f"exact, $m_1/m_2$ = {ratio:,.7g}, ξ = {restitution:g}"
+    exact = np.degrees(scattering_angle(fine, ratio, restitution))
+    top.plot(fine, exact, color="black", lw=1.2, label=label)
     if restitution == 1:
-        top.plot(
-            fine,
-            np.degrees(scattering_angle(fine)),
-            color=COLOURS[4],
-            lw=1.2,
-            ls="--",
-            label="$m_1/m_2 = \\infty$: $2\\arccos(|b|/R_{12})$",
-        )
-    top.plot(
-        s,
-        np.degrees(angle),
-        ls="",
-        marker="o",
-        mfc="none",
-        color=COLOURS[0],
-        label=f"simulation, {len(points)} runs",
-    )
+        label, heavy = "$m_1/m_2 = \\infty$: $2\\arccos(|b|/R_{12})$", scattering_angle(fine)
+        top.plot(fine, np.degrees(heavy), color=COLOURS[4], lw=1.2, ls="--", label=label)
+    label = f"simulation, {len(rows)} runs"
+    top.plot(s, angle, ls="", marker="o", mfc="none", color=COLOURS[0], label=label)
     top.set(ylabel="scattering angle θ (degrees)", ylim=(-5, 185), yticks=range(0, 181, 30))
     top.legend()
-    error = np.abs(np.degrees(angle - scattering_angle(s, ratio, restitution)))
     bottom.semilogy(s, np.maximum(error, 1e-16), ls="", marker=".", color=COLOURS[0])
-    bottom.set(
-        xlabel="impact parameter $b/R_{12}$",
-        ylabel="|error| (degrees)\n(0 drawn at $10^{-16}$)",
-        ylim=(1e-17, 30 * max(error.max(), 1e-16)),
-    )
+    bottom.set(xlabel="impact parameter $b/R_{12}$", ylim=(1e-17, 30 * max(error.max(), 1e-16)))
+    bottom.set_ylabel("|error| (degrees)\n(0 drawn at $10^{-16}$)")
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "scattering.png").parse_args()
-    runs = read_all(args.runs)
-    points = sorted(scattering(run) for run in runs)
-    restitution = runs[0].restitution
-    table = []
-    for p in points:
-        exact = scattering_angle(p.impact, p.mass_ratio, restitution)
-        row = {"b_over_R12": p.impact, "angle_degrees": float(np.degrees(p.angle))}
-        row |= {"exact_degrees": float(np.degrees(exact))}
-        row |= {"error_degrees": float(np.degrees(abs(p.angle - exact)))}
-        table.append(row | {"speed_change": p.speed_change})
-    report(args, runs, "Scattering angle", draw(points, restitution), table)
+    rows = sorted(map(scattering, args.runs), key=lambda row: row["b_over_R12"])
+    first = args.runs[0]
+    moving, resting = moving_and_resting(first)
+    figure = draw(rows, first.mass[resting] / first.mass[moving], first.restitution)
+    report(args, figure, rows)
 
 
 if __name__ == "__main__":

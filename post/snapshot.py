@@ -12,7 +12,7 @@ side is drawn on both.
 
 import argparse
 
-from ricochet import Run, read_run
+from ricochet import Run
 from ricochet.drawing import (
     LABELS,
     caption,
@@ -32,11 +32,6 @@ from ricochet.thermodynamics import packing
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array
-
-
-def darker(colours: list[str]) -> np.ndarray:
-    """(N, 4) the same hues, which stand out against them."""
-    return to_rgba_array(colours) * (0.6, 0.6, 0.6, 1)
 
 
 def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -> None:
@@ -89,7 +84,9 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
         if args.quiver:
-            arrows = darker(species_colours(run)) if colour == "species" else "0.2"
+            arrows = "0.2"
+            if colour == "species":  # the same hues, darker, to stand out against them
+                arrows = to_rgba_array(species_colours(run)) * (0.6, 0.6, 0.6, 1)
             draw_arrows(axes, run, frames[k], longest, arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
@@ -97,21 +94,8 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
     elif not args.per_frame:
         figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
     dense = f",  η = {packing(run):.4g}" if colour == "psi6" else ""
-    figure.suptitle(caption([run]) + dense, fontsize=10)
+    figure.suptitle(caption([run]) + dense)
     return figure
-
-
-def table(run: Run, frames: list[int]) -> list[dict]:
-    """A row per frame: when it is, and how fast the disks are."""
-    return [
-        {
-            "frame": frame,
-            "time": float(run.time[frame]),
-            "mean_speed": float(run.speed(frame).mean()),
-            "kinetic_energy": float(run.kinetic_energy(frame).mean()),
-        }
-        for frame in frames
-    ]
 
 
 def main() -> None:
@@ -120,11 +104,16 @@ def main() -> None:
     parser.add_argument("--log", action="store_true", help="logarithmic colour scale")
     parser.add_argument("--per-frame", action="store_true", help="a colour scale for each frame")
     args = parser.parse_args()
-    run = read_run(args.run)
+    (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))
     frames = chosen_frames(run, which, args.count)
     figure = draw(run, frames, chosen_colour(run, args.colour), args)
-    report(args, [run], f"Frames of {run.path.name}", figure, table(run, frames))
+    rows = []
+    for frame in frames:
+        row = {"frame": frame, "time": float(run.time[frame])}
+        row |= {"mean_speed": float(run.speed(frame).mean())}
+        rows.append(row | {"kinetic_energy": float(run.kinetic_energy(frame).mean())})
+    report(args, figure, rows)
 
 
 if __name__ == "__main__":

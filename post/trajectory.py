@@ -9,7 +9,7 @@ are the exact path of flight without gravity.  Several runs are drawn side by si
 
 from ricochet import Run
 from ricochet.drawing import COLOURS, caption, disk_collection, draw_box, plt
-from ricochet.script import chosen_disks, chosen_frames, command_line, launch, read_all, report
+from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np
 from matplotlib.patches import Circle
@@ -60,29 +60,21 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
     )
 
 
-def table(run: Run, disks: list[int], frames: list[int]) -> list[dict]:
-    """A row per path: its disk, its ends, through periodic sides too."""
-    (x0, y0), (x1, y1) = (run.unwrapped(frames[end])[disks].T.tolist() for end in (0, -1))
-    return [
-        {
-            "run": run.path.name, "disk": disk + 1, "frames": len(frames),
-            "x_first": x0[k], "y_first": y0[k], "x_last": x1[k], "y_last": y1[k],
-        }
-        for k, disk in enumerate(disks)
-    ]  # fmt: skip
-
-
 def main() -> None:
     parser = command_line(__doc__, "trajectory.png", frames=None, count=None, disks=None)
     args = parser.parse_args()
-    runs, rows = read_all(args.runs), []
-    figure, panels = plt.subplots(1, len(runs), squeeze=False, figsize=(5.2 * len(runs), 5.7))
-    for axes, run in zip(panels.flat, runs, strict=True):
+    size, rows = len(args.runs), []
+    figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, 5.7))
+    for axes, run in zip(panels.flat, args.runs, strict=True):
         frames = chosen_frames(run, args.frames, args.count)
         disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.count))))
         draw_paths(axes, run, disks, frames)
-        rows += table(run, disks, frames)
-    report(args, runs, "Paths of disks", figure, rows)
+        ends = np.hstack([run.unwrapped(frames[end])[disks] for end in (0, -1)]).tolist()
+        names = ("x_first", "y_first", "x_last", "y_last")
+        for disk, places in zip(disks, ends, strict=True):
+            row = {"run": run.path.name, "disk": disk + 1, "frames": len(frames)}
+            rows.append(row | dict(zip(names, places, strict=True)))
+    report(args, figure, rows)
 
 
 if __name__ == "__main__":

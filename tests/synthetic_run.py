@@ -69,8 +69,7 @@ def write_run(
         disks["radius"] = np.broadcast_to(np.asarray(radius, float), count)
         species = np.ones(count, np.int32) if species is None else np.asarray(species, np.int32)
         disks["species"], disks["id"] = species, np.arange(1, count + 1)
-        if committed is not None:
-            disks["committed"] = np.int64(committed)
+        disks["committed"] = np.int64(frames if committed is None else committed)
         write_observables(file, time if observable_time is None else observable_time, observables)
         write_parameters(file, parameters, names, species, obstacles, walls)
         file.create_group("provenance").attrs.update(provenance or {"git_commit": text("abc1234")})

@@ -4,13 +4,12 @@
     run = ricochet.run("input/gas.nml")
     run = ricochet.read_run("runs/gas.h5")
 
-`program` starts simulations, `starting` writes what they start from, `namelists` edits input files,
-`variables` is the program's table of them; `reader` opens files, `bridges` hands them to other
-programs; `statistics`, `theory`, `hard_disks`, `thermodynamics`, `helfand` and `crater` measure and
-compare; `drawing` draws disks and walls, `film` moves them; `paths` knows where disks are between
-frames, `live` shows a run that goes on, `laboratory` starts an `experiment` for each of its pages;
-`script` is what the command-line scripts share; `files` trusts neither what it reads nor where it
-writes.
+`program` starts simulations, `starting` writes what they start from; `reader` opens files,
+`bridges` hands them to other programs; `statistics` finds means and errors, `theory` and
+`hard_disks` have the laws; `thermodynamics`, `free_paths`, `transport`, `structure`, `fields`,
+`speeds`, `cooling`, `driven` and `crater` measure; `drawing` draws disks and walls, `film` moves
+them; `paths` knows where disks are between frames; `live` shows a run that goes on, `lab` starts
+the runs of its pages; `script` is what the command-line scripts share, `files` what opens files.
 """
 
 from . import packages as packages  # first

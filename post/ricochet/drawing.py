@@ -44,6 +44,12 @@ def caption(runs: list[Run]) -> str:
     return "\n".join(wrap(",  ".join(parts), 110))
 
 
+def titled(runs: list[Run]) -> str:
+    """Title of the input and what else a reader must know."""
+    title = str(runs[0].parameter("run", "title", ""))
+    return "\n".join(filter(None, (title, caption(runs))))
+
+
 def listed(values: set[float]) -> str:
     """A few numbers, or from where to where they go."""
     words = [f"{value:g}" for value in sorted(values)]

@@ -89,6 +89,13 @@ def crystal(eta: np.ndarray, count: float = math.inf) -> np.ndarray:
     return z - (z - 1) / count
 
 
+def published(eta: float, count: int, periodic: bool) -> float:
+    """Z that simulations of others found: fluid to 0.65, crystal beyond 0.72; NaN between."""
+    if eta <= 0.5:
+        return float(simulated_finite(eta, count) if periodic else simulated(eta))
+    return float(crystal(eta, count) if eta >= 0.72 else simulated(eta))
+
+
 def contact_value(z: float, eta: float) -> float:
     """The chi of Z = 1 + 2 eta chi."""
     return (z - 1) / (2 * eta)

@@ -19,7 +19,6 @@ import numpy as np
 from .files import RunError
 from .reader import Run
 
-SIDES = ("left", "right", "bottom", "top")
 CLOSE = 1e-3  # radii between where a path leads and where the disk is
 MOST_AT_ONCE = 200000  # disks of the frames that are read together
 
@@ -82,53 +81,26 @@ class Flight:
         self.turns.append((self.time, self.x, self.y, gain))
 
 
-def wall_laws(run: Run) -> list[tuple[float, bool]]:
-    """Restitution of each side, obstacle and straight wall, and whether it is smooth; by code."""
-    contact, sides = run.parameters.get("contact", {}), run.parameters.get("side", {})
-    common = (
-        float(contact.get("wall_restitution", 1.0)),
-        contact.get("wall_rule", "velocity") == "normal",
-    )
-    laws = [common] * 4
-    for name, law in sides.items():
-        laws[SIDES.index(name)] = float(law["restitution"]), law["rule"] == "normal"
-    for group, count in (("obstacle", len(run.obstacles)), ("wall", len(run.walls))):
-        table = run.parameters.get(group, {})
-        restitutions = table.get("restitution", [common[0]] * count)
-        smooth = table.get("normal", [common[1]] * count)
-        laws += [(float(xi), bool(flag)) for xi, flag in zip(restitutions, smooth, strict=True)]
-    return laws
-
-
 class Paths:
     """The paths between frames of a run."""
 
     def __init__(self, run: Run, most: float = np.inf) -> None:
-        """Take what the wall rule needs from the run; give at most so many turns in all."""
-        self.most = most
-        self.run = run
-        self.period = np.where(run.periodic, run.edges, np.inf).tolist()
-        self.shapes = [*run.obstacles, *run.walls.tolist()]
-
-    @cached_property
-    def laws(self) -> list[tuple[float, bool]]:
-        """The wall rules, for logs without changes of momentum."""
-        return wall_laws(self.run)
+        """Give at most so many turns in all."""
+        self.run, self.most = run, most
 
     @cached_property
     def log(self) -> tuple[np.ndarray, ...] | None:
-        """Time, i, j and change of the events, and the collisions of all disks after each.
+        """Time, i, j and change of momentum of the events, and the collisions of all after each.
 
-        The change of momentum of disk i is a vector where the log has it, else its magnitude.
         Not of a sheared box: images that slide are beyond these paths.
         """
         if self.run.shear_rate != 0:
             return None
         try:
-            time, i, j, impulse, vector = self.run.events
+            time, i, j, _, change = self.run.events
         except RunError:
             return None  # a log that is not there, or is damaged, does not stop a film
-        return time, i, j, impulse if vector is None else vector, np.cumsum(1 + (j > 0))
+        return None if change is None else (time, i, j, change, np.cumsum(1 + (j > 0)))
 
     def along(self, frames: list[int]) -> Iterator[Turns]:
         """The turns between each two frames that follow each other in a list."""
@@ -142,17 +114,9 @@ class Paths:
         run = self.run
         place, velocity = run.position[frames], run.velocity[frames]
         image = np.zeros_like(place) if run.image is None else run.image[frames]
-        hits = None if run.collisions is None else run.collisions[frames]
-        return [
-            State(
-                float(run.time[f]),
-                place[k],
-                velocity[k],
-                image[k],
-                None if hits is None else hits[k],
-            )
-            for k, f in enumerate(frames)
-        ]
+        hits = [None] * len(frames) if run.collisions is None else run.collisions[frames]
+        times = map(float, run.time[frames])
+        return [State(*one) for one in zip(times, place, velocity, image, hits, strict=True)]
 
     def between(self, a: State, b: State) -> Turns:
         """The turns between two frames."""
@@ -184,7 +148,11 @@ class Paths:
             flights = self.replay(a, b)
             for k in np.flatnonzero(guessed):
                 flight = flights.get(k)
-                if flight and self.arrives(flight, b, k, end[k]):
+                if flight is None:
+                    continue
+                flight.fly(b.time, *g.tolist())
+                gap = hypot(flight.x - end[k][0], flight.y - end[k][1])
+                if gap <= CLOSE * self.run.radius[k]:
                     times, x, y, gain = np.transpose(flight.turns)
                     place = np.column_stack([x, y])
                     found.append((np.full(len(times), k), times, place, gain))
@@ -193,12 +161,6 @@ class Paths:
         order = np.lexsort((parts[1], parts[0]))
         self.most -= len(order)
         return Turns(*(part[order] for part in parts), guessed)
-
-    def arrives(self, flight: Flight, b: State, disk: int, end: np.ndarray) -> bool:
-        """Whether a flight by the log leads to the next frame."""
-        flight.fly(b.time, *self.run.gravity.tolist())
-        gap = hypot(flight.x - end[0], flight.y - end[1])
-        return gap <= CLOSE * self.run.radius[disk]
 
     def near(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(N,) whether places agree, by the sizes of their disks."""
@@ -218,65 +180,11 @@ class Paths:
             for k in {*(i[span] - 1).tolist(), *(j[span][j[span] > 0] - 1).tolist()}
         }
         gravity = run.gravity.tolist()
-        for event in zip(*(part[span].tolist() for part in (time, i, j, changes)), strict=True):
-            at, one, other, change = event
-            flight = flights[one - 1]
-            flight.fly(at, *gravity)
-            if other > 0:
-                partner = flights[other - 1]
-                partner.fly(at, *gravity)
-            if changes.ndim > 1:
-                flight.turn(*(part / flight.mass for part in change))
-                if other > 0:
-                    partner.turn(*(-part / partner.mass for part in change))
-            elif other > 0:
-                self.collide(flight, partner, change)
-            else:
-                self.bounce(flight, other, change)
+        parts = (part[span].tolist() for part in (time, i, j, changes))
+        for at, one, other, change in zip(*parts, strict=True):
+            for disk, sign in ((one, 1), (other, -1)):
+                if disk > 0:
+                    flight = flights[disk - 1]
+                    flight.fly(at, *gravity)
+                    flight.turn(*(sign * part / flight.mass for part in change))
         return flights
-
-    def nearest(self, dx: float, dy: float) -> tuple[float, float]:
-        """The way to the nearest periodic image."""
-        px, py = self.period
-        return dx - px * round(dx / px) if px < np.inf else dx, (
-            dy - py * round(dy / py) if py < np.inf else dy
-        )
-
-    def collide(self, a: Flight, b: Flight, change: float) -> None:
-        """Two disks get this impulse along the line of their centres."""
-        dx, dy = self.nearest(b.x - a.x, b.y - a.y)
-        along = change / hypot(dx, dy)
-        a.turn(-along * dx / a.mass, -along * dy / a.mass)
-        b.turn(along * dx / b.mass, along * dy / b.mass)
-
-    def bounce(self, disk: Flight, code: int, change: float) -> None:
-        """A disk leaves a wall by the wall rule; whether elastically shows in the impulse."""
-        nx, ny = self.normal(disk, code)
-        vn = disk.vx * nx + disk.vy * ny
-        tx, ty = disk.vx - vn * nx, disk.vy - vn * ny
-
-        restitution, smooth = self.laws[-code]
-
-        def changes(xi: float) -> tuple[float, float]:
-            slower = 0.0 if smooth else xi - 1
-            return -(1 + xi) * vn * nx + slower * tx, -(1 + xi) * vn * ny + slower * ty
-
-        options = [changes(xi) for xi in (restitution, 1.0)]
-        disk.turn(*min(options, key=lambda v: abs(disk.mass * hypot(*v) - change)))
-
-    def normal(self, disk: Flight, code: int) -> tuple[float, float]:
-        """The direction across a side, an obstacle or a straight wall where the disk meets it."""
-        if code > -4:
-            return (1.0, 0.0) if code > -2 else (0.0, 1.0)
-        shape = self.shapes[-4 - code]
-        if code > -4 - len(self.run.obstacles):
-            dx, dy = self.nearest(disk.x - shape.centre[0], disk.y - shape.centre[1])
-        else:
-            (x0, y0), (x1, y1) = shape
-            middle = (x0 + x1) / 2, (y0 + y1) / 2
-            dx, dy = self.nearest(disk.x - middle[0], disk.y - middle[1])
-            along = (dx * (x1 - x0) + dy * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2)
-            along = min(0.5, max(-0.5, along))
-            dx, dy = dx - along * (x1 - x0), dy - along * (y1 - y0)
-        size = hypot(dx, dy)
-        return dx / size, dy / size

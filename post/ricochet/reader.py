@@ -21,10 +21,9 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from .files import RunError, Unsound, attribute, find, numbers, open_file, tree, whole
+from .files import RunError, Unsound, open_file, tree
 
 DISKS = "particles/disks"
-LONGEST_NAME = 40
 
 
 class Series(NamedTuple):
@@ -45,7 +44,7 @@ class Events(NamedTuple):
     i: np.ndarray  # id of a disk
     j: np.ndarray
     impulse: np.ndarray  # magnitude of the change of momentum
-    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None where it follows from that
+    momentum_change: np.ndarray | None = None  # (E, 2) of disk i; None in files of before
 
 
 class Obstacle(NamedTuple):
@@ -109,17 +108,13 @@ class Frames:
             raise RunError(f"{self.path}: no frame {frame}, there are {len(self)}") from None
         steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
         with open_file(self.path) as file:
-            data = find(file, f"{DISKS}/{self.name}/value")
+            data = file[f"{DISKS}/{self.name}/value"]
             if len(steps) == 1 and steps[0] > 0:
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
             elif chosen.ndim and chosen.size:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
             else:
                 values = data[chosen] if chosen.size else data[:0]
-        bad = np.argwhere(~np.isfinite(values))
-        if len(bad):
-            first = chosen[bad[0, 0]] if chosen.ndim else chosen
-            raise RunError(f"{self.path}: {self.name}: not all numbers in frame {first} are finite")
         return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
@@ -235,22 +230,19 @@ class Run:
     def observable(self, name: str) -> Series:
         """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
-            group = find(file, f"observables/{name}")
-            if group is None or find(group, "value") is None:
+            if f"observables/{name}/value" not in file:
                 raise Unsound(f"has no observable '{name}'")
-            count = committed(file, "observables", len(numbers(group, "value")))
+            count = committed(file, "observables")
             if count == 0:
                 raise Unsound("holds no observables yet")
-            return Series(rows(group, "time", count), rows(group, "value", count, None))
+            group = file[f"observables/{name}"]
+            return Series(*(rows(group[part], count) for part in ("time", "value")))
 
     @cached_property
     def observables(self) -> tuple[str, ...]:
         """The names that `observable` knows."""
         with open_file(self.path) as file:
-            group = find(file, "observables")
-            if not isinstance(group, h5py.Group):
-                raise Unsound("has no observables")
-            return tuple(series_in(group))
+            return tuple(series_in(file["observables"]))
 
     def to_dataframe(self):
         """The observables as a pandas DataFrame, a row per sample, the time as index."""
@@ -262,17 +254,16 @@ class Run:
     def events(self) -> Events:
         """All collisions; needs `output.event_log = .true.` in the input file."""
         with open_file(self.path) as file:
-            if find(file, "events") is None:
+            if "events" not in file:
                 raise Unsound("has no event log, set output.event_log = .true.")
-            count = committed(file, "events", len(numbers(file, "events/time")))
-            time, impulse = (rows(file, f"events/{name}", count) for name in ("time", "impulse"))
-            i, j = (rows(file, f"events/{name}", count, kinds="iu") for name in "ij")
-            if np.any(i < 1) or np.any(np.maximum(i, j) > self.count):
-                raise Unsound("events of disks that there are not")
-            change = find(file, "events/momentum_change")
-            if change is not None:
-                change = rows(file, "events/momentum_change", count, (2,))
-            return Events(time, i, j, impulse, change)
+            count = committed(file, "events")
+            return Events(
+                **{
+                    name: rows(file["events"][name], count)
+                    for name in Events._fields
+                    if name in file["events"]
+                }
+            )
 
     @cached_property
     def collisions_per_disk(self) -> Series:
@@ -336,69 +327,45 @@ def read_run(path: str | Path) -> Run:
     """Open a run, finished or not.  Raises RunError with a one-line reason."""
     path = Path(path)
     with open_file(path) as file:
-        check_format(path, file)
-        run = run_of(path, file)
-    for frames in (run.position, run.velocity):  # not every script reads them
-        frames[[0, -1]]
-    return run
-
-
-def check_format(path: Path, file: h5py.File) -> None:
-    """Refuse a file of another kind or of a later version."""
-    if path.name.endswith(".chk.h5"):
-        raise Unsound("a checkpoint, resume the run or read its .part file")
-    h5md = find(file, "h5md")
-    version = None if h5md is None else attribute(h5md, "version")
-    if version is None or find(file, DISKS) is None:
-        raise Unsound("an HDF5 file, but not of a Ricochet run")
-    if version[0] != 1:
-        raise Unsound(f"H5MD version {version[0]}.{version[1]}, this program reads 1.x")
+        if DISKS not in file or "h5md" not in file:
+            raise Unsound("an HDF5 file, but not of a Ricochet run")
+        major, minor = file["h5md"].attrs["version"]
+        if major != 1:
+            raise Unsound(f"H5MD version {major}.{minor}, this program reads 1.x")
+        return run_of(path, file)
 
 
 def run_of(path: Path, file: h5py.File) -> Run:
     """The run in an open file."""
-    disks = find(file, DISKS)
-    time = numbers(disks, "position/time")
-    count, disk_count = committed(file, DISKS, len(time)), len(numbers(disks, "mass", 1))
+    disks, count = file[DISKS], committed(file, DISKS)
     if count == 0:
         raise Unsound("holds no frame yet")
-    frames = {}
-    for name, item in {"position": (2,), "velocity": (2,), "image": (2,), "collisions": ()}.items():
-        if name in ("position", "velocity") or find(disks, name) is not None:
-            numbers(disks, f"{name}/value", count, (disk_count, *item))
-            frames[name] = Frames(path, name, (count, disk_count, *item))
-    elements = {
-        name: Frames(path, name, (count, disk_count))
-        for name in disks
-        if name not in (*frames, "box") and find(disks, f"{name}/value") is not None
+    frames = {
+        name: Frames(path, name, (count, *item["value"].shape[1:]))
+        for name, item in disks.items()
+        if isinstance(item, h5py.Group) and "value" in item
     }
-    for name in elements:
-        numbers(disks, f"{name}/value", count, (disk_count,))
-    box = find(disks, "box")
-    parameters, provenance = (
-        {} if group is None else tree(group)
-        for group in (find(file, "parameters"), find(file, "provenance"))
-    )
-    species = rows(disks, "species", disk_count, kinds="iu").astype(int)
+    parameters = tree(file["parameters"])
+    box = tree(disks["box"])
     return Run(
         path=path,
-        time=rows(disks, "position/time", count),
-        position=frames["position"],
-        velocity=frames["velocity"],
-        image=frames.get("image"),
-        collisions=frames.get("collisions"),
-        elements=elements,
-        mass=positive(rows(disks, "mass", disk_count), "mass"),
-        radius=positive(rows(disks, "radius", disk_count), "radius"),
-        species=species,
-        names=names_of(species, parameters.get("species", {}).get("names")),
-        lower=vector(box, "lower", (0.0, 0.0)),
-        edges=positive(vector(box, "edges"), "edges"),
-        periodic=pair(attribute(box, "boundary"), "boundary") == "periodic",
+        time=rows(disks["position/time"], count),
+        position=frames.pop("position"),
+        velocity=frames.pop("velocity"),
+        image=frames.pop("image", None),
+        collisions=frames.pop("collisions", None),
+        elements=frames,
+        mass=rows(disks["mass"]),
+        radius=rows(disks["radius"]),
+        species=rows(disks["species"]),
+        names=tuple(parameters["species"]["names"]),
+        lower=box["lower"],
+        edges=box["edges"],
+        periodic=np.array(box["boundary"]) == "periodic",
         obstacles=obstacles_of(parameters.get("obstacle", {})),
         walls=walls_of(parameters.get("wall", {})),
         parameters=parameters,
-        provenance=provenance,
+        provenance=tree(file["provenance"]),
     )
 
 
@@ -410,92 +377,35 @@ def span(values: np.ndarray) -> str:
 
 def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
     """The names of the series in a group, and in its groups: of species, of sides and of each."""
-    for name in group:
-        item = find(group, name)
+    for name, item in group.items():
         if isinstance(item, h5py.Group):
-            if find(item, "value") is not None:
+            if "value" in item:
                 yield path + name
-            elif path.count("/") < 2:
+            else:
                 yield from series_in(item, f"{path}{name}/")
 
 
-def committed(file: h5py.File, group: str, extent: int) -> int:
-    """How many of the `extent` samples of a group are valid (a `.part` is allocated ahead)."""
-    counter = find(file, f"{group}/committed")
-    count = extent if counter is None else int(whole(counter))
-    if not 0 <= count <= extent:
-        raise Unsound(f"{group}/committed is {count}, but there are {extent} samples")
-    return count
+def committed(file: h5py.File, group: str) -> int:
+    """How many samples of a group are valid: a `.part` is allocated ahead."""
+    return int(file[group]["committed"][()])
 
 
-def rows(
-    group: h5py.Group,
-    path: str,
-    count: int,
-    item: tuple[int, ...] | None = (),
-    kinds: str = "iuf",
-) -> np.ndarray:
-    """The first rows of a dataset."""
-    return finite(numbers(group, path, count, item, kinds)[:count], path)
-
-
-def finite(values: np.ndarray, what: str) -> np.ndarray:
-    """The values, those with a fraction in double precision."""
-    if values.dtype.kind != "f":
-        return values
-    if not np.isfinite(values).all():
-        raise Unsound(f"{what}: not all numbers are finite")
-    return values.astype(float, copy=False)
-
-
-def positive(values: np.ndarray, what: str) -> np.ndarray:
-    """The values, if all are above 0."""
-    if not np.all(values > 0):
-        raise Unsound(f"{what}: not all numbers are above 0")
-    return values
-
-
-def vector(group: h5py.Group, name: str, default: tuple | None = None) -> np.ndarray:
-    """(2,) numbers that are a dataset or an attribute."""
-    value = attribute(group, name) if find(group, name) is None else rows(group, name, 2)
-    return finite(pair(default if value is None else value, name), name)
-
-
-def pair(value: object, what: str) -> np.ndarray:
-    """The value, if it is two."""
-    if np.shape(value) != (2,):
-        raise Unsound(f"{what}: not one for each axis")
-    return np.asarray(value)
-
-
-def names_of(species: np.ndarray, names: object) -> tuple[str, ...]:
-    """The names of the species (N,), numbered where the file has none."""
-    there = np.unique(species)
-    if not np.array_equal(there, np.arange(1, len(there) + 1)):
-        raise Unsound(f"species from {there[0]} to {there[-1]}, not all from 1 on")
-    names = [f"species {k}" for k in there] if names is None else names
-    names = tuple(np.atleast_1d(names))
-    usual = all(isinstance(name, str) and name.isprintable() and name for name in names)
-    if not usual or len(names) != len(there) or max(map(len, names)) > LONGEST_NAME:
-        raise Unsound("species without a proper name, or names without disks")
-    return names
+def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
+    """The first rows of a dataset [all], those with a fraction in double precision."""
+    values = data[:count]
+    if count is not None and len(values) < count:
+        raise Unsound(f"{data.name} holds {len(values)} of {count} samples")
+    return values.astype(float, copy=False) if values.dtype.kind == "f" else values
 
 
 def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
     """The circular walls in /parameters/obstacle."""
     if "centre" not in group:
         return ()
-    centres = finite(np.reshape(group["centre"], (-1, 2)), "obstacle/centre")
-    radii = positive(finite(np.atleast_1d(group["radius"]), "obstacle/radius"), "obstacle/radius")
-    inside = np.atleast_1d(group["inside"])
-    return tuple(
-        Obstacle(c, float(r), bool(i)) for c, r, i in zip(centres, radii, inside, strict=True)
-    )
+    parts = (group[name] for name in ("centre", "radius", "inside"))
+    return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
 
 
 def walls_of(group: dict) -> np.ndarray:
     """(W, 2, 2) the straight walls in /parameters/wall."""
-    if "from" not in group:
-        return np.empty((0, 2, 2))
-    ends = [np.reshape(group[end], (-1, 2)) for end in ("from", "to")]
-    return finite(np.stack(ends, axis=1), "wall")
+    return np.stack([group["from"], group["to"]], axis=1) if group else np.empty((0, 2, 2))

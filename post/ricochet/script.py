@@ -19,8 +19,8 @@ import numpy as np
 from .drawing import LABELS, STYLE, plt, save, warn
 from .files import did_you_mean, destination
 from .reader import Run, RunError, read_run
-from .statistics import Estimate, SeriesMean
-from .thermodynamics import frames_from, start_of_equilibrium
+from .statistics import Curve, Estimate, SeriesMean, combined, doubts
+from .thermodynamics import frames_from, packing, start_of_equilibrium
 
 matplotlib.use("Agg")
 plt.style.use(STYLE)
@@ -140,24 +140,16 @@ def joined(words: Iterable[str]) -> list[str]:
 def command_line(doc: str, output: str, one: bool = False, csv: bool = True, **defaults) -> Parser:
     """A parser whose help is the script's docstring and whose output has this default.
 
-    It takes `one` run or any number, --csv if there are numbers to write, and those of the shared
-    `OPTIONS` that are named, with their defaults (None: no default).
+    It opens `one` run or any number, as `runs`, and takes --csv if there are numbers to write, and
+    those of the shared `OPTIONS` that are named, with their defaults (None: no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
-    if one:
-        parser.add_argument("run", metavar="RUN.h5", help="file written by ricochet")
-    else:
-        parser.add_argument("runs", nargs="+", metavar="RUN.h5", help="files written by ricochet")
-    fixed = None if output.startswith("RUN") else Path(output)
-    parser.add_argument(
-        "-o",
-        "--output",
-        default=fixed,
-        type=Path,
-        metavar="FILE",
-        help=f"where to write [{output}]",
-    )
+    parser.set_defaults(title=doc.splitlines()[0])
+    some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
+    parser.add_argument("runs", type=read_run, metavar="RUN.h5", **some)
+    place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}
+    parser.add_argument("-o", "--output", type=Path, help=f"where to write [{output}]", **place)
     if csv:
         parser.add_argument("--csv", type=Path, metavar="FILE", help="write the numbers to a table")
     for name, default in defaults.items():
@@ -210,15 +202,20 @@ def chosen_disks(run: Run, ids: list[int]) -> list[int]:
     return [number - 1 for number in ids]
 
 
-def read_all(paths: Iterable[str]) -> list[Run]:
-    """The runs in the order given."""
-    return [read_run(path) for path in paths]
-
-
 def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:
     """Runs with the same value of `key` together, in ascending order."""
     ordered = sorted(runs, key=key)
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
+
+
+def by_restitution(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
+    """Runs of the same restitution together."""
+    return grouped(runs, lambda run: run.restitution)
+
+
+def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
+    """Runs of the same packing fraction together."""
+    return grouped(runs, lambda run: round(packing(run), 6))
 
 
 # --- the report ---
@@ -226,8 +223,6 @@ def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[floa
 
 def report(
     args: argparse.Namespace,
-    runs: list[Run],
-    title: str,
     figure: plt.Figure | None,
     *tables: Table,
     data: Table | None = None,
@@ -239,21 +234,55 @@ def report(
     stderr, and on the figure.
     """
     print("\n\n".join(text_of(table) for table in tables if table), flush=True)
-    notes = [*(run.shortcoming for run in runs if run.shortcoming), *notes]
+    notes = [*(run.shortcoming for run in args.runs if run.shortcoming), *notes]
     for note in [*notes, *without_error(tables)]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
         warn(figure, notes)
-        save(figure, args.output, runs, title)
+        save(figure, args.output, args.runs, args.title)
     if "csv" in args and args.csv:
         write_csv(args.csv, tables[0] if data is None else data)
 
 
-def measured(name: str, estimate: Estimate | SeriesMean | None) -> dict[str, float | None]:
-    """Two cells of a row: a mean and its error; None where there is nothing to measure."""
-    if estimate is None:
-        return {name: None, f"{name}_error": None}
-    return {name: float(estimate.mean), f"{name}_error": float(estimate.error)}
+def measured(
+    name: str, estimate: Estimate | SeriesMean | None, at: int | tuple = ()
+) -> dict[str, float | None]:
+    """Two cells of a row: a mean and its error, of one point of a curve or of a number.
+
+    None where there is nothing to measure.
+    """
+    parts = (None, None) if estimate is None else (estimate.mean, estimate.error)
+    values = [part if part is None else float(np.asarray(part)[at]) for part in parts]
+    return dict(zip((name, f"{name}_error"), values, strict=True))
+
+
+def over_runs(
+    name: str, members: Sequence[SeriesMean], notes: list[str], about: str
+) -> dict[str, float | None]:
+    """The cells of what runs say together; to the notes goes what speaks against it."""
+    notes += doubts(about, members)
+    return measured(name, combined(members))
+
+
+def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:
+    """Columns of arrays and estimates, with the errors of these; each name ends as said."""
+    columns = {}
+    for end, found in results.items():
+        for name, values in found.items():
+            if isinstance(values, Estimate):
+                columns |= {name + end: values.mean, f"{name}_error{end}": values.error}
+            else:
+                columns[name + end] = values
+    return columns
+
+
+def points(names: Sequence[str], curves: dict[tuple, Curve]) -> list[dict]:
+    """A row of these columns for each point of the curves: the key of the curve, x, y, error."""
+    return [
+        dict(zip(names, (*key, *map(float, point)), strict=True))
+        for key, curve in curves.items()
+        for point in zip(*curve, strict=True)
+    ]
 
 
 def without_error(tables: Sequence[Table]) -> list[str]:

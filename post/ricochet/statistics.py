@@ -21,6 +21,14 @@ class Estimate(NamedTuple):
     error: np.ndarray | float
 
 
+class Curve(NamedTuple):
+    """Points with the standard errors of y; (P,) each."""
+
+    x: np.ndarray
+    y: np.ndarray
+    error: np.ndarray  # NaN where there is none
+
+
 class LawTest(NamedTuple):
     """A sample compared with a law."""
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from . import hard_disks
 from .reader import Run, RunError, Species
-from .statistics import FEWEST, SeriesMean, equilibration, series_mean
+from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
 ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
+SIDES = ("left", "right", "bottom", "top")
 
 
 class Steps(NamedTuple):
@@ -94,6 +95,15 @@ def frames_from(
             chosen.append(frame)
             last = tau[frame]
     return chosen
+
+
+def later(run: Run, skip: float | None, cool: bool) -> slice:
+    """Frames in equilibrium, or after the start, without the last, which may be out of step."""
+    begin = after_start if cool else start_of_equilibrium
+    first = int(np.searchsorted(run.time, begin(run, skip)))
+    if run.frames - 1 - first < 2:
+        raise RunError(f"{run.path}: needs more frames after the start")
+    return slice(first, run.frames - 1)
 
 
 def steps(run: Run, skip: float | None = None) -> Steps:
@@ -206,3 +216,59 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
     return series_mean(work, s.time).scaled(1 / (2 * run.count * temperature(run)))
+
+
+def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
+    """P / (n kT) by virial, rate, walls, where they apply."""
+    if run.gravity.any():
+        raise RunError(f"{run.path}: falls, it has no equation of state")
+    empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
+    walled = empty and np.ptp(run.radius) == 0
+    ways = {
+        "virial": (z_virial, True),
+        "rate": (z_rate, equal_disks(run)),
+        "walls": (z_wall, walled),
+    }
+    return {name: way(run, skip) for name, (way, applies) in ways.items() if applies}
+
+
+def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
+    """By the virial, and by the sides that are walls; a side feels force per length."""
+    area, kt = np.prod(run.edges), run.count * temperature(run)
+    found = {"pressure_virial": z_virial(run, skip).scaled(kt / area)}
+    s = steps(run, skip)
+    for k, side in enumerate(SIDES):
+        if not run.periodic[k // 2]:
+            force = series_mean(s.impulse[:, k], s.time)
+            found[f"pressure_{side}"] = force.scaled(1 / run.edges[1 - k // 2])
+    return found
+
+
+def has_log(run: Run) -> bool:
+    """Whether the collisions of the run are in its file."""
+    return bool(run.parameter("output", "event_log", False))
+
+
+def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
+    """w_ij from the event log: of a disk of species i with disks of species j, per time."""
+    log, species = run.events, run.species - 1
+    cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
+    pairs = log.j > 0
+    one, other = species[log.i[pairs] - 1], species[log.j[pairs] - 1]
+    found = {}
+    for a, first in enumerate(run.by_species):
+        for b, second in enumerate(run.names):
+            weight = ((one == a) & (other == b)) * 1.0 + ((one == b) & (other == a))
+            counts, _ = np.histogram(log.time[pairs], cuts, weights=weight)
+            rate = series_mean(counts, np.diff(cuts))
+            found[f"w_{first.name}_{second}"] = rate.scaled(1 / first.disks.sum())
+    return found
+
+
+def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
+    """Pressures and rates of collisions, by name."""
+    found = pressures(run, skip) | {"collisions_per_disk_and_time": collision_rate(run, skip)}
+    if not run.periodic.all():
+        s = steps(run, skip)
+        found["side_hits_per_time"] = series_mean(s.hits, s.time)
+    return found | (pair_rates(run, skip) if has_log(run) else {})

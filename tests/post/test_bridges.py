@@ -17,26 +17,23 @@ def reader(module: str):
 
 
 @pytest.fixture
-def run(ricochet, tmp_path) -> Run:
-    """Two species in a container whose lower corner is not the origin."""
-    result = ricochet(
-        *(ROOT / "input" / "container.nml", "-o", "run.h5", "--quiet"),
-        *("--set", "stop.collisions_per_disk=2", "--set", "species.light.count=20"),
-    )
-    assert result.returncode == 0, result.stderr
-    return read_run(tmp_path / "run.h5")
+def simulated(ricochet, tmp_path):
+    """`simulated(input, *settings)` is the run of an input of the project."""
+
+    def made(name, *settings) -> Run:
+        options = [word for one in settings for word in ("--set", one)]
+        path = ROOT / "input" / f"{name}.nml"
+        done = ricochet(path, "-o", f"{name}.h5", "--quiet", *options)
+        assert done.returncode == 0, done.stderr
+        return read_run(tmp_path / f"{name}.h5")
+
+    return made
 
 
 @pytest.fixture
-def periodic_run(ricochet, tmp_path) -> Run:
-    """A gas between two walls, periodic along x."""
-    result = ricochet(
-        *(ROOT / "input" / "brownian.nml", "-o", "periodic.h5", "--quiet"),
-        *("--set", "box.boundary=periodic,wall", "--set", "species.gas.count=50"),
-        *("--set", "stop.time=0.1"),
-    )
-    assert result.returncode == 0, result.stderr
-    return read_run(tmp_path / "periodic.h5")
+def run(simulated) -> Run:
+    """Two species in a container whose lower corner is not the origin."""
+    return simulated("container", "stop.collisions_per_disk=2", "species.light.count=20")
 
 
 def exported(run: Run, name: str, *options) -> Path:
@@ -65,9 +62,10 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
         ]
 
 
-def test_ovito_knows_the_box_and_its_periodic_sides(run, periodic_run):
+def test_ovito_knows_the_box_and_its_periodic_sides(run, simulated):
     import_file = reader("ovito.io").import_file
-    for one in (run, periodic_run):
+    strip = ("box.boundary=periodic,wall", "species.gas.count=50", "stop.time=0.1")
+    for one in (run, simulated("brownian", *strip)):
         cell = import_file(str(exported(one, "run.xyz"))).compute(0).cell
         assert tuple(cell.pbc[:2]) == tuple(one.periodic)
         np.testing.assert_array_equal(np.diag(cell[:2, :2]), one.edges)
@@ -90,15 +88,6 @@ def test_mdanalysis_reads_positions_velocities_times_and_species(run):
     np.testing.assert_allclose(universe.atoms.radii, run.radius)
 
 
-def test_analyses_of_mdanalysis_work_on_a_run(run):
-    reader("MDAnalysis")
-    from MDAnalysis.analysis.rms import RMSF
-
-    atoms = mdanalysis_universe(run).atoms
-    spread = np.sqrt(np.sum(np.var(run.position[:], axis=0), axis=1))
-    np.testing.assert_allclose(RMSF(atoms).run().results.rmsf, spread, rtol=1e-4)
-
-
 def test_pandas_gets_all_observables(run):
     reader("pandas")
     table = run.to_dataframe()
@@ -113,25 +102,18 @@ def test_pandas_gets_all_observables(run):
 
 
 def test_csv_is_read_by_numpy(run):
-    table = np.genfromtxt(
-        exported(run, "run.csv", "--frames", "::2"), delimiter=",", names=True, dtype=None
-    )
+    path = exported(run, "run.csv", "--frames", "::2")
+    table = np.genfromtxt(path, delimiter=",", names=True, dtype=None)
     frames = range(0, run.frames, 2)
     assert len(table) == len(frames) * run.count
-    np.testing.assert_array_equal(
-        table["vx"], np.concatenate([run.velocity[k][:, 0] for k in frames])
-    )
+    speeds = np.concatenate([run.velocity[k][:, 0] for k in frames])
+    np.testing.assert_array_equal(table["vx"], speeds)
     np.testing.assert_array_equal(table["time"], np.repeat(run.time[frames], run.count))
     assert set(table["species"]) == {"light", "heavy"}
 
 
-def test_what_else_disks_have_is_exported_too(ricochet, tmp_path):
-    result = ricochet(
-        *(ROOT / "input" / "rough.nml", "-o", "rough.h5", "--quiet"),
-        *("--set", "stop.collisions_per_disk=2"),
-    )
-    assert result.returncode == 0, result.stderr
-    run = read_run(tmp_path / "rough.h5")
+def test_what_else_disks_have_is_exported_too(simulated):
+    run = simulated("rough", "stop.collisions_per_disk=2")
     table = np.genfromtxt(exported(run, "rough.csv", "--frames", "-1"), delimiter=",", names=True)
     head, *lines = exported(run, "rough.xyz", "--frames", "-1").read_text().splitlines()[1:]
     assert {"angular_velocity", "orientation"} == set(run.elements)

@@ -5,11 +5,11 @@ Frames in single precision: seven digits of a velocity are more than enough here
 
 import numpy as np
 
-from correlations import later
 from ricochet import Run
 from ricochet import hard_disks as hd
-from ricochet.diffusion import velocity_memory
 from ricochet.statistics import estimate
+from ricochet.thermodynamics import later
+from ricochet.transport import velocity_memory
 
 from .case import Case, Member, within
 from .inputs import gas

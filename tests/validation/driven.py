@@ -8,7 +8,7 @@ from ricochet import Run
 from ricochet.statistics import Estimate, combined, hold_against
 from ricochet.theory import ROUGH_RATIOS, maxwell_cdf
 from ricochet.thermodynamics import start_of_equilibrium
-from transport import MOMENTS, of_moments
+from ricochet.transport import MOMENTS, of_moments
 
 from .case import AT_LEAST, Case, Member, sigmas, within
 from .estimators import over

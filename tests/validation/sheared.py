@@ -5,9 +5,9 @@ from math import pi, sqrt
 
 import numpy as np
 
-from fields import estimates, prediction
 from ricochet import Run
 from ricochet import hard_disks as hd
+from ricochet.fields import estimates, prediction
 
 from .case import Case, Member, relative, sigmas
 from .estimators import over

@@ -1,0 +1,306 @@
+"""How disks carry momentum, energy and themselves: viscosities, conductivity, diffusion.
+
+Diffusion: lags are numbers of frames, which must be equally far apart; `frames` are those in
+equilibrium.  The integral of <v(0) v(t)> needs no sum over frames: that of v is the way x(t) -
+x(0), which the run knows exactly, however far apart its frames are.
+
+Viscosities and conductivity by Einstein and Helfand: a Helfand moment is what momentum or energy
+has been carried, times the way: disks carry m v_a v_b and (m v^2 / 2) v while they fly, and a
+collision hands dP_a and dE on over r = x_i - x_j.  Its mean square grows in time as the mean square
+displacement does, and half of the slope is the transport coefficient: times 1 / (A kT) for
+viscosities, 1 / (A kT^2) for the conductivity, A the area.  See Helfand, Phys. Rev. 119, 1 (1960);
+Alder, Gass and Wainwright, J. Chem. Phys. 53, 3813 (1970).  Velocities between collisions are the
+first ones and all changes in the event log, and r is along the change of momentum, one diameter
+long: so the moments are exact, at any time, without positions.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import hard_disks
+from .reader import Events, Run, RunError, read_run
+from .statistics import Curve, SeriesMean, estimate, series_mean
+from .thermodynamics import (
+    drift,
+    equal_disks,
+    free_disks,
+    mean_free_time,
+    packing,
+    start_of_equilibrium,
+    temperature,
+)
+
+PER_FREE_TIME = 10  # samples of the moments
+#: Mean free times after which fluxes are forgotten: in a dilute gas as exp(-w t / 2.06), that of
+#: heat, which lives longest; from half of this on less than 0.2 % of the conductivity is missing.
+MEMORY = 20.0
+CLOSE = 1e-5  # of a velocity
+MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
+
+
+# --- diffusion ---
+
+
+def lags(frames: int, per_decade: int = 12) -> np.ndarray:
+    """Whole numbers of frames, in logarithmic steps, up to half the run."""
+    last = max(1, frames // 2)
+    count = 1 + int(per_decade * np.log10(last))
+    return np.unique(np.geomspace(1, last, count).round().astype(int))
+
+
+def velocity_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
+    """Normalised velocity autocorrelation at lags in frames."""
+    v = run.velocity[frames]
+    return np.array([np.mean(v[k:] * v[: len(v) - k]) for k in at]) / np.mean(v**2)
+
+
+def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
+    """(T, N, 2) positions, continuous in time, and velocities, relative to the centre of mass."""
+    return tuple(
+        values - np.average(values, axis=1, weights=run.mass, keepdims=True)
+        for values in (run.unwrapped(frames), run.velocity[frames])
+    )
+
+
+def displacement(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
+    """Mean square displacement at lags in frames, relative to the centre of mass."""
+    x, _ = motion(run, frames)
+    return np.array([2 * np.mean((x[k:] - x[: len(x) - k]) ** 2) for k in at])
+
+
+def integrated_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
+    """D(t) at lags in frames: half the integral of <v(0) v(s)> from 0 to t."""
+    x, v = motion(run, frames)
+    return np.array([np.mean(v[: len(v) - k] * (x[k:] - x[: len(x) - k])) for k in at])
+
+
+def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
+    """In frames: until sound has crossed the box, so that disks feel its size.
+
+    Or an eighth of the shortest run.
+    """
+    run, shortest = runs[0], min(f.stop - f.start for f in frames)
+    sound = hard_disks.speed_of_sound(packing(run), temperature(run), run.mass.mean())
+    crossing = float(run.edges.min()) / sound / (run.time[1] - run.time[0])
+    return int(np.clip(crossing, 2, max(2, shortest // 8)))
+
+
+def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean]:
+    """D between the lags `lag` / 2 and `lag`, from the displacements and from the velocities.
+
+    That is the mean over these lags of d<r^2>/dt / 4, and of half the integral of <v(0) v(t)>.  One
+    origin in time gives one value, so that the error knows what disks remember and share.  Between
+    frames the latter is a cubic curve, whose slopes <v(0) v(t)> are known: off by 0.2 % of D at
+    most, for a memory that falls exponentially, and by far less if D(t) has settled.
+    """
+    step, half = float(run.time[1] - run.time[0]), lag // 2
+    x, v = motion(run, frames)
+    origins = len(x) - lag
+    near, far = (np.sum((x[k : k + origins] - x[:origins]) ** 2, axis=2) for k in (half, lag))
+    spread = (far - near).mean(axis=1) / (4 * step * (lag - half))
+    area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # the integral of x over time, in steps
+    mean = (area[lag : lag + origins] - area[half : half + origins]) / (lag - half)
+    memory = np.sum(v[:origins] * (mean - x[:origins]), axis=2).mean(axis=1) / 2
+    return series_mean(spread), series_mean(memory)
+
+
+# --- Helfand moments ---
+
+
+def check(run: Run) -> None:
+    """Refuse all but the gases that the moments are for."""
+    alone = run.periodic.all() and not (run.gravity.any() or run.obstacles or len(run.walls))
+    driven = run.kicked or run.shear_rate != 0 or "angular_velocity" in run.elements
+    if not alone or driven or run.time_step or not equal_disks(run) or run.restitution != 1:
+        raise RunError(
+            f"{run.path}: transport takes equal elastic smooth disks in a periodic box, by events "
+            "and at rest: no gravity, walls, shear or kicks"
+        )
+
+
+def log(run: Run) -> Events:
+    """The events until the last frame."""
+    events = read_run(run.path).events  # logs are long: the run would keep them
+    seen = np.searchsorted(events.time, run.time[-1], "right")
+    return Events(*(part[:seen] for part in events))
+
+
+def velocities(run: Run, events: Events) -> tuple[np.ndarray, np.ndarray]:
+    """(E, 2, 2) velocities of the disks i and j before each collision and after it.
+
+    Raises RunError if the log does not lead from the first frame to the last.
+    """
+    start, end = run.velocity[[0, -1]] - drift(run)
+    _, i, j, _, change = events
+    disk = np.stack([i, j], axis=1).ravel() - 1
+    change = np.stack([change, -change], axis=1).reshape(-1, 2) / run.mass[disk, None]
+    order = np.argsort(disk, kind="stable")  # the collisions of each disk in turn
+    disk, change = disk[order], change[order]
+    before = np.cumsum(change, axis=0) - change
+    first, last = (np.searchsorted(disk, disk, side) for side in ("left", "right"))
+    before += start[disk] - before[first]
+    after = before + change
+    if not np.allclose(after[last - 1], end[disk], rtol=0, atol=CLOSE * np.abs(end).max()):
+        raise RunError(f"{run.path}: the event log does not lead from the first frame to the last")
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return before[back].reshape(-1, 2, 2), after[back].reshape(-1, 2, 2)
+
+
+def flux(v: np.ndarray, mass: float) -> np.ndarray:
+    """(..., 5) what disks with the velocities (..., 2) carry: momentum xx, xy, yy, energy x, y."""
+    x, y = np.moveaxis(v, -1, 0)
+    energy = mass * (x**2 + y**2) / 2
+    return np.stack([mass * x * x, mass * x * y, mass * y * y, energy * x, energy * y], axis=-1)
+
+
+def handed_on(run: Run, change: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(E, 5) the same, from disk to disk in each collision."""
+    way = 2 * run.radius[0] * change / np.linalg.norm(change, axis=1, keepdims=True)
+    gain = run.mass[0] * np.sum(after[:, 0] ** 2 - before[:, 0] ** 2, axis=1) / 2
+    products = [change[:, a] * way[:, b] for a, b in ((0, 0), (0, 1), (1, 1))]
+    return np.stack([*products, gain * way[:, 0], gain * way[:, 1]], axis=1)
+
+
+def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
+    """From the time `start` to the last frame, `PER_FREE_TIME` samples per mean free time.
+
+    Their step, and by coefficient the moments (T, C) without their mean growth: of the momentum xy
+    and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y.
+    """
+    check(run)
+    events = log(run)
+    before, after = velocities(run, events)
+    mass = run.mass[0]
+    carried = flux(run.velocity[0] - drift(run), mass).sum(axis=0)
+    changes = (flux(after, mass) - flux(before, mass)).sum(axis=1)
+    carried = carried + np.cumsum(np.vstack([np.zeros(5), changes]), axis=0)
+    knots = np.concatenate([run.time[:1], events.time, run.time[-1:]])
+    flown = np.cumsum(np.vstack([np.zeros(5), carried * np.diff(knots)[:, None]]), axis=0)
+    handed = handed_on(run, events.momentum_change, before, after)
+    handed = np.cumsum(np.vstack([np.zeros(5), handed]), axis=0)
+
+    step = mean_free_time(run) / PER_FREE_TIME
+    time = np.arange(start, run.time[-1], step)
+    total = handed[np.searchsorted(events.time, time, "right")]
+    total += np.stack([np.interp(time, knots, part) for part in flown.T], axis=1)
+    total -= total[0] + np.linspace(0, 1, len(time))[:, None] * (total[-1] - total[0])
+    xx, xy, yy, *heat = total.T
+    parts = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat
+    return step, {name: np.stack(one, axis=1) for name, one in zip(MOMENTS, parts, strict=True)}
+
+
+def squares(moment: np.ndarray, lag: int) -> np.ndarray:
+    """(T - lag,) squares of what the moment (T, C) gains in `lag` samples, mean of the components.
+
+    The mean growth, which is that of the series itself, has taken lag / (T - 1) of them away.
+    """
+    gain = moment[lag:] - moment[: len(moment) - lag]
+    return np.mean(gain**2, axis=1) / (1 - lag / (len(moment) - 1))
+
+
+def running(moment: np.ndarray, step: float, at: np.ndarray) -> np.ndarray:
+    """Half of the slope of the mean square between each of the lags (in samples) and the last."""
+    mean = np.array([squares(moment, lag).mean() for lag in at])
+    return np.diff(mean, prepend=0) / np.diff(at, prepend=0) / (2 * step)
+
+
+def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
+    """Half of the slope of the mean square between the lags `lag` / 2 and `lag`.
+
+    One origin in time gives one value, as for the diffusion coefficient.
+    """
+    half = lag // 2
+    near, far = squares(moment, half), squares(moment, lag)
+    return series_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
+
+
+# --- coefficients over those of Enskog ---
+
+
+class Found(NamedTuple):
+    """A coefficient at one packing fraction, over Enskog's."""
+
+    members: list[SeriesMean]  # of the runs
+    curve: Curve  # against the lag, in mean free times
+    lag: float  # at which they were taken [mean free times]
+
+
+def enskog(eta: float, diameter: float = 1.0, kt: float = 1.0, mass: float = 1.0):
+    """The coefficients by Enskog's theory, by name."""
+    state = (hard_disks.henderson(eta), eta, diameter, kt, mass)
+    density = mass * 4 * eta / (np.pi * diameter**2)
+    return {
+        "viscosity": density * hard_disks.enskog_viscosity(*state),
+        "conductivity": hard_disks.enskog_conductivity(*state),
+        "bulk_viscosity": density * hard_disks.enskog_bulk_viscosity(*state),
+        "D": hard_disks.enskog_diffusion(*state),
+    }
+
+
+def enskog_of(run: Run) -> dict[str, float]:
+    """The same of a run, in its units and at its temperature."""
+    return enskog(packing(run), 2 * run.radius[0], temperature(run), run.mass[0])
+
+
+def enskog_by_rate(run: Run) -> tuple[float, float]:
+    """Diffusion coefficient and kinematic viscosity of equal disks, with the Z of their rate."""
+    diameter, kt, mass = 2 * run.radius[0], temperature(run), run.mass[0]
+    unit = hard_disks.collision_rate(2.0, diameter, free_disks(run), kt, mass)
+    state = (1 + 1 / (mean_free_time(run) * unit), packing(run), diameter, kt, mass)
+    return hard_disks.enskog_diffusion(*state), hard_disks.enskog_viscosity(*state)
+
+
+def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
+    """Viscosities and conductivity."""
+    each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
+    shortest = min(len(one["viscosity"]) for _, one in each)
+    lag = min(round(MEMORY * PER_FREE_TIME), shortest // 8)
+    if lag < PER_FREE_TIME:
+        raise RunError(f"{runs[0].path}: needs more than eight collisions per disk in equilibrium")
+    at = lags(4 * lag)  # up to twice the lag
+    middle = (at + np.append(0, at[:-1])) / 2 / PER_FREE_TIME
+    found = {}
+    for name in MOMENTS:
+        members, slopes = [], []
+        for run, (step, one) in zip(runs, each, strict=True):
+            kt = temperature(run)
+            unit = float(np.prod(run.edges)) * (kt**2 if name == "conductivity" else kt)
+            unit = 1 / unit / enskog_of(run)[name]
+            members.append(coefficient(one[name], step, lag).scaled(unit))
+            slopes.append(running(one[name], step, at) * unit)
+        found[name] = Found(members, Curve(middle, *estimate(slopes)), lag / PER_FREE_TIME)
+    return found
+
+
+def in_step(run: Run, start: float) -> slice:
+    """Frames in equilibrium that are equally far apart, as all but the last must be."""
+    frames = slice(int(np.searchsorted(run.time, start)), run.frames - 1)
+    apart = np.diff(run.time[frames])
+    if len(apart) < 16 or np.ptp(apart) > 1e-6 * apart[0]:
+        raise RunError(
+            f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
+            "output.frames_every_time"
+        )
+    return frames
+
+
+def of_displacements(runs: list[Run], starts: list[float]) -> Found:
+    """The diffusion coefficient."""
+    frames = [in_step(run, start) for run, start in zip(runs, starts, strict=True)]
+    lag = diffusion_lag(runs, frames)
+    at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
+    units = [1 / enskog_of(run)["D"] for run in runs]
+    members = [diffusion(*one, lag)[1].scaled(unit) for one, unit in zip(pairs, units, strict=True)]
+    slopes = [integrated_memory(*one, at) * unit for one, unit in zip(pairs, units, strict=True)]
+    step = np.mean([(run.time[1] - run.time[0]) / mean_free_time(run) for run in runs])
+    return Found(members, Curve(at * step, *estimate(slopes)), lag * step)
+
+
+def coefficients(runs: list[Run], skip: float | None) -> dict[str, Found]:
+    """All coefficients at one packing fraction."""
+    for run in runs:
+        check(run)
+    starts = [start_of_equilibrium(run, skip) for run in runs]
+    return of_moments(runs, starts) | {"D": of_displacements(runs, starts)}

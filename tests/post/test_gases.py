@@ -1,0 +1,545 @@
+"""Pressure, rates, cooling, transport and fields: the estimators of post/ on gases.
+
+Runs that are made, whose answer is known, and small runs of the program, on which the scripts draw.
+"""
+
+import csv
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import correlations
+import driven
+import melting
+from ricochet import Events, RunError, fields, free_paths, read_run, statistics, theory
+from ricochet import cooling as cool
+from ricochet import hard_disks as hd
+from ricochet import thermodynamics as td
+from ricochet import transport as tp
+from ricochet.driven import demon_law, noise_law
+from synthetic_run import ROOT, run_script, write_run
+from validation.estimators import force, hit_rate
+from whole_runs import FINISHED, write_input
+
+PERIODIC = (True, True)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(8)
+
+
+def written(path, position, velocity, **options):
+    """A run read back."""
+    return read_run(write_run(path, position, velocity, **options))
+
+
+@pytest.fixture
+def simulated(ricochet, tmp_path):
+    """`simulated(input, name, *settings)` runs an input or its text; the path of the output."""
+
+    def run(system, name="gas", *settings):
+        path = system if isinstance(system, Path) else write_input(tmp_path, system)
+        options = [word for one in settings for word in ("--set", one)]
+        done = ricochet(path, *options, "--quiet", "--force", "-o", f"{name}.h5")
+        assert done.returncode == FINISHED, done.stderr
+        return tmp_path / f"{name}.h5"
+
+    return run
+
+
+def rows_of(path):
+    """The rows of a table."""
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def drawn(folder, script, *arguments):
+    """Run a script, warnings being errors; the rows of its table."""
+    figure, table = folder / f"{script}.png", folder / f"{script}.csv"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run_script(script, *arguments, "-o", figure, "--csv", table) == 0
+    assert figure.stat().st_size > 10000
+    return rows_of(table)
+
+
+# --- pressure ---
+
+
+def steady(path, periodic, speed=1.0, radius=0.01, **parameters):
+    """100 disks with kT = 2 speed^2; all sums grow linearly in time."""
+    time = np.arange(201.0)
+    v = speed * np.tile([[2.0, 0.0], [-2.0, 0.0]], (1, 50, 1)).repeat(2, axis=0)
+    observables = {
+        "collisions": (500 * time).astype(int),
+        "virial": 300 * speed**2 * time,
+        "wall_collisions": np.outer(time, (3, 3, 4, 4)).astype(int),
+        "wall_impulse": speed**2 * np.outer(time, (400.0, 400.0, 500.0, 500.0)),
+    }
+    more = {"observables": observables, "observable_time": time, "parameters": parameters}
+    more |= {"time": [0, 200], "radius": radius, "periodic": periodic}
+    return written(path, np.full_like(v, 0.5), v, **more)
+
+
+def test_three_pressures_of_a_steady_run(tmp_path):
+    walled = steady(tmp_path / "walls.h5", (False, False))
+    assert td.temperature(walled) == 2
+    z = td.z_virial(walled)
+    assert z.mean == pytest.approx(1 + 300 / 400) and z.error == pytest.approx(0, abs=1e-12)
+    assert td.z_wall(walled).mean == pytest.approx(900 * 0.98 / 400)
+    assert td.collision_rate(walled).mean == pytest.approx(10)
+    assert hit_rate(walled).mean == pytest.approx(14)
+    assert force(walled).mean == pytest.approx(450)
+    unit = hd.collision_rate(2.0, 0.02, 100, 2.0)
+    assert td.z_rate(walled).mean == pytest.approx(1 + 10 / unit)
+    bulk = steady(tmp_path / "bulk.h5", PERIODIC)
+    assert td.temperature(bulk) == pytest.approx(200 / 99)
+    assert td.z_virial(bulk).mean == pytest.approx(1 + 300 / (2 * 100 * 200 / 99))
+    assert set(td.z_ways(bulk)) == {"virial", "rate"}
+
+
+@pytest.mark.parametrize("periodic", [(False, False), (True, False), PERIODIC])
+def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
+    """A few disks share what the conserved motion of them all does not have."""
+    kept, mass, heat = np.array(periodic), np.array([9.0, 1.0, 1.0, 1.0]), 3.0
+    v = rng.normal(size=(20000, 4, 2)) / np.sqrt(mass)[:, None]
+    v -= kept * np.average(v, axis=1, weights=mass, keepdims=True)
+    v *= np.sqrt(heat / np.sum(0.5 * mass[:, None] * v**2, axis=(1, 2)))[:, None, None]
+    v += kept * np.array([0.2, -0.1])
+    parts = {"species": [1, 2, 2, 2], "names": ("big", "small"), "mass": mass}
+    run = written(tmp_path / "run.h5", 0 * v, v, periodic=periodic, **parts)
+    assert td.temperature(run) == pytest.approx(heat / (4 - kept.sum() / 2))
+    for kind in run.by_species:
+        energy = run.kinetic_energy(slice(None))[:, kind.disks].mean()
+        assert td.mean_energy(run, kind.mass) == pytest.approx(energy, rel=0.02)
+    inside = {"obstacles": [((0.5, 0.5), 0.1, 0)], "periodic": periodic}
+    stopped = written(tmp_path / "stopped.h5", 0 * v[:1], v[:1], mass=mass, **inside)
+    expected = stopped.kinetic_energy(0).mean()
+    assert td.temperature(stopped) == pytest.approx(expected), "an obstacle takes all"
+
+
+@pytest.mark.parametrize(
+    ("script", "system"),
+    [
+        *((name, "wall") for name in ("rates", "equation_of_state")),
+        *((name, "periodic") for name in ("melting", "coverage")),
+    ],
+)
+def test_a_gas_that_walls_cool_has_no_equilibrium(simulated, tmp_path, capsys, script, system):
+    """Its disks are elastic; the walls, or an obstacle in a periodic box, take energy."""
+    text = f"""&box boundary = '{system}', '{system}' /
+    &species count = 64 radius = 0.02 temperature = 1 /
+    &contact restitution = 1 wall_restitution = 0.9 / &stop collisions_per_disk = 40 /
+    &output frames_every_time = 0.05 observables_every_time = 0.05 /"""
+    text += (system == "periodic") * "&obstacle centre = 0.5, 0.5 radius = 0.1 /"
+    seeds = range(1, 11 if script == "coverage" else 2)
+    runs = [simulated(text, f"{seed}", f"run.seed={seed}") for seed in seeds]
+    assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+    said = capsys.readouterr().err
+    assert "1.h5: is not elastic: it loses energy in collisions" in said and said.count("\n") == 1
+
+
+def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
+    """Of twelve gases whose pressure scatters without a memory, as the naive errors have it."""
+    runs = []
+    for k in range(12):
+        v, time = np.ones((2, 100, 2)), np.arange(401.0)
+        virial = np.append(0, np.cumsum(300 + 30 * rng.normal(size=400)))
+        observables = {"virial": virial, "collisions": (500 * time).astype(int)}
+        observables |= {name: np.zeros((401, 4)) for name in ("wall_collisions", "wall_impulse")}
+        more = {"observables": observables, "observable_time": time, "time": [0, 400]}
+        runs.append(write_run(tmp_path / f"{k}.h5", v, v, **more))
+    (row,) = drawn(tmp_path, "coverage", *runs)
+    assert float(row["error"]) == pytest.approx(float(row["naive_error"]), rel=0.3)
+    assert float(row["naive_error"]) == pytest.approx(float(row["scatter"]), rel=0.6)
+    assert 30 < float(row["within_%"]) < 95
+
+
+def test_melting_has_a_curve_for_each_number_of_disks(tmp_path, capsys):
+    """The pressure of 4 eta / pi Z; between walls, of mixtures, there is none."""
+    run = steady(tmp_path / "equal.h5", PERIODIC)
+    (row,), _ = melting.table([run], None)
+    kt = td.temperature(run)
+    assert row["P"] == pytest.approx((100 * kt + 300 / 2) * 0.02**2 / kt, rel=1e-5)
+    axes = melting.draw([row, {**row, "N": 400}], [run]).axes[0]
+    assert {"N = 100", "N = 400"} < set(axes.get_legend_handles_labels()[1])
+    falling = {"box": {"gravity": [0.0, -1.0]}}
+    for kind, more in (("walls", {"periodic": (True, False)}), ("mixed", {}), ("falling", falling)):
+        radius = np.repeat([0.01, 0.02], 50) if kind == "mixed" else 0.01
+        other = steady(tmp_path / f"{kind}.h5", radius=radius, **{"periodic": PERIODIC, **more})
+        assert run_script("melting", other.path, "-o", tmp_path / "no.png") == 2
+        assert "needs equal disks in a periodic box without gravity" in capsys.readouterr().err
+
+
+# --- free paths ---
+
+
+def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path):
+    """A disk that flies 1, 1, 4, 1, 1, 4, ... time units between hits; another one without hits."""
+    hits = np.cumsum(np.tile([1.0, 1.0, 4.0], 40))
+    time = np.linspace(0.05, hits[-1] - 0.05, 2400)
+    v = np.tile([[0.5, 0.0], [1.0, 0.0]], (len(time), 1, 1))
+    collisions = {"collisions": np.zeros(len(time), int)}
+    run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=collisions)
+    zero = np.zeros(len(hits), int)
+    run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
+    path, weight = free_paths.free_paths(run, skip=0)
+    assert set(np.round(path, 9)) == {0.5, 2.0}
+    assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
+
+
+def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
+    """Of runs, and of one run in blocks: paths without memory, 4000 to a run."""
+    monkeypatch.setattr(
+        free_paths, "free_paths", lambda run, skip: (rng.exponential(2.0, 4000), np.ones(4000))
+    )
+    monkeypatch.setattr(free_paths, "has_log", lambda run: True)
+    for runs, samples in ((1, 4000), (50, 200000)):
+        mean, density = free_paths.mean_and_density([None] * runs)
+        assert abs(mean.mean - 2) < 4 * mean.error
+        assert mean.error == pytest.approx(2 / np.sqrt(samples), rel=0.9 if runs == 1 else 0.4)
+        law = np.diff(np.exp(-free_paths.BINS)) / np.diff(free_paths.BINS)
+        off = (density.mean + law)[:16] / density.error[:16]
+        assert np.mean(np.abs(off) < 3) > 0.8
+
+
+# --- the scripts, on runs of the program ---
+
+RUNS = (
+    ("species.disks.packing_fraction=0.05",),
+    ("species.disks.packing_fraction=0.3",),
+    ("species.disks.packing_fraction=0.02", "contact.restitution=0.9"),
+)
+
+
+@pytest.fixture
+def bulk(simulated):
+    """Small gases at two packing fractions, and one that cools."""
+    settings = ["species.disks.count=100", "stop.collisions_per_disk=60"]
+    settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
+    settings += ["output.event_log=true"]
+    system = ROOT / "input" / "bulk.nml"
+    return [simulated(system, f"{k}", *settings, *more) for k, more in enumerate(RUNS)]
+
+
+def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_path):
+    rows = {row["what"]: row for row in drawn(tmp_path, "correlations", *bulk[:1])}
+    both = [rows[f"D_{way}"] for way in ("displacement", "velocities")]
+    one, other = (float(row["y"]) for row in both)
+    error, run = float(both[0]["error"]), read_run(bulk[0])
+    assert 0 < error < 0.3 * one and one == pytest.approx(other, abs=error)
+    assert one == pytest.approx(tp.enskog_by_rate(run)[0], abs=4 * error + 0.1 * one)
+    assert {"vacf", "msd", "g", "S", "g6", "psi6_local", "psi6_global"} <= set(rows)
+    twice = correlations.analysed([run, run], None, cool=False)
+    for name in ("vacf", "msd", "a2", "g", "S", "D_velocities(t)", "D_displacement(t)"):
+        assert np.all(twice.curves[name].error == 0), name
+    alone = correlations.analysed([run], None, cool=False)
+    assert np.isnan(alone.curves["vacf"].error).all()
+
+
+def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
+    run = read_run(bulk[0])
+    found = td.rates(run)
+    per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
+    assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
+    assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
+    (mean, error), (density, _) = free_paths.mean_and_density([run])
+    assert 0 < error < 0.03 * mean
+    speed = np.mean(run.speed(slice(None)))
+    assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
+    assert np.sum(density * np.diff(free_paths.BINS)) == pytest.approx(1, abs=0.02)
+    points = [row for row in drawn(tmp_path, "rates", *bulk[:1]) if row["x"]]
+    names = [row["quantity"] for row in points]
+    assert names.count("free_path_density") == len(free_paths.BINS) - 1
+    assert names.count("pressure_virial(t)") > 10
+
+
+def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
+    """And no diffusion, no pressure, no equation of state."""
+    rows = drawn(tmp_path, "correlations", bulk[2])
+    assert "loses energy, no equilibrium: no memory" in capsys.readouterr().err
+    assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
+    run = read_run(bulk[2])
+    assert run.collisions_per_disk_at(run.time[td.later(run, None, cool=True).start]) > 14
+    rows = {row["quantity"]: row["mean"] for row in drawn(tmp_path, "rates", bulk[2])}
+    assert "loses energy, no equilibrium" in capsys.readouterr().err
+    assert not any(name.startswith("pressure") for name in rows)
+    eta, diameter = td.packing(run), 2 * run.radius[0]
+    density = (run.count - 1) / np.prod(run.edges)
+    contact = (hd.simulated(eta) - 1) / (2 * eta)  # a path does not know how fast it is flown
+    enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
+    assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
+    found, rate, _ = cool.haff([cool.energy_left(run)], 0.9)
+    for y, law in (("K_by_time", "haff"), ("K", "law")):
+        early = found[law] > 0.1
+        np.testing.assert_allclose(found[y].mean[early], found[law][early], rtol=0.2)
+    assert np.isnan(rate.error), "of a single run"
+    drawn(tmp_path, "haff", bulk[2])
+    drawn(tmp_path, "equation_of_state", *bulk[:2])
+
+
+def test_what_is_no_gas_in_equilibrium_is_refused(bulk, tmp_path, capsys):
+    falling = {"box": {"gravity": [0.0, -1.0]}}
+    x = np.full((20, 4, 2), 0.5)
+    fall = write_run(tmp_path / "fall.h5", x, x, parameters=falling)
+    radius = {"radius": [0.01, 0.01, 0.02, 0.02], "species": [1, 1, 2, 2], "names": ("a", "b")}
+    two_sizes = write_run(tmp_path / "mixed.h5", x, x, **radius)
+    for script, lossy, words in (
+        ("correlations", [bulk[0], bulk[2]], ("draw them", "without gravity", "not equal disks")),
+        ("equation_of_state", [bulk[2]], ("not elastic", "falls", "not of one radius")),
+    ):
+        for runs, word in zip((lossy, [fall], [bulk[0], two_sizes]), words, strict=True):
+            assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
+            said = capsys.readouterr().err
+            assert said.startswith(f"{script}.py: {runs[-1]}: ") and said.count("\n") == 1
+            assert word in said
+
+
+def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, simulated, tmp_path):
+    """Of equal disks both ways agree; a gas of two sizes cools by the same laws."""
+    run = read_run(bulk[2])
+    assert cool.counted_rate(run) == pytest.approx(cool.first_rate(run), rel=0.1)
+    two = simulated(
+        """&box boundary = 'periodic', 'periodic' / &contact restitution = 0.9 /
+        &species name = 'small' count = 400 radius = 0.005 temperature = 1 /
+        &species name = 'large' count = 400 radius = 0.008 temperature = 1 /
+        &stop collisions_per_disk = 15 /
+        &output observables_every_collisions_per_disk = 0.1 /""",
+        "two",
+    )
+    w0_t, tau, left = cool.energy_left(read_run(two))
+    np.testing.assert_allclose(left, hd.haff_by_collisions(tau, 0.9), rtol=0.1)
+    np.testing.assert_allclose(left, hd.haff_by_time(w0_t, 0.9), rtol=0.15)
+    drawn(tmp_path, "haff", two)
+
+
+def test_rough_gases_are_drawn_and_others_refused(simulated, tmp_path, capsys):
+    text = """&box upper = 60, 60 boundary = 'periodic', 'periodic' /
+    &species count = 100 radius = 0.5 temperature = 1 / &contact restitution = 0.9 {} /
+    &stop collisions_per_disk = 3 / &output observables_every_collisions = 20 /"""
+    drawn(tmp_path, "rough", simulated(text.format("tangential_restitution = 0"), "a"))
+    smooth = simulated(text.format(""), "b")
+    assert run_script("rough", smooth, "-o", tmp_path / "b.png") == 2
+    assert "equal rough disks" in capsys.readouterr().err
+
+
+def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
+    text = """&box boundary = 'wall', 'wall' gravity = 0, -1 /
+    &side name = 'bottom' motion = 'sawtooth' velocity = 0.1 / &wall from = 0.5, 0 to = 0.5, 0.3 /
+    &species count = 9 radius = 0.02 temperature = 1 /
+    &contact restitution = 0.9 wall_restitution = 1 wall_rule = 'normal' /
+    &drive kind = 'noise' strength = 1 interval = 0.1 / &stop time = 1 /"""
+    changes = {
+        **{"a": "run.seed=1", "b": "run.seed=2", "c": "side.bottom.velocity=0.2"},
+        **{"d": "drive.strength=2", "e": "contact.restitution=0.8"},
+    }
+    runs = [read_run(simulated(text, name, change)) for name, change in changes.items()]
+    groups = driven.by_input(runs)
+    found = [[run.path.stem for run in group] for group in groups.values()]
+    assert found == [["a", "b"], ["c"], ["d"], ["e"]]
+    assert list(groups)[1] == "ξ = 0.9, bottom velocity = 0.2, drive strength = 1"
+    expected = theory.demon_share(0.3 / 0.01, 9 * 0.04 / 0.46, 0.9)
+    assert demon_law(runs[0]) == pytest.approx(expected)
+    assert noise_law(runs[0]) is None, "walls take part"
+
+
+# --- transport ---
+
+GAS = """&run seed = {seed} / &box boundary = {sides} /
+&species count = {count} packing_fraction = {packing} temperature = 2 mass = 3 /
+&contact restitution = {restitution} / &stop collisions_per_disk = {length} /
+&output event_log = {log} virial_tensor = {tensor} {cadence} /
+"""
+USUAL = {
+    "seed": 1, "sides": "'periodic', 'periodic'", "count": 64, "packing": 0.1, "restitution": 1,
+    "length": 400, "log": ".true.", "tensor": ".true.",
+    "cadence": "frames_every_time = 0.05 observables_every_collisions = 64",
+}  # fmt: skip
+
+
+@pytest.fixture
+def gas(simulated):
+    """A run of a periodic gas, with what is unusual about it."""
+    return lambda name="gas", **unusual: read_run(simulated(GAS.format(**USUAL | unusual), name))
+
+
+def test_moments_are_those_of_the_definition(gas):
+    """With a frame at each event places and velocities tell what is carried and handed on."""
+    run = gas(count=10, packing=0.3, length=40, cadence="frames_every_events = 1")
+    x, v, m, time = run.position[:], run.velocity[:], run.mass[0], run.time
+    v = v - v[0].mean(axis=0)
+    flown, handed = [], []
+    for k in range(run.frames - 1):
+        flown.append((time[k + 1] - time[k]) * tp.flux(v[k], m).sum(axis=0))
+        changed = np.flatnonzero(np.any(v[k + 1] != v[k], axis=1))
+        if len(changed) == 0:
+            handed.append(np.zeros(5))
+            continue
+        i, j = changed
+        r = x[k + 1, i] - x[k + 1, j]
+        r -= run.edges * np.round(r / run.edges)
+        dp = m * (v[k + 1, i] - v[k, i])
+        de = m * (v[k + 1, i] @ v[k + 1, i] - v[k, i] @ v[k, i]) / 2
+        handed.append([dp[0] * r[0], dp[0] * r[1], dp[1] * r[1], *(de * r)])
+    expected = np.vstack([np.zeros(5), np.cumsum(np.add(flown, handed), axis=0)])
+
+    step, found = tp.moments(run, 0.0)
+    at = np.arange(len(found["viscosity"])) * step
+    before = np.searchsorted(time, at, "right") - 1
+    rest = (at - time[before])[:, None] * np.array([tp.flux(v[k], m).sum(0) for k in before])
+    xx, xy, yy, *heat = (expected[before] + rest).T
+    parts = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat
+    for name, own in zip(tp.MOMENTS, parts, strict=True):
+        for one, other in zip(found[name].T, own, strict=True):
+            straight = other[0] + np.linspace(0, 1, len(at)) * (other[-1] - other[0])
+            np.testing.assert_allclose(one, other - straight, atol=1e-7 * np.ptp(other))
+
+
+def test_collisions_hand_on_what_the_virial_tensor_counts(gas):
+    run = gas()
+    events = tp.log(run)
+    handed = tp.handed_on(run, events.momentum_change, *tp.velocities(run, events))
+    tensor = run.observable("virial_tensor").value[-1]
+    np.testing.assert_allclose(handed.sum(axis=0)[[0, 1, 1, 2]], tensor, rtol=1e-9, atol=1e-9)
+    gap = type(events)(*(np.delete(part, 7, axis=0) for part in events))
+    with pytest.raises(RunError, match="does not lead"):
+        tp.velocities(run, gap)
+
+
+def fluctuating(rng, count, memory):
+    """(count, 2) moments of fluxes that forget as exp(-t / memory), without their mean growth."""
+    keep = np.exp(-1 / memory)
+    noise = rng.normal(0, np.sqrt(1 - keep**2), (count + 500, 2))
+    moment = np.cumsum(lfilter([1], [1, -keep], noise, axis=0)[500:] + 0.3, axis=0)
+    return moment - np.linspace(moment[0], moment[-1], len(moment))
+
+
+def test_fluxes_that_forget_have_the_coefficient_and_the_errors_they_should():
+    """It is the sum of their memory; right errors hold it in 68 % of all cases."""
+    rng, keep = np.random.default_rng(4), np.exp(-1 / 6)
+    truth = (1 + keep) / (1 - keep) / 2
+    found = [tp.coefficient(fluctuating(rng, 6000, 6.0), 1.0, 100) for _ in range(300)]
+    mean, error = np.array([(one.mean, one.error) for one in found]).T
+    assert mean.mean() == pytest.approx(truth, abs=4 * mean.std() / np.sqrt(300))
+    held = np.mean(np.abs(mean - truth) < error)
+    assert held == pytest.approx(2 * statistics.ONE_SIGMA - 1, abs=0.1)
+    slopes = tp.running(fluctuating(np.random.default_rng(5), 400000, 6.0), 0.5, [1, 40, 80])
+    assert slopes[0] == pytest.approx(1, rel=0.02)  # <flux^2> step / 2
+    assert slopes[-1] == pytest.approx(2 * truth, rel=0.05)
+
+
+def test_squares_allow_for_the_mean_growth_that_is_taken_away():
+    """Steps without memory gain their number, whatever they gain on average."""
+    moment = np.cumsum(np.random.default_rng(6).normal(2.0, 1.0, (41, 4000)), axis=0)
+    moment -= np.linspace(moment[0], moment[-1], 41)
+    assert tp.squares(moment, 20).mean() == pytest.approx(20, rel=0.05)
+
+
+def test_a_dilute_gas_has_the_coefficients_of_enskog(gas):
+    dilute = {"packing": 0.02, "length": 2000, "cadence": "frames_every_time = 1"}
+    found = tp.coefficients([gas(f"gas{seed}", seed=seed, **dilute) for seed in (1, 2, 3)], None)
+    assert set(found) == set(tp.enskog(0.02))
+    for name, one in found.items():
+        ratio = statistics.combined(one.members)
+        assert ratio.error < 0.2, name
+        assert ratio.mean == pytest.approx(1, abs=4 * ratio.error), name
+    assert found["bulk_viscosity"].curve.y[0] == pytest.approx(1, abs=0.05)
+
+
+def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, capsys):
+    runs = [gas(f"gas{k}", packing=packing).path for k, packing in enumerate((0.1, 0.3))]
+    rows = drawn(tmp_path, "transport", *runs)
+    means = [row for row in rows if not row["wt"]]
+    coefficients = {(name, eta) for name in tp.enskog(0.1) for eta in (0.1, 0.3)}
+    assert {(row["what"], float(row["packing"])) for row in means} == coefficients
+    assert all(float(row["error"]) > 0 for row in means)
+    assert all(float(row["wt"]) > 0 for row in rows if row["what"].endswith("(t)"))
+    assert "before it has settled" not in capsys.readouterr().err
+    drawn(tmp_path, "transport", gas(length=20).path)
+    assert "before it has settled" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("unusual", "said"),
+    [
+        ({"sides": "'wall', 'periodic'"}, "in a periodic box"),
+        ({"restitution": 0.9, "length": 20}, "elastic"),
+        ({"log": ".false."}, "event_log"),
+        ({"length": 12}, "eight collisions"),
+        ({"cadence": "frames_every_collisions = 500"}, "frames_every_time"),
+    ],
+)
+def test_other_runs_have_no_transport(gas, tmp_path, capsys, unusual, said):
+    assert run_script("transport", gas(**unusual).path, "-o", tmp_path / "a.png") == 2
+    assert said in capsys.readouterr().err
+
+
+# --- fields ---
+
+WALLS = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
+&side name = 'left' temperature = 2 / &side name = 'right' temperature = 2 speed = {speed} /
+&species count = 40 radius = 0.5 temperature = 2 /
+&stop time = 100 / &output frames_every_time = 1 observables_every_time = 1 /
+"""
+
+
+def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
+    """Two disks in the left half that move together, two in the right half that part."""
+    position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 4)
+    velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 0.0], [-1.0, 0.0]]] * 4)
+    run = written(tmp_path / "a.h5", position, velocity)
+    found = fields.fields(run, [0, 1, 2, 3], (2, 1))
+    assert found["density"] == pytest.approx(4)
+    assert found["flow_x"] == pytest.approx(1) and found["flow_y"] == pytest.approx([2, 0])
+    assert found["temperature"] == pytest.approx([0, 2]) == found["stress_xx"] / 8
+    assert found["stress_yy"] == pytest.approx(0) and found["heat_x"] == pytest.approx(0)
+
+
+def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
+    """Its gradients times viscosity and conductivity are what passes from wall to wall."""
+    run, eta = read_run(simulated(WALLS.format(speed=0))), 0.3
+    flux = fields.Fluxes(4 * eta / np.pi * 2 * hd.henderson(eta), 0.0, 0.0)
+    law = fields.expected(run, 0, np.linspace(1, 19, 7), flux, (0.5, 2.0))
+    assert law == pytest.approx(np.tile([0.5, 2, 4 * eta / np.pi], (7, 1)))
+    flux, x = fields.Fluxes(1.2, -0.05, 0.1), np.linspace(1, 19, 181)
+    u, kt, density = fields.expected(run, 0, x, flux, (0.0, 2.0)).T
+    eta = np.pi * density / 4
+    z = hd.henderson(eta)
+    assert density * kt * z == pytest.approx(1.2)
+    shear = -density * hd.enskog_viscosity(z, eta, 1.0, kt) * np.gradient(u, x)
+    heat = -hd.enskog_conductivity(z, eta, 1.0, kt) * np.gradient(kt, x)
+    assert shear[1:-1] == pytest.approx(-0.05, rel=1e-3)
+    assert (heat + shear * u)[1:-1] == pytest.approx(0.1, rel=2e-3)
+
+
+def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, capsys):
+    path = simulated(WALLS.format(speed=3))
+    rows = drawn(tmp_path, "fields", path, "--cells", "5")
+    found = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    assert found["x"] == pytest.approx([2, 6, 10, 14, 18])
+    assert np.mean(found["density"]) == pytest.approx(0.2)
+    assert (found["density_error"] > 0).all() and found["flow_y"][-1] > found["flow_y"][0]
+    assert np.isfinite(found["flow_expected"]).all()
+    assert len(drawn(tmp_path, "fields", path, "--grid", "4,2")) == 8
+    early = simulated(ROOT / "input/fourier.nml", "early", "stop.time=20")
+    assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
+    assert "warning: no gas has these fluxes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--cells", "1"], "there are 2 to 100000 cells"),
+        (["--grid", "2000000,2000000"], "there are 2 to 100000 cells"),
+        (["--cells", "4", "--grid", "3,3"], "not allowed with"),
+        (["--skip", "nan"], "is not a number from 0 on"),
+        (["--skip", "-1"], "is not a number from 0 on"),
+    ],
+)
+def test_options_without_a_meaning_are_refused(words, reason, capsys):
+    assert run_script("fields", *words, "a.h5") == 2
+    assert reason in capsys.readouterr().err

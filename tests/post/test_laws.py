@@ -1,0 +1,104 @@
+"""Published and closed laws in post/: against series, equations and samples, each once."""
+
+import numpy as np
+import pytest
+
+from ricochet import hard_disks as hd
+from ricochet import theory
+from ricochet.free_paths import path_density
+from validation.laws import cooling_ratio, mixture_rates, mixture_z
+
+
+def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
+    eta = 1e-4
+    assert (hd.henderson(eta) - 1) / eta == pytest.approx(2, rel=1e-3)
+    reduced = [1, 1, 0.78200444, 0.53223180, 0.33355604, 0.1988425, 0.1148728, 0.0649930, 0.0362193]
+    virial = [b * 2**k for k, b in enumerate(reduced)]
+    for eta in (0.075, 0.125, 0.175):
+        series = np.polyval(virial[::-1], eta)
+        assert float(hd.simulated(eta)) == pytest.approx(series, rel=2e-5)
+    np.testing.assert_allclose(hd.simulated(hd.FLUID[:, 0]), hd.FLUID[:, 1])
+    assert hd.crystal(0.8) - hd.crystal(0.8, 100) == pytest.approx((hd.crystal(0.8) - 1) / 100)
+    assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
+
+
+def test_published_pressures_near_melting_have_a_loop_that_flattens():
+    depth = {}
+    for name, points in hd.MELTING.items():
+        eta, p = np.transpose(points)
+        assert np.all(np.diff(eta) > 0) and p.min() > 9.15 and p.max() < 9.25
+        depth[name] = p[:-1].max() - p[(eta > 0.702) & (eta < 0.718)].min()
+    assert list(depth.values()) == sorted(depth.values(), reverse=True)
+
+
+def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
+    diameter, count = 0.02, 1000
+    eta = count * np.pi * diameter**2 / 4
+    w = mixture_rates([diameter, diameter], [300, 700], [1.0, 1.0])
+    one = hd.collision_rate(hd.simulated(eta), diameter, 10**8)
+    np.testing.assert_allclose(w.sum(axis=1), one, rtol=1e-6)
+    np.testing.assert_allclose(w[:, 1] / w[:, 0], 7 / 3)
+    unequal = mixture_rates([0.02, 0.04], [300, 200], [1.0, 4.0])
+    assert 300 * unequal[0, 1] == pytest.approx(200 * unequal[1, 0])
+    assert mixture_z([diameter, diameter], [300, 700]) == pytest.approx(hd.simulated(eta))
+
+
+def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():
+    assert hd.haff_by_time(0.01, 0.9) == pytest.approx(hd.haff_by_collisions(0.01, 0.9), rel=1e-4)
+    assert hd.haff_by_time(5.0, 1.0) == hd.haff_by_collisions(5.0, 1.0) == 1
+    assert cooling_ratio(1, 0.7) == pytest.approx(1) == cooling_ratio(4, 1.0)
+    assert cooling_ratio(4, 0.8) > cooling_ratio(4, 0.9) > 1
+    assert cooling_ratio(0.25, 0.8) == pytest.approx(1 / cooling_ratio(4, 0.8))
+
+
+def test_rough_temperatures_follow_their_equations():
+    xi, beta, q = 0.9, 0.3, 0.5
+    tau = np.linspace(0, 5, 5001)
+    t, r = theory.rough_temperatures(tau, (1.0, 0.2), xi, beta, q)
+    a, b, c = theory.rough_rates(xi, beta, q)
+    assert np.gradient(t, tau)[1:-1] == pytest.approx((-2 * (a * t - b * r))[1:-1], abs=1e-6)
+    assert np.gradient(r, tau)[1:-1] == pytest.approx((4 * (b * t - c * r))[1:-1], abs=1e-6)
+    late = theory.rough_temperatures(np.array([50.0]), (1.0, 0.2), xi, beta, q)
+    assert late[1] / late[0] == pytest.approx(theory.rough_ratio(xi, beta, q))
+
+
+def test_free_paths_without_memory_have_the_mean_one():
+    x = np.linspace(0, 40, 20001)
+    density = path_density(x)
+    assert np.trapezoid(density, x) == pytest.approx(1, rel=1e-3)
+    assert np.trapezoid(x * density, x) == pytest.approx(1, rel=1e-3)
+
+
+def test_enskog_bulk_viscosity_is_what_uncorrelated_collisions_hand_on():
+    """Half of their rate per area times <(diameter dP / 2)^2> / kT, where <dP^2> is 4 m kT."""
+    eta, diameter, kt, mass = 0.3, 0.7, 2.0, 3.0
+    z, density = float(hd.henderson(eta)), 4 * eta / (np.pi * 0.7**2)
+    pairs = density * hd.collision_rate(z, diameter, 1e6, kt, mass) / 2
+    expected = pairs / 2 * diameter**2 / 4 * 4 * mass
+    bulk = mass * density * hd.enskog_bulk_viscosity(z, eta, diameter, kt, mass)
+    assert bulk == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("eta", [0.001, 0.2])
+def test_at_the_temperature_of_noise_heating_is_what_collisions_take(eta):
+    strength, xi, diameter, mass = 0.3, 0.8, 0.7, 2.0
+    kt = hd.noise_temperature(strength, xi, eta, diameter, mass)
+    rate = hd.collision_rate(hd.henderson(eta), diameter, 1e6, kt, mass)
+    assert mass * strength == pytest.approx((1 - xi**2) / 2 * rate * kt, rel=1e-5)
+
+
+def test_chambers_are_even_above_the_threshold_and_as_the_fluxes_say_below():
+    xi, layers = 0.9, 3.0
+
+    def heat_over_climb(share, climb):
+        """T / m g h of a chamber with this share of the disks."""
+        return (2 / (share * layers * np.sqrt(np.pi) * (1 - xi**2))) ** 2 / climb
+
+    threshold = heat_over_climb(0.5, 1.0)
+    assert theory.demon_share(0.99 * threshold, layers, xi) == 0.5
+    climb = 1.5 * threshold
+    share = theory.demon_share(climb, layers, xi)
+    flux = [s**2 * np.exp(-1 / heat_over_climb(s, climb)) for s in (share, 1 - share)]
+    assert share > 0.6 and flux[0] == pytest.approx(flux[1])
+    assert theory.demon_share(100 * threshold, layers, xi) == pytest.approx(1)
+    assert theory.demon_share(1.001 * threshold, layers, xi) == pytest.approx(0.5, abs=0.05)

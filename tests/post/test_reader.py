@@ -1,0 +1,508 @@
+"""The reader of output files, and what scripts answer to files and words that they cannot use."""
+
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import venv
+from contextlib import suppress
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from ricochet import Obstacle, RunError, read_run
+from ricochet.drawing import draw_box, plt, radius_marks
+from synthetic_run import ROOT, SCRIPTS, run_script, write_run
+from whole_runs import FINISHED, MIXTURE, STOPPED, frames_in, wait_for, write_input
+
+
+def tiny(path, frames=1, count=1, **more):
+    """A run of disks at rest."""
+    x = np.zeros((frames, count, 2))
+    return write_run(path, x, x, **more)
+
+
+# --- what a run says ---
+
+
+@pytest.fixture
+def small(tmp_path):
+    """Three frames of two disks that move apart."""
+    x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
+    v = np.array([[[-3.0, 4.0], [0.0, 1.0]]] * 3)
+    disks = {"mass": [2.0, 1.0], "radius": [0.1, 0.2], "species": [2, 1]}
+    disks |= {"names": ("light", "heavy one"), "collisions": [[0, 0], [1, 0], [3, 2]]}
+    box = {"edges": (2, 4), "lower": (-1, -2), "periodic": (True, False), "time": [0, 0.5, 1]}
+    box["image"] = np.array([[[0, 0], [0, 0]], [[0, 0], [1, 0]], [[-1, 0], [1, 0]]])
+    box["obstacles"] = [((0.5, 0.25), 0.2, 0)]
+    observables = {"collisions": [0, 2, 6], "all/kinetic_energy": [1.0, 2.0, 3.0]}
+    parameters = {"run": {"seed": 7}, "contact": {"restitution": 0.5}}
+    parameters["box"] = {"gravity": [0.0, -9.81]}
+    more = {"observables": observables, "parameters": parameters}
+    return write_run(tmp_path / "small.h5", x, v, **disks, **box, **more)
+
+
+def test_constants_and_parameters(small):
+    run = read_run(small)
+    assert (run.count, run.frames, run.names) == (2, 3, ("light", "heavy one"))
+    assert run.seed == 7 and run.restitution == 0.5
+    np.testing.assert_array_equal(run.gravity, [0, -9.81])
+    np.testing.assert_array_equal(run.upper, [1, 2])
+    np.testing.assert_array_equal(run.periodic, [True, False])
+    np.testing.assert_array_equal(run.of_species("heavy one"), [True, False])
+    (obstacle,) = run.obstacles
+    assert obstacle[1:] == Obstacle(None, 0.2, False)[1:]
+    assert repr(run) == f"<Run {small}: 1 light, 1 heavy one; 3 frames, t = 0 to 1>"
+
+
+def test_derived_quantities(small):
+    run = read_run(small)
+    np.testing.assert_allclose(run.speed(0), [5, 1])
+    np.testing.assert_allclose(run.kinetic_energy(-1), [25, 0.5])
+    np.testing.assert_allclose(run.unwrapped(2), [[-2, 0.5], [2.9, 0.5]])
+    np.testing.assert_allclose(run.displacement(2), [2.2, 2.2])
+    np.testing.assert_allclose(run.displacement(slice(0, 2)), [[0, 0], [0.1, 2.1]])
+    np.testing.assert_allclose(run.collisions_per_disk_at([0.25, 1.0]), [1, 6])
+
+
+def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
+    run = read_run(small)
+    whole = run.position[:]
+    assert whole.shape == run.position.shape == (3, 2, 2)
+    for index in (0, -1, slice(None, None, -1), slice(2, 0, -2), slice(1, 9), [2, -3]):
+        np.testing.assert_array_equal(run.position[index], whole[index])
+    np.testing.assert_array_equal(np.array(list(run.position)), whole)
+    np.testing.assert_array_equal(run.position, whole)
+    assert np.asarray(run.collisions, dtype=float).dtype == float
+    with pytest.raises(RunError, match="no frame 3, there are 3"):
+        run.position[3]
+
+
+def frames_seen_by_another_program(path):
+    code = f"from ricochet import read_run; print(read_run({str(path)!r}).frames)"
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT / "post")
+    return int(result.stdout) if result.returncode == 0 else result.stderr.splitlines()[-1]
+
+
+def test_a_run_in_progress_is_read_up_to_its_last_committed_frame(tmp_path):
+    path = tiny(tmp_path / "run.h5.part", 5, 2, committed=2)
+    assert len(read_run(path).position[:]) == 2
+    with h5py.File(path, "r+", locking=True) as writer:  # as the program holds it
+        assert frames_seen_by_another_program(path) == 2
+        for count, words in ((0, "holds no frame yet"), (6, "holds 5 of 6 samples")):
+            writer["particles/disks/committed"][...] = count
+            writer.flush()
+            assert words in frames_seen_by_another_program(path)
+
+
+def test_restitution_per_pair_of_species(tmp_path):
+    for pairs, expected in (([0.5, 0.5, 0.5, 0.5], 0.5), ([0.5, 0.9, 0.9, 0.5], np.nan)):
+        contact = {"restitution": 0.7, "pair_restitution": pairs}
+        run = read_run(tiny(tmp_path / "run.h5", parameters={"contact": contact}))
+        np.testing.assert_equal(run.restitution, expected)
+
+
+def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
+    assert read_run(tiny(tmp_path / "none.h5")).walls.shape == (0, 2, 2)
+    walls = [((0.1, 0.2), (0.9, 0.4)), ((0.5, 0.0), (0.5, 0.3))]
+    for periodic, copies in (((False, False), 1), ((True, False), 3), ((True, True), 9)):
+        run = read_run(tiny(tmp_path / "run.h5", walls=walls, periodic=periodic))
+        np.testing.assert_array_equal(run.walls, walls)
+        axes = plt.figure().add_subplot()
+        draw_box(axes, run)
+        drawn = [line.get_xydata() for line in axes.lines[4:]]  # the sides come first
+        plt.close()
+        assert len(drawn) == 2 * copies
+        for wall in walls:
+            for i in (-1, 0, 1) if periodic[0] else (0,):
+                assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)
+
+
+def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(ricochet, tmp_path):
+    text = """&side name = 'left' temperature = 2 / &wall name = 'w' from = 0.2, 0.2 to = 0.4, 0.3 /
+    &contact tangential_restitution = 0.5 wall_rule = 'normal' /
+    &species count = 20 radius = 0.03 temperature = 1 rotational_temperature = 1 /
+    &stop time = 1 / &output frames_every_time = 0.1 event_log = .true. /"""
+    write_input(tmp_path, text)
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    run = read_run(tmp_path / "gas.h5")
+    assert set(run.elements) == {"angular_velocity", "orientation"}
+    energy = 0.5 * np.mean(run.inertia * run.angular_velocity[:] ** 2, axis=1)
+    assert run.observable("all/rotational_energy").value[-1] == pytest.approx(energy[-1])
+    assert run.orientation[-1].any() and not run.orientation[0].any()
+    assert {"sides/left/impulse", "walls/w/energy"} <= set(run.observables)
+    assert run.observable("walls/w/impulse").value.shape[1:] == (2,)
+    size = np.hypot(*run.events.momentum_change.T)
+    assert size == pytest.approx(run.events.impulse)
+    with pytest.raises(RunError, match="its frames have no wall_hits"):
+        run.element("wall_hits")
+    axes = plt.subplots()[1]
+    marks = radius_marks(axes, run, run.frames - 1)
+    dx, dy = np.transpose([b - a for a, b in marks.get_segments()])
+    assert np.hypot(dx, dy) == pytest.approx(run.radius)
+    turned = np.angle(np.exp(1j * (np.arctan2(dy, dx) - run.orientation[-1])))
+    assert turned == pytest.approx(0)
+
+
+# --- files that cannot be used ---
+
+
+def bad_files(folder) -> dict[str, str]:
+    """Files that cannot be used, each with words of the message that says why."""
+    data = tiny(folder / "good.h5", 4, 50).read_bytes()
+    (folder / "short.h5").write_bytes(data[: len(data) // 2])
+    (folder / "empty.h5").touch()
+    (folder / "text.h5").write_text("no HDF5 at all\n" * 100)
+    (folder / "unfinished.h5.part").touch()
+    with h5py.File(folder / "foreign.h5", "w") as file:
+        file["x"] = 1
+    with h5py.File(tiny(folder / "future.h5"), "r+") as file:
+        file["h5md"].attrs["version"] = np.array([2, 0])
+    with h5py.File(tiny(folder / "partial.h5"), "r+") as file:
+        del file["particles/disks/velocity"], file["particles/disks/mass"]
+    os.mkfifo(folder / "fifo")
+    return {
+        "empty.h5": "empty",
+        "text.h5": "not an HDF5",
+        "short.h5": "cut short",
+        "foreign.h5": "not of a Ricochet run",
+        "future.h5": "version 2.0",
+        "partial.h5": "not laid out as a Ricochet run",
+        "missing.h5": "no such file",
+        "unfinished.h5": "unfinished run",
+        "": "folder",
+        "fifo": "is a device, not a run",
+    }
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, capsys):
+    for name, words in bad_files(tmp_path).items():
+        path = tmp_path / name
+        assert run_script(script, *[path] * (2 if script == "lyapunov" else 1)) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"{script}.py: {path}") and said.count("\n") == 1
+        assert words in said
+
+
+def read_everything(path):
+    """All numbers that a script could ask for."""
+    run = read_run(path)
+    asked = [run.time, run.position[-1], run.velocity[:], run.speed(0), run.kinetic_energy(-1)]
+    asked += [run.unwrapped(-1), *run.events, run.collisions_per_disk_at(run.time)]
+    for name in ("total_energy", "momentum", *(f"{name}/kinetic_energy" for name in run.names)):
+        asked += run.observable(name)
+
+
+@pytest.fixture
+def unfinished(ricochet, tmp_path) -> Path:
+    """What a run has written that its wall clock stopped."""
+    write_input(tmp_path, MIXTURE)
+    run = ricochet("gas.nml", "-o", "gas.h5", "--set", "stop.wall_clock=1e-9")
+    assert run.returncode == STOPPED
+    return tmp_path / "gas.h5.part"
+
+
+@pytest.mark.parametrize("cuts", [12, pytest.param(300, marks=pytest.mark.check)])
+def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
+    """A finished one, and one that was being written."""
+    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
+    for whole in (unfinished, tmp_path / "whole.h5"):
+        data, path = whole.read_bytes(), tmp_path / "cut.h5"
+        for k in range(cuts):
+            path.write_bytes(data[: k * len(data) // cuts])
+            with pytest.raises(RunError, match=r"is empty|cut short") as caught:
+                read_everything(path)
+            assert "\n" not in str(caught.value)
+
+
+READER = f"""
+import sys; sys.path[:0] = {[str(ROOT / name) for name in ("post", "tests", "tests/post")]!r}
+from test_reader import read_damaged
+read_damaged(*sys.argv[1:])
+"""
+
+
+def read_damaged(path, copies):
+    """Reads copies of a file with a bit turned; in a process of its own, it is hard on HDF5."""
+    data, copy = Path(path).read_bytes(), Path(f"{path}.copy")
+    for seed in range(int(copies)):
+        rng, damaged = random.Random(seed), bytearray(data)
+        damaged[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        copy.write_bytes(damaged)
+        print(seed, flush=True)
+        with suppress(RunError):
+            read_everything(copy)
+
+
+@pytest.mark.parametrize("flips", [100, pytest.param(2000, marks=pytest.mark.check)])
+def test_a_damaged_file_is_refused_or_read(ricochet, tmp_path, flips):
+    few = re.sub(r"count = \d+", "count = 2", MIXTURE).replace("time = 4", "time = 0.3")
+    write_input(tmp_path, few)
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    command = [sys.executable, "-c", READER, tmp_path / "gas.h5", str(flips)]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout.splitlines()[-1] + run.stderr
+
+
+# --- runs that go on, or ended early ---
+
+OUTPUT = "&stop time = 1e5 / &output frames_every_time = 0.2 observables_every_time = 0.2 {}/\n"
+LONGER = OUTPUT.format("").replace("1e5", "1e6")  # of few disks
+PAIR = "&species name = 'one' count = 1 radius = 0.1 position = {}, 0.3 velocity = 1, 0.3 /\n"
+FALLING = """&box upper = 4, 4 gravity = 0, -9.81 /
+&species name = 'A' count = 8 mass = 1 radius = 0.05 velocities = 'uniform' speed = 3 /
+&species name = 'B' count = 8 mass = 2 radius = 0.05 velocities = 'uniform' speed = 3 /
+"""
+BULK = """&box boundary = 'periodic', 'periodic' /
+&species name = 'gas' count = 64 packing_fraction = 0.3 temperature = 1 /
+"""
+CRATER = """&species name = 'bed' count = 40 radius = 0.04 region = 0, 1, 0, 0.5 /
+&species name = 'projectile' mass = 25 radius = 0.1 position = 0.5, 0.75 velocity = 0, -5 /
+"""
+STEPS = "&run dynamics = 'steps' dt = 4e-3 /\n"
+LOG = "event_log = .true. virial_tensor = .true. "
+GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "player", "cooling")
+SOON = ("--skip", "1", "--apart", "1")
+#: Simulations: inputs, and the scripts that draw them, with their options.
+RUNNING = [
+    ([MIXTURE.split("&contact")[0] + OUTPUT.format("")], dict.fromkeys(GENERIC, ())),
+    ([MIXTURE.split("&contact")[0] + OUTPUT.format("")], {"mixture": SOON}),
+    (
+        [FALLING + OUTPUT.format("")],
+        {"gravity": SOON[:2], "equipartition": (), "fields": (), "driven": ("--show", "height")},
+    ),
+    ([CRATER + OUTPUT.format("")], {"crater": (), "crater_scan": ()}),
+    (
+        [PAIR.format(0.3) + "&species radius = 0.05 position = 0.8, 0.5 /\n" + LONGER],
+        {"scattering": ()},
+    ),
+    (
+        [BULK + OUTPUT.format(LOG)],
+        dict.fromkeys(("correlations", "equation_of_state", "rates", "melting", "transport"), ()),
+    ),
+    (
+        [BULK + "&contact tangential_restitution = 0.5 restitution = 0.9 /\n" + OUTPUT.format("")],
+        {"rough": (), "haff": ()},
+    ),
+    (
+        [PAIR.format(x) + LONGER for x in (0.3, 0.300001)],
+        {"lyapunov": ("--largest", "0.1")},
+    ),
+    (
+        [FALLING + OUTPUT.format(""), FALLING + STEPS + OUTPUT.format("")],
+        {"missed": SOON[:2]},
+    ),
+]
+ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
+
+
+@pytest.mark.parametrize("system", range(len(RUNNING)))
+def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
+    """The simulation is held up while the scripts look at its file, and has not finished."""
+    texts, scripts = RUNNING[system]
+    parts = []
+    for k, text in enumerate(texts):
+        process = started(write_input(tmp_path, text, f"{k}.nml"), "-o", f"{k}.h5")
+        parts.append(tmp_path / f"{k}.h5.part")
+        wait_for(lambda: frames_in(parts[-1], "observables") > 100)
+        process.send_signal(signal.SIGSTOP)
+    for script, options in scripts.items():
+        figure = tmp_path / f"{script}.{ENDINGS.get(script, 'png')}"
+        few = ("--count", "3") if script == "animate" else ()
+        code = run_script(script, *parts, "-o", figure, *options, *few)
+        said = capsys.readouterr().err
+        assert code == 0, said
+        for part in parts:
+            assert f"warning: {part.name} is unfinished" in said
+        assert figure.stat().st_size > 0
+
+
+def test_every_script_draws_a_running_simulation():
+    """All but `cost` and `scaling`, which want times of whole runs, and `coverage`: ten runs."""
+    drawn = {script for _, scripts in RUNNING for script in scripts}
+    assert drawn == {*SCRIPTS} - {"cost", "coverage", "scaling"}
+
+
+@pytest.mark.parametrize(
+    ("name", "note", "said"),
+    [
+        ("a.h5", "", ""),
+        ("a.h5", "cooled to nothing", "a.h5 ended early: cooled to nothing"),
+        ("a.h5.part", "", "a.h5.part is unfinished: going on, stopped, or broken off"),
+        ("a.h5.part", "an inelastic collapse", "broke off: an inelastic collapse; last"),
+    ],
+)
+def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name, note, said):
+    """In print, and in red on the figure."""
+    run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note})
+    texts = []
+    monkeypatch.setattr(
+        "ricochet.script.save",
+        lambda figure, *_: texts.append(figure.get_supxlabel().replace("\n", " ")),
+    )
+    assert run_script("snapshot", run) == 0
+    warned = capsys.readouterr().err
+    assert said in warned and said in texts[0] and bool(said) == bool(warned) == bool(texts[0])
+
+
+# --- where results go ---
+
+#: Scripts that write a result each in their own way, the option, the ending of its name.
+WRITERS = [
+    ("snapshot", "-o", "png"),
+    ("cooling", "--csv", "csv"),
+    ("export", "-o", "xyz"),
+    ("player", "-o", "html"),
+    ("animate", "-o", "gif"),
+]
+
+
+def write_with(script, option, run, result):
+    """Let a script write a result in its own way."""
+    few = ["--count", "1"] if script == "animate" else []
+    return run_script(script, run, option, result, *few)
+
+
+@pytest.mark.parametrize(("script", "option", "ending"), WRITERS)
+def test_a_full_disk_is_one_line(
+    unfinished, small_disk, tmp_path, monkeypatch, capsys, script, option, ending
+):
+    monkeypatch.chdir(tmp_path)
+    assert write_with(script, option, unfinished, small_disk(4) / f"a.{ending}") == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == f"{script}.py: cannot write the output: No space left on device"
+
+
+@pytest.mark.parametrize(("script", "option", "ending"), WRITERS)
+def test_results_are_written_into_files_of_ones_own(
+    tmp_path, monkeypatch, capsys, script, option, ending
+):
+    """Not through links, not into a FIFO or a run; a file with two names keeps the other."""
+    monkeypatch.chdir(tmp_path)
+    names = ("collisions", "all/kinetic_energy", "disk/kinetic_energy")
+    run = tiny(Path("run.h5"), 4, 3, observables={name: np.arange(1.0, 5.0) for name in names})
+    result, precious, before = Path(f"a.{ending}"), Path("precious"), run.read_bytes()
+
+    def refused(words: str) -> bool:
+        code = write_with(script, option, run, result)
+        said = capsys.readouterr().err.splitlines()[-1]
+        result.unlink()
+        return code == 2 and said.startswith(f"{script}.py: {result}: ") and words in said
+
+    precious.write_text("precious")
+    for target in (precious, "dangling"):
+        result.symlink_to(target)
+        assert refused("not an ordinary file")
+    os.mkfifo(result)
+    assert refused("not an ordinary file")
+    result.hardlink_to(run)
+    assert refused("HDF5")
+    result.hardlink_to(precious)
+    assert write_with(script, option, run, result) == 0 and result.stat().st_size > 50
+    assert write_with(script, option, run, result) == 0, "an ordinary file is replaced"
+    assert precious.read_text() == "precious" and run.read_bytes() == before
+    assert not Path("dangling").exists()
+
+
+# --- words on the command line ---
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("snapshot run.h5 --cuont 3", "did you mean --count?"),
+        ("snapshot run.h5 --colour=sped", "did you mean speed?"),
+        ("animate run.h5 --frames 3", "--frames 3 is a single frame; use --count"),
+        ("player run.h5 --frames=300", "--frames 300 is a single frame; use --count"),
+        ("player run.h5 --disk 1", "--disk is now --disks"),
+        ("export run.h5 --every=2", "--every is now --frames ::N"),
+        ("speeds run.h5 --first 2", "--first is now --frames 0:N, or N: for"),
+        ("gravity run.h5 --after 20", "--after is now --skip X"),
+        ("lyapunov run.h5 --skip 0.2", "--skip is now --fit-from SHARE"),
+        ("haff run.h5 --out a.png", "unknown argument --out; did you mean --output?"),
+        ("snapshot rum.h5", "no such file; did you mean run.h5?"),
+        ("snapshot run.h5 --frames 0,a", "'0,a' is not a list"),
+        ("snapshot run.h5 --frames ::0", "'::0' is not a list"),
+        ("snapshot run.h5 --frames 0:1:1:1", "'0:1:1:1' is not a list"),
+        ("snapshot run.h5 --frames -4:-5,3", "no frame 3, there are 3"),
+        ("snapshot run.h5 --count 0", "'0' is not a whole number above 0"),
+        ("animate run.h5 --count -3", "'-3' is not a whole number above 0"),
+        ("trajectory run.h5 --disks one", "'one' is not a list"),
+        ("trajectory run.h5 --disks 0", "no disk 0"),
+        ("export run.h5 --count 0.5", "'0.5' is not a whole number above 0"),
+    ],
+)
+def test_a_wrong_word_is_answered_by_the_right_one(small, monkeypatch, capsys, wrong, words):
+    monkeypatch.chdir(small.parent)
+    small.rename("run.h5")
+    assert run_script(*wrong.split()) == 2
+    said = capsys.readouterr().err
+    assert words in said and "Traceback" not in said
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_scripts_explain_themselves(script, capsys):
+    assert run_script(script, "--help") == 0
+    said = capsys.readouterr().out
+    assert f"python post/{script}.py" in said and "--output" in said
+
+
+# --- where scripts and packages are ---
+
+
+def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
+    command = [sys.executable, ROOT / "post" / "snapshot.py", small, "-o", "new/a.png"]
+    bare = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)}
+    result = subprocess.run(command, cwd=tmp_path, env=bare, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "new" / "a.png").exists()
+
+
+def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
+    """In a copy of what set-up reads, with a `.venv` that lacks no other package."""
+    package = "post/ricochet/__init__.py"
+    for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    environment = tmp_path / ".venv"
+    venv.create(environment, symlinks=True)
+    (environment / "purposes").write_text("demo\n")
+    wanted = [tmp_path / "requirements.txt", tmp_path / "tests" / "readers.txt"]
+    (environment / "requirements.txt").write_text("".join(path.read_text() for path in wanted))
+    subprocess.run([tmp_path / ".ci" / "set-up", "demo"], check=True)
+    code = "from importlib.util import find_spec; print(find_spec('ricochet').origin)"
+    command = [environment / "bin" / "python", "-c", code]
+    found = subprocess.run(command, cwd="/", capture_output=True, text=True, check=True).stdout
+    assert found.strip() == str(tmp_path / package)
+
+
+def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, capsys):
+    film, path = tmp_path / "film.mp4", tiny(tmp_path / "run.h5", 2, 3)
+    ffmpeg = tmp_path / "its-ffmpeg"
+    ffmpeg.write_text('#!/bin/sh\nfor film; do :; done\ncat >"$film"\n')
+    ffmpeg.chmod(0o755)
+    with plt.rc_context({"animation.ffmpeg_path": "no-ffmpeg"}):
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
+        assert run_script("animate", path, "-o", film) == 2
+        assert "mp4 needs ffmpeg" in capsys.readouterr().err and not film.exists()
+        package = SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg))
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
+        assert run_script("animate", path, "-o", film) == 0
+    assert film.stat().st_size > 0
+
+
+@pytest.mark.parametrize("script", [*SCRIPTS, "lab"])
+def test_a_python_without_packages_is_told_where_they_are(script):
+    command = [sys.executable, "-S", ROOT / "post" / f"{script}.py", "--help"]  # no site-packages
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 2 and run.stderr.count("\n") == 1
+    assert run.stderr.startswith(f"{script}.py: ") and "has no numpy, h5py" in run.stderr
+    assert f"{ROOT}/.venv/bin/python" in run.stderr

@@ -1,0 +1,690 @@
+"""Each script of post/ against what it should find in runs that are made by closed formulas."""
+
+import csv
+import warnings
+
+import h5py
+import numpy as np
+import pytest
+
+import cost
+import crater_scan
+import equipartition
+import gravity
+import lyapunov
+import missed
+import mixture
+import scaling
+import scattering
+import trajectory
+from ricochet import RunError, cooling, crater, read_run, speeds, statistics, theory, thermodynamics
+from ricochet.drawing import caption, plt, with_images
+from ricochet.script import chosen_frames, frame_list, grouped
+from synthetic_run import maxwell_velocities, run_script, write_run
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20)
+
+
+def draw(script, *arguments):
+    """Run a script in this process, warnings being errors; the rows of its table, if it has one."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run_script(script, *arguments) == 0
+    if "--csv" in arguments:
+        with arguments[arguments.index("--csv") + 1].open() as file:
+            return list(csv.DictReader(file))
+    return None
+
+
+def refusal(capsys, script, *arguments):
+    """What a script says that refuses its arguments, in one line."""
+    assert run_script(script, *arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"{script}.py: ") and said.count("\n") == 1
+    return said
+
+
+# --- gases ---
+
+
+def gas(path, rng, count=200, frames=41, mass=1.0, **more):
+    """Equal speeds at first, then Maxwell with the energy kept; half a collision per frame."""
+    angle = rng.uniform(0, 2 * np.pi, (1, count))
+    start = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    v = np.concatenate([start, maxwell_velocities(rng, frames - 1, count)])
+    v *= np.sqrt(count / np.sum(v**2, axis=(1, 2)))[:, None, None]
+    x = rng.uniform(0.05, 0.95, (frames, count, 2))
+    energies = 0.5 * np.broadcast_to(mass, count) * np.sum(v**2, axis=2)
+    observables = {"collisions": np.arange(frames) * count // 2} | {
+        f"{name}/kinetic_energy": energies[:, more.get("species", np.ones(count)) == k + 1].mean(1)
+        for k, name in enumerate(more.get("names", ()))
+    }
+    return write_run(path, x, v, mass=mass, observables=observables, **more)
+
+
+def mixed(path, rng):
+    """Half of the disks four times as heavy."""
+    species = {"species": np.repeat([1, 2], 100), "names": ("a", "b")}
+    return gas(path, rng, mass=np.repeat([1.0, 4.0], 100), **species)
+
+
+def made_to_cool(path, rate=0.05):
+    """Lets the frames of a file lose energy by exp(-rate) from one to the next."""
+    with h5py.File(path, "r+") as file:
+        velocity, mass = file["particles/disks/velocity/value"], file["particles/disks/mass"][()]
+        first = 0.5 * np.sum(mass[:, None] * velocity[0] ** 2)
+        left = np.exp(-rate * np.arange(len(velocity)))
+        velocity[...] = velocity[...] * np.sqrt(left)[:, None, None]
+        file["observables/dissipated_energy/value"][...] = first * (1 - left)
+    return path
+
+
+def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
+    run = read_run(gas(tmp_path / "gas.h5", rng))
+
+    def frames(skip, apart):
+        start = thermodynamics.start_of_equilibrium(run, skip)
+        return thermodynamics.frames_from(run, start, apart)
+
+    assert frames(skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
+    assert frames(skip=39, apart=0) == [39, 40]
+    with pytest.raises(RunError, match="ends after 40 collisions per disk, before --skip 50"):
+        frames(skip=50, apart=5)
+
+
+def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path, rng):
+    u = speeds.reduced_speeds(read_run(mixed(tmp_path / "a.h5", rng)), [5, 6])
+    np.testing.assert_allclose(np.mean(u.reshape(2, 2, 100) ** 2, axis=(0, 2)), [1, 1])
+    tau, a2 = speeds.relaxation(read_run(gas(tmp_path / "gas.h5", rng)))
+    assert a2[0] == pytest.approx(-0.5) and np.abs(a2[1:]).max() < 0.5
+    np.testing.assert_allclose(tau, np.arange(17))
+
+
+@pytest.mark.parametrize(
+    ("system", "exact"),
+    [
+        ({}, True),
+        ({"periodic": (True, True)}, True),
+        ({"periodic": (True, False)}, False),
+        ({"parameters": {"box": {"gravity": [0.0, -1.0]}}, "names": ("disk",)}, False),
+        ({"periodic": (True, True), "mass": np.repeat([1.0, 2.0], 100)}, False),
+    ],
+)
+def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, system, exact):
+    """Gravity takes kinetic energy away and gives it back; a strip keeps one momentum of two."""
+    run = gas(tmp_path / "run.h5", rng, **system)
+    draw("speeds", run, "-o", tmp_path / "run.png")
+    assert (speeds.exact_law(read_run(run)) is not None) == exact
+
+
+def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monkeypatch):
+    """Its frames are each drawn at their own temperature, here Maxwell's."""
+    figures = []
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    calm = gas(tmp_path / "calm.h5", rng, count=2000)
+    cool = made_to_cool(gas(tmp_path / "cool.h5", rng, count=2000))
+    draw("speeds", calm, "-o", tmp_path / "calm.png")
+    assert "Equilibrium, many frames" in words_on(figures[0]) and capsys.readouterr().err == ""
+    draw("speeds", cool, "-o", tmp_path / "cool.png")
+    assert "No equilibrium" in words_on(figures[1]) and "Equilibrium" not in words_on(figures[1])
+    falls = "kT falls from 0.2362 to 0.06767"  # exp(-0.75) and exp(-2) halves
+    printed, said = capsys.readouterr()
+    assert falls in words_on(figures[1]) and falls in said and said.count("\n") == 1
+    header, row = (line.split() for line in printed.splitlines())
+    tests = dict(zip(header, row, strict=True))
+    assert float(tests["KS_p"]) > 0.001 and float(tests["kT_last"]) == 0.0676676
+    assert "cool.h5: loses energy" in refusal(capsys, "speeds", calm, cool)
+
+
+def words_on(figure):
+    """All texts of a figure, in one line."""
+    parts = [text.get_text() for text in figure.findobj(plt.Text)]
+    return " ".join(" ".join(parts).split())
+
+
+@pytest.mark.parametrize("script", ["mixture", "gravity", "equipartition", "missed"])
+def test_what_loses_energy_has_no_means_in_equilibrium(tmp_path, rng, capsys, script):
+    paths = {
+        "mixture": lambda: [mixed(tmp_path / "a.h5", rng)],
+        "missed": lambda: pairs_of_runs(tmp_path, rng),
+    }.get(script, lambda: [falling(tmp_path / "a.h5", rng)])()
+    said = refusal(capsys, script, *map(made_to_cool, paths))
+    assert "it loses energy in collisions and has no equilibrium" in said
+
+
+@pytest.mark.parametrize("script", ["equipartition", "mixture"])
+def test_what_compares_species_wants_several(tmp_path, rng, capsys, script):
+    path = gas(tmp_path / "gas.h5", rng, names=("one",))
+    assert f": {path}: needs " in refusal(capsys, script, path)
+
+
+def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
+    mass = np.repeat([1.0, 4.0], 500)
+    v = maxwell_velocities(rng, 31, 1000) / np.sqrt(mass)[:, None] * np.sqrt(1.25)
+    v[0] = [1, 0]
+    parts = {"mass": mass, "species": np.repeat([1, 2], 500), "names": ("light", "heavy")}
+    parts["observables"] = {"collisions": np.arange(31) * 500}
+    turned = (np.roll(v, k, axis=2) for k in (0, 1))
+    runs = [read_run(write_run(tmp_path / f"{k}.h5", 0 * v, own, **parts))
+            for k, own in enumerate(turned)]  # fmt: skip
+    result = mixture.table(runs, [list(range(1, 31))] * 2)
+    for row, kinetic, speed in zip(result, (0.5, 2.0), (1.401248, 0.700624), strict=True):
+        assert row["K_start"] == kinetic and row["v_start"] == 1
+        assert row["v_theory"] == pytest.approx(speed, abs=1e-6)
+        assert row["K"] == pytest.approx(1.25, rel=0.02) and row["KS_p"] > 1e-3
+
+
+# --- cooling ---
+
+
+def cooled(path, xi, decay, heavy=2.0, seed=1, points=101):
+    """Energies that decay with collisions; the heavy species `heavy` times as hot."""
+    t = np.linspace(0, 1, points) ** 2
+    total, x = np.exp(-decay * t), np.zeros((1, 4, 2))
+    observables = {
+        "collisions": 40 * t,
+        "all/kinetic_energy": 3 * total,
+        "light/kinetic_energy": 6 * total / (1 + heavy),
+        "heavy/kinetic_energy": 6 * heavy * total / (1 + heavy),
+    }
+    more = {"species": [1, 1, 2, 2], "names": ("light", "heavy"), "mass": [1, 1, 4, 4]}
+    more["parameters"] = {"run": {"seed": seed}, "contact": {"restitution": xi}}
+    return write_run(path, x, x, observable_time=t, observables=observables, **more)
+
+
+def test_cooling_averages_over_runs_on_one_grid(tmp_path):
+    """Relative energies against collisions, those of the input against time."""
+    paths = [
+        cooled(tmp_path / f"{k}.h5", 0.9, decay, points=p)
+        for k, (decay, p) in enumerate([(1.0, 401), (2.0, 301)])
+    ]
+    found = cooling.energies([read_run(path) for path in paths])
+    tau, all_of_them = found["collisions_per_disk"], found["K_all"]
+    assert tau[-1] == 20 and found["time"][-1] == 1
+    one, other = np.exp(-tau / 20), np.exp(-tau / 10)
+    np.testing.assert_allclose(all_of_them.mean, (one + other) / 2, atol=1e-4)
+    np.testing.assert_allclose(all_of_them.error, np.abs(one - other) / 2, atol=1e-4)
+    np.testing.assert_allclose(found["ratio"].mean, 2)
+    heavy, t = found["energy_heavy"].mean, found["time"]
+    np.testing.assert_allclose(heavy, 2 * (np.exp(-t) + np.exp(-2 * t)), rtol=1e-3)
+
+
+def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng, names=("all",))  # all/kinetic_energy, disks of that name
+    (row, *_) = draw("cooling", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    assert not any("ratio" in name for name in row)
+
+
+@pytest.mark.parametrize("end", [25.0, None])
+def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
+    """Three per cent above the law, scattering by one; at half the rate after the end."""
+    tau, true = np.linspace(0, 60, 601), 1.03 * cooling.hard_disks.haff_rate(0.9)
+    tracks = []
+    for factor in 1 + 0.01 * rng.normal(size=20):
+        lost = true * factor * np.minimum(tau, end or 60)
+        lost += 0.5 * true * np.maximum(tau - (end or 60), 0)
+        tracks.append((tau, tau, np.exp(-lost)))
+    curves, rate, until = cooling.haff(tracks, 0.9)
+    assert rate.mean == pytest.approx(true, abs=4 * rate.error)
+    assert rate.error == pytest.approx(0.01 * true / np.sqrt(20), rel=0.5)
+    assert curves["rate"].mean[100] == pytest.approx(true * (0.5 if end else 1), rel=0.01)
+    assert until == pytest.approx(end, abs=1) if end else np.isnan(until)
+
+
+def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
+    """Of runs that follow the law, whether they start without a spin or with too much of it."""
+    law, tau = (0.9, 0.0, 0.5), np.linspace(0, 25, 251)
+
+    def run(start, last=251):
+        both = theory.rough_temperatures(tau, (1.0, start), *law)[:, :last]
+        names = ("all/temperature", "all/rotational_temperature")
+        observables = {"collisions": tau[:last], **dict(zip(names, both, strict=True))}
+        x, path = np.zeros((1, 2, 2)), tmp_path / "a.h5"
+        more = {"observable_time": tau[:last], "observables": observables}
+        return read_run(write_run(path, x, x, **more)), both
+
+    for start in (0.0, 2.0):
+        found = cooling.steady_ratio([run(start)[0]], law).mean
+        assert found == pytest.approx(theory.rough_ratio(*law), rel=cooling.SETTLED)
+    short, (t, r) = run(0.0, 51)
+    late = np.mean(r[25:] / t[25:])
+    assert cooling.steady_ratio([short], law).mean == pytest.approx(late)
+
+
+# --- scattering ---
+
+
+def collision(path, b, ratio=1e6):
+    """Two frames of a light disk scattered by a heavy one at rest, by the collision rule."""
+    r, v = np.array([0.1, 0.001]), np.array([1.0, 0.0])
+    normal = np.array([-np.sqrt(1 - b**2), b]) if abs(b) < 1 else np.zeros(2)
+    after = v - 2 * ratio / (1 + ratio) * (v @ normal) * normal
+    x = [[[0.5, 0.5], [0.1, 0.5 + b * r.sum()]]] * 2
+    velocities, elastic = [[[0, 0], v], [[0, 0], after]], {"contact": {"restitution": 1.0}}
+    return write_run(path, x, velocities, mass=[ratio, 1], radius=r, parameters=elastic)
+
+
+@pytest.mark.parametrize("b", [0.0, 0.3, -0.7, 0.99, -1.1])
+def test_scattering_of_a_run(tmp_path, b):
+    row = scattering.scattering(read_run(collision(tmp_path / "run.h5", b)))
+    assert row["b_over_R12"] == pytest.approx(b, abs=1e-14)
+    assert row["angle_degrees"] == pytest.approx(row["exact_degrees"], abs=1e-11)
+    if abs(b) < 1:
+        infinite = 2 * np.degrees(np.arccos(abs(b)))
+        assert np.degrees(theory.scattering_angle(b)) == pytest.approx(infinite)
+
+
+# --- crater ---
+
+
+def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=True, walls=0):
+    """A bed of 4 x 20 disks; the `moved` first ones of the upper row pushed aside."""
+    r = 0.02
+    xs, ys = np.meshgrid(np.arange(20) * 0.05 + 0.025, [0.35, 0.3, 0.25, 0.2])
+    first = np.concatenate([[[0.5, 0.75]], np.stack([xs.ravel(), ys.ravel()], axis=1)])
+    last = first.copy()
+    last[1 : 1 + moved, 1] += 1.5 * r
+    last[1 + moved, 0] += 0.5 * r
+    v = np.zeros((2, 81, 2))
+    v[0, 0], v[1, 0] = (0, -speed), (0, -speed * np.sqrt(left))
+    hit = np.zeros((2, 81), np.int32)
+    hit[1, : 1 + moved + 4] = 2
+    observables = {"collisions": [0, 90], "wall_collisions": [[0] * 4, [0, 0, walls, 0]]}
+    observables["all/kinetic_energy"] = [1.0, left]
+    parameters = {"run": {"seed": seed}, "contact": {"restitution": xi}}
+    parameters["stop"] = {"energy_fraction": 0.1}
+    kinds = {"names": ("projectile" if names else "tip", "bed"), "mass": np.r_[mass, np.ones(80)]}
+    kinds |= {"species": np.r_[1, np.full(80, 2)], "radius": np.r_[5 * r, np.full(80, r)]}
+    more = {"collisions": hit, "observables": observables, "parameters": parameters, **kinds}
+    return write_run(path, [first, last], v, **more)
+
+
+@pytest.mark.parametrize("names", [True, False])
+def test_crater_sizes(tmp_path, names):
+    run = read_run(impact(tmp_path / "run.h5", names=names))
+    size = crater.crater(run)
+    assert (size.hit, size.displaced, size.collisions) == (7, 3, 90)
+    assert size.width == pytest.approx(0.1) and size.depth == pytest.approx(0.04)
+    assert size.energy_left == pytest.approx(0.1)
+    none = crater.crater(read_run(impact(tmp_path / "none.h5", moved=0)))
+    assert (none.displaced, none.width, none.depth) == (0, 0, 0)
+    x, y, field = crater.packing_field(run, 0)
+    area = field.sum() * (x[1] - x[0]) * (y[1] - y[0])
+    assert area == pytest.approx(80 * np.pi * 0.02**2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("words", "more"),
+    [
+        ("", {}),
+        ("reaches the floor or the sides, 3 wall hits", {"walls": 3}),
+        ("30 % of the energy is left", {"left": 0.3}),
+    ],
+)
+def test_a_crater_that_was_cut_short_is_marked(tmp_path, capsys, words, more):
+    path = impact(tmp_path / "a.h5", **more)
+    (row,) = draw("crater", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    assert int(row["box_takes_part"]) == ("walls" in more)
+    assert int(row["ended_by_time"]) == ("left" in more)
+    said = capsys.readouterr().err
+    assert words in said and bool(said) == bool(more)
+
+
+def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
+    """Three masses, two speeds, two seeds; and two runs that stand alone, one of them twice.
+
+    Points that the box or time cut short are in no fit; the same run twice counts once.
+    """
+    grid = [
+        impact(tmp_path / f"{m}_{v}_{s}.h5", mass=m, speed=v, seed=s, moved=m + s, walls=m // 15)
+        for m in (5, 10, 15)
+        for v in (2, 5)
+        for s in (1, 2)
+    ]
+    alone = [impact(tmp_path / f"{m}_7.h5", mass=m, speed=7, xi=0.9 - m / 100) for m in (30, 40)]
+    again = impact(tmp_path / "again.h5", mass=30, speed=7, xi=0.6, seed=2)
+    paths = [*grid, *alone, again]
+    runs = crater_scan.distinct([read_run(path) for path in (*paths, grid[0])])
+    assert len(runs) == len(paths)
+    points = [crater_scan.point(*one) for one in grouped(runs, crater_scan.key_of)]
+    scans = crater_scan.scanned(points)
+    assert [curve[0].values["speed"] for curve in scans["mass"]] == [2, 5]
+    assert [curve[0].values["mass"] for curve in scans["speed"]] == [5, 10, 15]
+    for own in scans.values():
+        assert sum(p.runs for curve in own for p in curve) == len(grid)
+    slow = scans["mass"][0]
+    assert slow[1].sizes["displaced"] == (11.5, 0.5) and slow[1].runs == 2
+    assert [p.free for p in slow] == [True, True, False]
+    assert crater_scan.fit_of("mass", slow, "displaced") is None, "two free points"
+    figure = crater_scan.draw(runs, scans)
+    legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
+    assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
+    assert figure.axes[0].get_title("left") == "radius 5,  restitution 0.5"
+    rows = draw("crater_scan", *paths, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    assert len(rows) == 6 + 6 and {row["speed"] for row in rows} == {"2.0", "5.0"}
+    said = capsys.readouterr().err.splitlines()
+    for line, mass, xi, count in zip(said, (30, 40), (0.6, 0.5), (2, 1), strict=True):
+        assert f"mass {mass},  speed 7,  radius 5,  restitution {xi} (runs: {count})" in line
+
+
+# --- gravity ---
+
+
+def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0, seed=1, hits=15):
+    """An ideal gas in equilibrium in the gravity box; `hits` pair collisions per frame."""
+    mass, r = np.repeat([0.025, 0.05], 30), 0.04
+    height = r + rng.exponential(temperature / (mass * 9.81), (frames, 60))
+    x = np.stack([rng.uniform(r, 8 - r, (frames, 60)), height], axis=-1)
+    v = rng.normal(size=(frames, 60, 2)) * np.sqrt(temperature / mass)[:, None]
+    k, u = 0.5 * mass * np.sum(v**2, axis=2), mass * 9.81 * x[..., 1]
+    halves = {"A": slice(0, 30), "B": slice(30, 60), "all": slice(0, 60)}
+    observables = {
+        f"{name}/{kind}_energy": e[:, part].mean(axis=1)
+        for name, part in halves.items()
+        for kind, e in (("kinetic", k), ("potential", u))
+    }
+    time = np.linspace(0, 100, frames)
+    observables |= {"collisions": hits * np.arange(frames), "total_energy": 80 * (1 + drift * time)}
+    parameters = {
+        "run": {"seed": seed, "dynamics": dynamics, "dt": 0.004},
+        "box": {"gravity": [0.0, -9.81]},
+        "contact": {"restitution": 1.0},
+        "species/A": {"speed": 0.5},
+        "species/B": {"speed": 0.25},
+    }
+    kinds = {"species": np.repeat([1, 2], 30), "names": ("A", "B"), "mass": mass, "radius": r}
+    more = {"time": time, "edges": (8, 16), "observables": observables, "parameters": parameters}
+    return write_run(path, x, v, **kinds, **more)
+
+
+def pairs_of_runs(folder, rng):
+    """By events and by steps, of two seeds."""
+    return [
+        falling(folder / f"{how}_{k}.h5", rng, dynamics=how, seed=k, hits=10 - k * step)
+        for step, how in enumerate(("events", "steps"))
+        for k in (1, 2)
+    ]
+
+
+def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
+    run = read_run(falling(tmp_path / "run.h5", rng))
+    frames = thermodynamics.frames_from(run, thermodynamics.start_of_equilibrium(run, 40))
+    assert frames == list(range(80, 400))
+    species = [gravity.samples(run, kind, frames) for kind in run.by_species]
+    assert species[0].height.shape == (320, 30) and 0 <= species[0].height.min() < 0.01
+    for row in gravity.table(run, species, 0.7):
+        for kind in ("speed", "height"):
+            assert row[f"{kind}_slope"] == pytest.approx(1, abs=0.06)
+        assert row["K"] == pytest.approx(0.7, rel=0.03)
+        assert row["K_x"] == pytest.approx(0.35, rel=0.04)
+
+
+def test_crowded_disks_spread_upwards_and_share_their_energy(tmp_path, rng):
+    """To first order a small radius lowers the density by the area that is taken, times n."""
+    run = read_run(falling(tmp_path / "run.h5", rng))
+    h = np.linspace(0, 15.9, 4001)
+    species = [gravity.samples(run, kind, list(range(80, 400))) for kind in run.by_species]
+    points = [s._replace(radius=0.0) for s in species]
+    ideal = gravity.crowded_heights(h, points, 9.81, 0.7, 8.0)
+    dense = gravity.crowded_heights(h, species, 9.81, 0.7, 8.0)
+    excess = np.pi * 0.08**2 / 8 * (29 * ideal[0] + 30 * ideal[1])
+    expected = -excess + np.trapezoid(excess * ideal[0], h)
+    np.testing.assert_allclose(dense[0] / ideal[0] - 1, expected, atol=0.006)
+    assert np.trapezoid(dense[1], h) == pytest.approx(1, rel=1e-12)
+    e = np.linspace(0, 84, 20001)
+    density = gravity.normalised(e, gravity.sharing(e, 0.7, 60))
+    assert np.trapezoid(e * density, e) == pytest.approx(0.7, rel=1e-4)
+
+
+def test_thermalisation_time_ignores_a_passing_agreement():
+    time = np.arange(8.0)
+    gap = np.array([2, 1.05, 1.5, 1.2, 1.09, 1.0, 0.95, 1.3]) - 1
+
+    def found(difference, error):
+        known = statistics.Estimate(difference, np.full(8, error))
+        return equipartition.thermalisation_time(time, known)
+
+    assert found(gap, 0.04) == 4
+    for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):
+        assert np.isnan(unknown)
+
+
+def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
+    """In equilibrium the energies of 30 disks pass through agreement again and again."""
+    path = falling(tmp_path / "run.h5", rng)
+    (row,) = draw("equipartition", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    assert row["T_therm"] == "nan" and "take more runs" in capsys.readouterr().err
+    several = [read_run(falling(tmp_path / f"{k}.h5", rng, seed=k)) for k in range(2, 60)]
+    assert equipartition.approach(several, 2, 0.1).thermalisation == 1
+
+
+def test_missed_share_is_that_of_chords_at_random_phases(rng):
+    for q in (0.1, 0.7, 1.0, 2.5):
+        half = np.sqrt(1 - rng.uniform(0, 1, 10**6) ** 2)
+        late = rng.uniform(0, q, 10**6) > half
+        assert missed.missed_share(q) == pytest.approx(late.mean(), abs=4e-3 * q)
+    assert missed.missed_share(9.99e-4) == pytest.approx(missed.missed_share(1.001e-3), rel=0.01)
+    assert missed.missed_share(1 - 1e-9) == pytest.approx(missed.missed_share(1.0))
+    assert missed.missed_share(0) == 0
+
+
+def test_runs_with_equal_seeds_are_compared_and_others_named(tmp_path, rng, capsys):
+    def made(seed, hits, dynamics):
+        path = tmp_path / f"{dynamics}_{seed}.h5"
+        return read_run(falling(path, rng, frames=50, dynamics=dynamics, seed=seed, hits=hits))
+
+    events = [made(1, 10, "events"), made(2, 20, "events"), made(3, 40, "events")]
+    steps = [made(1, 9, "steps"), made(2, 16, "steps"), made(4, 9, "steps")]
+    rows = missed.compare(steps + events, 2.0)
+    assert [row["dt"] for row in rows] == [0, 0.004] and [row["runs"] for row in rows] == [3, 2]
+    assert rows[0]["missed_percent"] == 0 and rows[1]["missed_percent"] == pytest.approx(15)
+    assert rows[1]["missed_percent_error"] == pytest.approx(5)
+    assert rows[1]["rate"] == pytest.approx(12.5 * 2 / 60 * 49 / 100)
+    paths = [run.path for run in (*events, *steps)]
+    draw("missed", *paths, "--skip", 2, "-o", tmp_path / "missed.png")
+    assert capsys.readouterr().err.endswith(f"left out, as no event-driven run has their seeds: {paths[-1]}\n")  # fmt: skip  # noqa: E501
+    for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
+        with pytest.raises(RunError, match=problem):
+            missed.compare(runs, 2.0)
+
+
+# --- frames, paths, export, times ---
+
+
+def test_frames_are_chosen_by_number_range_and_count(tmp_path, rng):
+    run = read_run(gas(tmp_path / "gas.h5", rng, count=2))
+    for which, count, chosen in (
+        (None, 1, [0]),
+        (None, 5, [0, 10, 20, 30, 40]),
+        (None, 1000, list(range(41))),
+        ("0,10,-1", None, [0, 10, 40]),
+        ("38:", None, [38, 39, 40]),
+        ("::20", None, [0, 20, 40]),
+        ("-2:,0", None, [39, 40, 0]),
+        ("10:21", 2, [10, 20]),
+    ):
+        assert chosen_frames(run, which and frame_list(which), count) == chosen
+    for which, problem in (("41", "no frame 41, there are 41"), ("50:", "no such frames")):
+        with pytest.raises(RunError, match=problem):
+            chosen_frames(run, frame_list(which), None)
+
+
+def test_disks_that_reach_across_a_periodic_side_are_drawn_on_both(tmp_path):
+    x = np.array([[[0.5, 0.5], [0.005, 0.5], [0.5, 0.995], [0.995, 0.995]]])
+    sides = {"radius": 0.01, "image": np.zeros((1, 4, 2), int)}
+    along_x = [(1, 1.005, 0.5), (3, -0.005, 0.995)]
+    along_y = [(2, 0.5, -0.005), (3, 0.995, -0.005)]
+    for periodic, expected in (
+        ((False, False), []),
+        ((True, False), along_x),
+        ((True, True), [*along_x, *along_y, (3, -0.005, -0.005)]),
+    ):
+        run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=periodic, **sides))
+        which, places = with_images(run, x[0])
+        np.testing.assert_array_equal(which[:4], range(4))
+        found = [(k, *place) for k, place in zip(which[4:], places[4:].round(9), strict=True)]
+        assert sorted(found) == sorted(expected)
+
+
+def test_paths_break_where_a_period_is_crossed_and_pass_corners(tmp_path):
+    x, image = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]]), np.zeros((3, 1, 2), int)
+    image[1:, 0, 0] = 1
+    run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=(True, False), image=image))
+    (path,) = trajectory.paths_of(run, [0], [0, 1, 2])
+    expected = [[0.8, 0.5], [1.1, 0.5], [np.nan] * 2, [-0.2, 0.5], [0.1, 0.5], [0.4, 0.5]]
+    np.testing.assert_allclose(path, expected)
+    corner = np.array([[0.9, 0.7], [0.5, 0.1]]), np.array([[0, 0], [1, 1]])
+    path = trajectory.wrapped(*corner, np.ones(2))
+    pieces = np.split(path, np.flatnonzero(np.isnan(path[:, 0])))
+    assert len(pieces) == 4, "as it leaves, through two cells that it may touch, as it arrives"
+    np.testing.assert_allclose(pieces[0], [[0.9, 0.7], [1.5, 1.1]])
+    np.testing.assert_allclose(pieces[-1][1:], [[-0.1, -0.3], [0.5, 0.1]])
+
+
+def timed(path, count=3, search="cells", **provenance):
+    """A run that says how long it took."""
+    x = np.zeros((1, count, 2))
+    return write_run(path, x, x, parameters={"run": {"search": search}}, provenance=provenance)
+
+
+def test_cost_takes_the_best_of_equal_runs_and_fits_a_power(tmp_path):
+    kinds = [("pairs", 20, 1e5), ("pairs", 10, 1e5), ("pairs", 10, 2e5), ("cells", 10, 1e6)]
+    runs = [
+        read_run(timed(tmp_path / f"{k}.h5", n, search, collisions_per_second=rate))
+        for k, (search, n, rate) in enumerate(kinds)
+    ]
+    measured = cost.costs(runs)
+    np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
+    np.testing.assert_allclose(measured["cells"], [[10], [1]])
+    n = np.array([16, 128, 256, 512, 1024])
+    measured = {"rescan": (n, np.where(n == 16, 9, 3e-3 * n**1.9)), "cells": (n[:3], n[:3])}
+    laws = cost.fits(measured, 128, 1e4)
+    assert laws["rescan"].exponent == pytest.approx(1.9) and "cells" not in laws
+    assert laws["rescan"].factor == pytest.approx(3e-3)
+    bent = cost.fits({"pairs": (n, n * np.array([1, 1, 1.1, 1, 1.1]))}, 16, 1e4)["pairs"]
+    assert 0 < abs(bent.exponent - 1) < 2 * bent.exponent_error < 0.1
+
+
+def test_several_cores_are_compared_with_one_by_medians(tmp_path):
+    times = [(1, 12.0), (1, 10.0), (1, 20.0), (2, 6.0)]
+    runs = [
+        read_run(timed(tmp_path / f"{n}_{t}.h5", threads=n, wall_time=t)) for n, t in times
+    ]
+    alone, two = scaling.table(runs)
+    assert alone["runs"] == 3 and alone["seconds"] == 12 and two["gain"] == pytest.approx(2)
+    with pytest.raises(RunError, match="one thread"):
+        scaling.table(runs[-1:])
+
+
+# --- divergence ---
+
+
+def neighbours(folder, rng, pairs=3, growth=2.0, frames=81):
+    """Files of pairs of runs of two disks, 1e-12 exp(growth t) apart up to 0.5, time 0 to 16."""
+    time = np.linspace(0, 16, frames)
+    paths = []
+    for k in range(pairs):
+        x = rng.uniform(size=(frames, 2, 2))
+        slope = growth + 0.1 * (k - (pairs - 1) / 2)
+        apart = np.minimum(1e-12 * np.exp(slope * time), 0.5)
+        shifted = x + apart[:, None, None] * np.array([[0.6, 0], [0, 0.8]])
+        for name, where in (("a", x), ("b", shifted)):
+            paths.append(write_run(folder / f"{k}_{name}.h5", where, x, time=time))
+    return paths
+
+
+def test_lyapunov_finds_the_rate_of_divergence(tmp_path, rng, capsys):
+    paths = neighbours(tmp_path, rng)
+    runs = [read_run(path) for path in paths]
+    apart = np.array([lyapunov.distance(*runs[k : k + 2]) for k in (0, 2, 4)])
+    found = lyapunov.divergence(runs[0].time, apart, largest=0.01, begin=0.2)
+    np.testing.assert_allclose(found.slope, [1.9, 2.0, 2.1], atol=1e-3)
+    assert found.exponent.mean == pytest.approx(2, abs=1e-3)
+    assert found.exponent.error == pytest.approx(0.1 / 3**0.5, rel=0.02)
+    assert found.end == pytest.approx(10.8), "the last frame before the first pair is 0.01 apart"
+    with pytest.raises(RunError, match="nothing to fit"):
+        lyapunov.divergence(runs[0].time, 0 * apart, largest=0.01, begin=0.2)
+    assert "3 runs: not pairs" in refusal(capsys, "lyapunov", *paths[:3])
+
+
+# --- captions, and every script draws ---
+
+
+def test_captions_name_what_varies(tmp_path):
+    x = np.zeros((1, 2, 2))
+
+    def run(k, **species):
+        groups = {"run": {"seed": k}, "contact": {"restitution": 1.0}, "species/disk": species}
+        groups["stop"] = {"time": 1.0 + k}
+        return read_run(write_run(tmp_path / f"{k}.h5", x, x, parameters=groups))
+
+    same = [run(k, mass=2.0) for k in (1, 2)]
+    assert caption(same) == "N = 2,  ξ = 1,  2 seeds"
+    two = [*same, run(3, mass=4.0)]
+    assert caption(two) == "N = 2,  ξ = 1,  mass = 2, 4,  3 seeds"
+    many = [run(k, packing_fraction=k / 10, radius=k / 100) for k in range(1, 7)]
+    assert caption(many) == "N = 2,  ξ = 1,  packing_fraction = 0.1 to 0.6,  6 seeds"
+
+
+def still(path, rng):
+    return [falling(path / "run.h5", rng)]
+
+
+#: Input files, and further options, of each script.
+DRAWN = {
+    "speeds": lambda p, rng: [gas(p / "a.h5", rng)],
+    "snapshot": lambda p, rng: [gas(p / "a.h5", rng), "--frames", "0,-1", "--quiver"],
+    "mixture": lambda p, rng: [mixed(p / f"{k}.h5", rng) for k in range(2)],
+    "cooling": lambda p, rng: [
+        cooled(p / f"{xi}_{s}.h5", xi, 3 - 3 * xi, seed=s) for xi in (0.8, 1.0) for s in (1, 2)
+    ],
+    "scattering": lambda p, rng: [collision(p / f"{b}.h5", b) for b in (-0.5, 0, 0.5, 1.1)],
+    "crater": lambda p, rng: [impact(p / "a.h5", moved=9)],
+    "driven": lambda p, rng: [*still(p, rng), "--show", "height"],
+    "energy": still,
+    "equipartition": still,
+    "gravity": still,
+    "missed": pairs_of_runs,
+    "trajectory": lambda p, rng: [gas(p / "a.h5", rng, count=3, obstacles=[((0.5, 0.5), 0.5, 1)])],
+    "cost": lambda p, rng: [timed(p / "a.h5", collisions_per_second=1e6, git_commit="abc")],
+    "scaling": lambda p, rng: [timed(p / "a.h5", threads=1, wall_time=1.0, git_commit="abc")],
+    "lyapunov": neighbours,
+}
+
+
+@pytest.mark.parametrize("script", DRAWN)
+def test_a_script_draws_and_tabulates(tmp_path, rng, script, capsys):
+    figure, table = tmp_path / "deep" / "figure.png", tmp_path / "new" / "a.csv"
+    rows = draw(script, *DRAWN[script](tmp_path, rng), "-o", figure, "--csv", table)
+    data = figure.read_bytes()
+    assert data.startswith(b"\x89PNG") and len(data) > 10000
+    assert b"ricochet" in data[:3000], "the source stands in the metadata"
+    assert rows and all(None not in row and None not in row.values() for row in rows)
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) > 1 and len(printed[0]) == len(printed[1]) > 10, "a table"
+
+
+def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
+    draw("cooling", cooled(tmp_path / "one.h5", 0.9, 0.3), "-o", tmp_path / "a.png")
+    printed, said = capsys.readouterr()
+    assert "nan" in printed and "no error of energy_left, temperature_ratio: it takes sev" in said
+    draw("equipartition", falling(tmp_path / "f.h5", rng), "--within", 0, "-o", tmp_path / "b.png")
+    assert "v0 = 0.5: no T_therm; the difference of the energies is not known to 0" in (
+        capsys.readouterr().err
+    )
+
+
+def test_other_formats_are_written_too(tmp_path, rng):
+    path = gas(tmp_path / "gas.h5", rng, frames=4)
+    for ending, begin in {"pdf": b"%PDF", "svg": b"<?xml"}.items():
+        draw("snapshot", path, "-o", tmp_path / f"a.{ending}")
+        assert (tmp_path / f"a.{ending}").read_bytes().startswith(begin)
+    draw("animate", path, "-o", tmp_path / "film.gif", "--fps", 10)
+    assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF")
+    draw("export", path, "-o", tmp_path / "gas.xyz", "--frames", "::2")
+    assert (tmp_path / "gas.xyz").read_text().count("Lattice") == 2
+
+

@@ -1,0 +1,153 @@
+"""Means, errors and tests in post/ on samples made by laws: error bars are as often right."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from ricochet import statistics, theory
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20)
+
+
+@pytest.fixture
+def noise():
+    return np.random.default_rng(8)
+
+
+def remembering(rng, length: int, memory: float) -> np.ndarray:
+    """A series (T,) of mean 0 and variance 1 whose correlation falls by 1/e in `memory` samples."""
+    keep = np.exp(-1 / memory)
+    return lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.normal(size=length + 2000))[2000:]
+
+
+# --- laws of speeds ---
+
+
+def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
+    u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (20000, 2)), axis=1)
+    right = statistics.hold_against(u, theory.maxwell_cdf)
+    wrong = statistics.hold_against(1.02 * u, theory.maxwell_cdf)
+    assert right.ks_p > 0.01 and right.chi2_p > 0.01 and right.ks < 1.63 / np.sqrt(right.n)
+    assert wrong.ks_p < 0.01 and wrong.chi2_p < 0.01
+    x = np.linspace(0, 4, 4001)
+    slope = np.gradient(theory.maxwell_cdf(x), x)
+    np.testing.assert_allclose(slope[1:-1], theory.maxwell_pdf(x)[1:-1], atol=1e-6)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng, periodic):
+    """And in a periodic box without the motion of all; copies of a value count once."""
+    v = rng.normal(size=(40000, 5, 2))
+    v -= periodic * v.mean(axis=1, keepdims=True)
+    k = np.sum(v**2, axis=2)
+    u, law = np.sqrt(k[:, 0] / k.mean(axis=1)), theory.finite_n_cdf(5, periodic)
+    found = statistics.hold_against(u, law)
+    assert found.ks_p > 0.01
+    assert statistics.hold_against(u, theory.finite_n_cdf(5, not periodic)).ks_p < 0.01
+    again = statistics.hold_against(np.repeat(u, 4), law, independent=len(u))
+    assert again == pytest.approx(found, rel=0.02)
+
+
+def test_excess_kurtosis_and_its_noise(rng):
+    assert statistics.excess_kurtosis(np.ones(10)) == -0.5
+    gases = np.sqrt(rng.exponential(size=(2000, 500)))
+    found = [statistics.excess_kurtosis(speed) for speed in gases]
+    assert np.mean(found) == pytest.approx(0, abs=0.01)
+    assert np.std(found) == pytest.approx(statistics.kurtosis_noise(500), rel=0.1)
+
+
+# --- independent values ---
+
+
+@pytest.mark.parametrize("copies", [1, 4])
+def test_errors_of_a_histogram_are_its_scatter(rng, copies):
+    """Of independent values, and of values of which each counts as four."""
+    bins = np.linspace(0, 1, 6)
+    draws = np.repeat(rng.beta(2, 3, (4000, 100)), copies, axis=1)
+    heights = [statistics.binned(values, bins, independent=100) for values in draws]
+    assert np.sum(heights[0].mean) / 5 == pytest.approx(1)
+    scatter = np.std([height.mean for height in heights], axis=0)
+    error2 = np.mean([height.error**2 for height in heights], axis=0)
+    assert np.sqrt(error2) == pytest.approx(scatter, rel=0.05)
+
+
+def test_estimate_has_the_error_of_the_mean():
+    mean, error = statistics.estimate([1.0, 2.0, 3.0, 4.0])
+    assert (mean, error) == (2.5, pytest.approx(np.sqrt(5 / 3 / 4)))
+    assert np.isnan(statistics.estimate([1.0]).error)
+
+
+def test_power_law_is_found_with_its_error(rng):
+    x = np.linspace(1, 30, 10)
+    pulls = []
+    for _ in range(200):
+        error = 0.02 * 3 * x**0.7
+        fit = statistics.fit_power_law(x, 3 * x**0.7 + error * rng.normal(size=10), error)
+        pulls.append((fit.exponent - 0.7) / fit.exponent_error)
+    assert abs(np.mean(pulls)) < 0.3 and 0.7 < np.std(pulls) < 1.3
+    assert fit.factor == pytest.approx(3, abs=4 * fit.factor_error)
+    assert statistics.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
+
+
+def test_errors_are_written_with_two_digits():
+    assert statistics.to_error(0.0000123, 0.00031) == ("0.00001", "0.00031")
+    assert statistics.to_error(-1e-9, 0.2) == ("0.00", "0.20")
+    assert statistics.to_error(945.3, 12.4) == ("945", "12")
+    assert statistics.to_error(0.9512, 0.00999) == ("0.951", "0.010")
+    assert statistics.to_error(0.5, 0.0) == ("0.5", "0")
+
+
+# --- series in time ---
+
+
+def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(noise):
+    amount = noise.poisson(1000, 20000).astype(float)
+    found = statistics.series_mean(amount, np.full(20000, 2.0))
+    assert found.mean == pytest.approx(500, rel=0.01)
+    assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(20000), rel=0.4)
+
+
+@pytest.mark.parametrize("memory", [0.5, 5, 20])
+def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(noise, memory):
+    means = [
+        statistics.series_mean(remembering(noise, 2000, memory) + 3 * noise.normal(size=2000))
+        for _ in range(400)
+    ]
+    hit = np.mean([abs(one.mean) < one.error for one in means])
+    assert 0.60 <= hit <= 0.76
+    exact = np.sqrt((1 / np.tanh(0.5 / memory) + 9) / 2000)
+    assert np.mean([one.error for one in means]) == pytest.approx(1.1 * exact, rel=0.12)
+
+
+def test_equilibrium_begins_where_a_drift_has_died_out(noise):
+    decay = 20 * np.exp(-np.arange(4000) / 200)
+    starts = [statistics.equilibration(remembering(noise, 4000, 3) + decay) for _ in range(40)]
+    assert np.quantile(starts, 0.1) > 3 * 200 and np.quantile(starts, 0.9) < 2000
+    calm = [statistics.equilibration(remembering(noise, 4000, 3)) for _ in range(40)]
+    assert np.median(calm) < 400
+
+
+def test_what_speaks_against_an_error_is_said(noise):
+    calm = [statistics.series_mean(noise.normal(size=640)) for _ in range(10)]
+    assert statistics.doubts("Z", calm) == []
+    slope = np.linspace(0, 0.5, 640)  # hardly seen in one run, but they all agree
+    drifting = [statistics.series_mean(noise.normal(size=640) + slope) for _ in range(10)]
+    assert "Z: still drifts" in statistics.doubts("Z", drifting)[0]
+    apart = [one._replace(mean=one.mean + k) for k, one in enumerate(calm)]
+    assert "runs scatter by 3" in statistics.doubts("Z", apart)[0]
+    assert statistics.combined(apart).error == pytest.approx(1, rel=0.1)
+    assert statistics.combined(apart).samples == 10, "a run is a sample"
+    short = statistics.series_mean(noise.normal(size=5))
+    assert "no error" in statistics.doubts("Z", [short])[0]
+    slow = statistics.series_mean(remembering(noise, 640, 100))
+    assert "independent samples; run longer" in " ".join(statistics.doubts("Z", [slow]))
+
+
+def test_windows_are_means():
+    time = np.arange(0, 10.01, 0.1)
+    middle, mean = statistics.windows(time, time, 2.0)
+    np.testing.assert_allclose(middle, [1, 3, 5, 7, 9])
+    np.testing.assert_allclose(mean, [0.95, 2.95, 4.95, 6.95, 8.95])
