@@ -162,16 +162,19 @@ def shift_of(found: Found, side: str, time: float) -> float:
 
 
 def log_error(found: Found) -> float:
-    """How far the log is from the sums of the observables: counts, and what each wall got."""
+    """How far the log is from what is counted and summed: for each disk, and for each wall."""
     if "/events/j" not in found:
         return 0.0
-    j = found["/events/j"]
+    i, j = found["/events/i"], found["/events/j"]
     walls = [(-k, f"sides/{name}") for k, name in enumerate(SIDES)]
     names = [*found.get("/parameters/obstacle/name", ()), *found.get("/parameters/wall/name", ())]
     walls += [(-4 - k, f"walls/{name.decode()}") for k, name in enumerate(names)]
     change = found.get("/events/momentum_change")
     wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
     wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
+    of_disks = found["/particles/disks/collisions/value"][-1]
+    mine = np.bincount(np.concatenate([i, j[j > 0]]), minlength=len(of_disks) + 1)
+    wrong += list(mine[1:] - of_disks)
     for code, name in walls:
         count, last = series(found, f"{name}/collisions"), series(found, f"{name}/impulse")
         if len(count):

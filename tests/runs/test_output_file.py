@@ -1,7 +1,8 @@
-"""The output file of whole runs: layout, meaning of every number, order, cadence, and refusals."""
+"""The output file of whole runs: layout, parameters, cadences, and places that are refused.
 
-import shutil
-import subprocess
+What its numbers mean is asserted of all systems (test_random_systems.py, tests/unit/).
+"""
+
 import time
 
 import h5py
@@ -56,6 +57,10 @@ def test_the_layout_is_h5md(ran):
     assert disks["box"].attrs["dimension"] == 2
     assert [text(b) for b in disks["box"].attrs["boundary"]] == ["none", "none"]
     assert list(disks["box/edges"]) == [1, 1] and list(disks["box/lower"]) == [0, 0]
+    assert list(disks["id"]) == list(range(1, 81))
+    assert list(disks["species"]) == [1] * 60 + [2] * 20
+    assert list(disks["mass"]) == [1] * 60 + [4] * 20
+    assert list(disks["radius"]) == [0.02] * 60 + [0.03] * 20
     frames = 17
     for name, kind, shape in [
         ("position", np.float64, (frames, 80, 2)),
@@ -99,6 +104,10 @@ def test_every_parameter_is_there_as_it_was_used(ran, tmp_path):
     assert file["output"].attrs["event_log"] == 1
     assert file["stop"].attrs["time"] == 4
     assert "frames_every_events" not in file["output"].attrs
+    table = ran(GRAVITY, name="obstacles")["parameters/obstacle"]
+    assert [text(name) for name in table["name"]] == ["peg"]
+    assert table["centre"][:].tolist() == [[1, 1]]
+    assert list(table["radius"]) == [0.3] and list(table["inside"]) == [0]
 
 
 def test_the_origin_is_there(ran):
@@ -109,108 +118,30 @@ def test_the_origin_is_there(ran):
     assert origin["wall_time"] > 0 and origin["collisions_per_second"] > 0
 
 
-def test_obstacles_are_one_table(ran):
-    table = ran(GRAVITY)["parameters/obstacle"]
-    assert [text(name) for name in table["name"]] == ["peg"]
-    assert table["centre"][:].tolist() == [[1, 1]]
-    assert list(table["radius"]) == [0.3] and list(table["inside"]) == [0]
-
-
-def test_disks_stand_in_the_order_of_the_input(ran):
-    """The program renumbers its disks as they move; the file must not show it."""
-    file = ran(MIXTURE, "--set", "output.frames_every_time=0.01", "--set", "stop.time=6")
-    disks = file["particles/disks"]
-    assert list(disks["id"]) == list(range(1, 81))
-    assert list(disks["species"]) == [1] * 60 + [2] * 20
-    assert list(disks["mass"]) == [1] * 60 + [4] * 20
-    assert list(disks["radius"]) == [0.02] * 60 + [0.03] * 20
-    assert file["observables/collisions/value"][-1] > 1500, "long enough for renumbering"
-    position, velocity = disks["position/value"][:], disks["velocity/value"][:]
-    fastest = np.linalg.norm(velocity, axis=-1).max()
-    steps = np.linalg.norm(np.diff(position, axis=0), axis=-1)
-    assert steps.max() <= fastest * 0.01 * (1 + 1e-9)
-    assert position.min() >= 0.02 - 1e-12 and position.max() <= 0.98 + 1e-12
-    assert (np.diff(disks["collisions/value"][:], axis=0) >= 0).all()
-
-
-def test_explicit_positions_are_the_first_frame(ran):
+@pytest.mark.parametrize(
+    ("track", "cadence", "end", "expected"),
+    [
+        ("frames", "time=0.1", "time=1", [k * 0.1 for k in range(11)]),
+        ("frames", "time=0.1", "time=1.03", [*(k * 0.1 for k in range(11)), 1.03]),
+        ("frames", "time=", "time=0.7", [0, 0.7]),
+        ("observables", "collisions=40", "collisions=250", [*range(0, 250, 40), 250]),
+        ("observables", "events=40", "events=250", [*range(0, 250, 40), 250]),
+        ("observables", "collisions_per_disk=1", "collisions=250", [*range(0, 250, 40), 250]),
+    ],
+)
+def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, end, expected):
+    """A cadence that is set takes the place of another of the same samples in the input, only."""
     file = ran(
-        "&species name = 'a' count = 3 radius = 0.01 position = 0.9,0.8, 0.1,0.2, 0.5,0.5\n"
-        "velocity = 1,2, 3,4, 5,6 /\n&stop time = 0 /\n"
+        MIXTURE, f"--set=output.{track}_every_{cadence}", "--set=stop.time=", f"--set=stop.{end}"
     )
-    disks = file["particles/disks"]
-    assert disks["position/value"][:].tolist() == [[[0.9, 0.8], [0.1, 0.2], [0.5, 0.5]]]
-    assert disks["velocity/value"][:].tolist() == [[[1, 2], [3, 4], [5, 6]]]
-    assert disks["position/time"][:].tolist() == [0]
-
-
-@pytest.mark.parametrize(("end", "last"), [(1.0, [1.0]), (1.03, [1.0, 1.03])])
-def test_samples_by_time_are_at_the_very_multiples_and_at_the_end(ran, end, last):
-    file = ran(MIXTURE, "--set", "output.frames_every_time=0.1", "--set", f"stop.time={end}")
-    time = file["particles/disks/position/time"][:]
-    assert time.tolist() == [k * 0.1 for k in range(10)] + last
-    assert file["particles/disks/position/step"][:].tolist() == list(range(len(time)))
-
-
-@pytest.mark.parametrize("kind", ["collisions", "events"])
-def test_samples_by_number_are_at_the_very_multiples_and_at_the_end(ran, kind):
-    every = ["--set", "output.observables_every_collisions=", "--set", "stop.time="]
-    every += ["--set", f"output.observables_every_{kind}=40", "--set", f"stop.{kind}=250"]
-    file = ran(MIXTURE, *every)["observables"]
-    number = file["collisions/value"][:]
-    if kind == "events":
-        number = number + file["wall_collisions/value"][:].sum(axis=1)
-    assert number.tolist() == [0, 40, 80, 120, 160, 200, 240, 250]
-
-
-def test_without_a_cadence_there_are_the_first_and_the_last_sample(ran):
-    file = ran(MIXTURE, "--set", "output.frames_every_time=", "--set", "stop.time=0.7")
-    assert file["particles/disks/position/time"][:].tolist() == [0, 0.7]
-
-
-def test_observables_are_what_the_frames_say(ran):
-    file = ran(GRAVITY)
     disks, seen = file["particles/disks"], file["observables"]
-    v, x, mass = disks["velocity/value"][:], disks["position/value"][:], disks["mass"][:]
-    kinetic = 0.5 * mass * (v**2).sum(axis=-1)
-    potential = 2 * mass * x[..., 1]
-    own = 0.5 * mass * ((v - v.mean(axis=1, keepdims=True)) ** 2).sum(axis=-1)
-    dissipated = seen["dissipated_energy/value"][:]
-    expected = {
-        "all/kinetic_energy": kinetic.mean(axis=1),
-        "gas/potential_energy": potential.mean(axis=1),
-        "gas/mean_speed": np.linalg.norm(v, axis=-1).mean(axis=1),
-        "all/temperature": own.mean(axis=1),
-        "momentum": (mass[:, None] * v).sum(axis=1),
-        "total_energy": (kinetic + potential).sum(axis=1),
-    }
-    for name, values in expected.items():
-        np.testing.assert_allclose(seen[name]["value"][:], values, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(seen["total_energy/value"][:], seen["total_energy/value"][0])
-    assert abs(dissipated).max() < 1e-10
-    area = 6 - np.pi * 0.09
-    time, virial = seen["virial/time"][1:], seen["virial/value"][1:]
-    pressure = (kinetic.sum(axis=1)[1:] + virial / (2 * time)) / area
-    np.testing.assert_allclose(seen["pressure/value"][1:], pressure, rtol=1e-12)
-    assert np.isclose(seen["pressure/value"][0], kinetic[0].sum() / area)
-
-
-def test_energy_that_is_gone_has_been_dissipated(ran):
-    seen = ran(MIXTURE)["observables"]
-    balance = seen["total_energy/value"][:] + seen["dissipated_energy/value"][:]
-    np.testing.assert_allclose(balance, balance[0], rtol=1e-12)
-    assert seen["dissipated_energy/value"][-1] > 0
-
-
-def test_positions_are_in_the_periodic_box_and_images_count_the_periods(ran):
-    file = ran(GRAVITY, "--set", "stop.time=20")
-    disks = file["particles/disks"]
-    assert [text(b) for b in disks["box"].attrs["boundary"]] == ["periodic", "none"]
-    x, image = disks["position/value"][:], disks["image/value"][:]
-    assert (x[..., 0] >= 0).all() and (x[..., 0] < 2).all()
-    assert (image[..., 1] == 0).all() and np.abs(image[..., 0]).max() > 2
-    way = np.abs(np.diff((x + image * [2, 3])[..., 0], axis=0)).max()
-    assert way <= 0.1 * np.abs(disks["velocity/value"][..., 0]).max() * (1 + 1e-9)
+    times, number = disks["position/time"][:], seen["collisions/value"][:]
+    if "events" in cadence:
+        number = number + seen["wall_collisions/value"][:].sum(axis=1)
+    assert (times if track == "frames" else number).tolist() == expected
+    assert disks["position/step"][:].tolist() == list(range(len(times)))
+    other = (number[1:-1] % 50 == 0) if track == "frames" else (times[1:-1] % 0.25 == 0)
+    assert other.all() and len(other) > 0
 
 
 def test_single_precision_is_the_same_run_rounded(ran):
@@ -221,43 +152,6 @@ def test_single_precision_is_the_same_run_rounded(ran):
         rounded = double[name]["value"][:].astype(np.float32)
         assert (single[name]["value"][:] == rounded).all()
     assert (single["position/time"][:] == double["position/time"][:]).all()
-
-
-def test_the_event_log_lists_every_collision(ran):
-    file = ran(GRAVITY)
-    events, seen = file["events"], file["observables"]
-    i, j, when = events["i"][:], events["j"][:], events["time"][:]
-    assert (np.diff(when) >= 0).all() and when[-1] <= 3
-    assert (j > 0).sum() == seen["collisions/value"][-1]
-    walls = [(j == code).sum() for code in (0, -1, -2, -3)]
-    assert walls == seen["wall_collisions/value"][-1].tolist() and walls[:2] == [0, 0]
-    assert (j == -4).sum() == seen["obstacle_collisions/value"][-1] > 0
-    assert (j >= -4).all() and (i >= 1).all() and (i <= 50).all() and (i != j).all()
-    floor = events["impulse"][:][j == -2].sum()
-    assert np.isclose(floor, seen["wall_impulse/value"][-1][2]), "the wall is elastic: no friction"
-    per_disk = np.bincount(np.concatenate([i, j[j > 0]]) - 1, minlength=50)
-    assert per_disk.tolist() == file["particles/disks/collisions/value"][-1].tolist()
-    assert events["committed"][()] == len(when)
-
-
-@pytest.mark.parametrize(
-    ("count", "packing", "seed"), [(3, 0.001, 22), (3, 0.001, 23), (10, 0.01, 29), (10, 0.01, 37)]
-)
-def test_a_period_brings_no_old_contact_back(ran, tmp_path, count, packing, seed):
-    """Without rebound a pair stays in contact to the last bits, which a period changes."""
-    sticky = f"""&run seed = {seed} / &contact restitution = 0 /
-    &box boundary = 'periodic', 'periodic' /
-    &species count = {count} packing_fraction = {packing} temperature = 1 /
-    &stop collisions_per_disk = 50 time = 1e5 /
-    &output event_log = .true. frames_every_collisions = 1 /
-    """
-    for name, search, queue in (("cells", "cells", "calendar"), ("pairs", "pairs", "heap")):
-        ways = ("--set", f"run.search={search}", "--set", f"run.queue={queue}")
-        file = ran(sticky, *ways, name=name)
-        assert (np.diff(file["events/time"][:]) >= 0).all()
-        file.close()
-    found = differences(tmp_path / "cells.h5", tmp_path / "pairs.h5")
-    assert [name for name in found if "parameters" not in name] == []
 
 
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
@@ -271,66 +165,6 @@ def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
     differing = [k for k in range(len(one)) if one[k] != two[k]]
     assert len(differing) <= 16
     assert differences(tmp_path / "one.h5", tmp_path / "two.h5") == []
-
-
-def test_a_cadence_that_is_set_takes_the_place_of_that_in_the_file(ricochet, tmp_path):
-    """For the same samples only."""
-    write_input(
-        tmp_path,
-        "&species count = 20 radius = 0.02 speed = 1 / &stop collisions = 40 /"
-        " &output frames_every_collisions = 10 observables_every_collisions = 10 /\n",
-    )
-
-    def samples(name, *settings):
-        run = ricochet("gas.nml", "-o", name, *(f"--set=output.{each}" for each in settings))
-        assert run.returncode == FINISHED, run.stderr
-        with h5py.File(tmp_path / name) as file:
-            tracks = "particles/disks/position", "observables/total_energy"
-            return tuple(len(file[track]["step"]) for track in tracks)
-
-    assert samples("a.h5") == (5, 5)
-    assert samples("b.h5", "frames_every_collisions_per_disk=2") == (3, 5)
-    assert samples("c.h5", "observables_every_collisions=20") == (5, 3)
-
-
-def test_two_cadences_of_the_same_samples_are_refused(ricochet, tmp_path):
-    """In the file or on the command line; neither would be left out without a word."""
-    disks = "&species count = 20 radius = 0.02 speed = 1 / &stop collisions = 40 /\n"
-    write_input(tmp_path, disks)
-    both = "output.frames_every_collisions_per_disk=2", "output.frames_every_collisions=15"
-    twice = ricochet("gas.nml", *(f"--set={each}" for each in both))
-    words = "is given with frames_every_collisions; give one of them\n"
-    assert twice.returncode == USAGE
-    assert twice.stderr == f"--set {both[0]}: output.frames_every_collisions_per_disk: {words}"
-    write_input(
-        tmp_path,
-        disks + "&output frames_every_collisions = 15\nframes_every_collisions_per_disk = 2 /\n",
-    )
-    twice = ricochet("gas.nml")
-    assert twice.returncode == USAGE
-    assert twice.stderr == f"gas.nml:3: output.frames_every_collisions_per_disk: {words}"
-    assert ricochet("gas.nml", f"--set={both[1]}").returncode == FINISHED
-
-
-def test_the_cadence_leaves_no_trace_in_the_trajectory(ran, tmp_path):
-    often = ran(MIXTURE, "--set", "output.frames_every_time=0.0125", name="often")
-    seldom = ran(MIXTURE, "--set", "output.observables_every_collisions=7", name="seldom")
-    for name in ("position", "velocity", "collisions"):
-        path = f"particles/disks/{name}/value"
-        assert (often[path][::20] == seldom[path][:]).all()
-
-
-def test_other_tools_read_the_file(ran, tmp_path):
-    ran(MIXTURE).close()
-    if shutil.which("h5dump") is None:
-        pytest.skip("no h5dump")
-    dump = subprocess.run(
-        ["h5dump", "-d", "/particles/disks/position/time", tmp_path / "gas.h5"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "3.75, 4" in dump.stdout
 
 
 def test_the_summary_says_what_the_file_says(ricochet, tmp_path):
@@ -388,12 +222,6 @@ def test_impossible_places_are_refused_in_one_line(ricochet, tmp_path):
         run = ricochet(input_file, "-o", place)
         assert run.returncode == FILES
         assert reason in one_line(run) and place in one_line(run)
-
-
-def test_an_output_beyond_the_disk_is_refused_before_the_run(ricochet, tmp_path):
-    run = ricochet(write_input(tmp_path), "-o", "gas.h5", "--set", "output.frames_every_time=4e-9")
-    assert run.returncode == FILES
-    assert "are free" in one_line(run) and list(tmp_path.glob("gas.h5*")) == []
 
 
 def test_a_species_has_no_name_that_the_file_uses_itself(ricochet, ran, tmp_path):

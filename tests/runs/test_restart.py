@@ -1,4 +1,4 @@
-"""A run that is stopped, killed, damaged or finished goes on as if nothing had been, or says why not.
+"""A run that is stopped, damaged or finished goes on as if nothing had been, or says why not.
 
 That the bits are the same whatever the system and the way is asserted by `test_random_systems.py`.
 """
@@ -56,7 +56,7 @@ def before(request, ricochet, tmp_path):
 
 
 def test_stops_between_and_at_samples_and_before_the_first_event(ricochet, tmp_path):
-    """The wall clock stops a run at once, so that every part makes one little step, but makes it."""
+    """The wall clock stops a run at once: every part makes one little step, but makes it."""
     write_input(tmp_path, GAS + GROWING)
     short = ["gas.nml", "--set", "species.gas.count=3", "--set", "species.gas.radius=0.15"]
     short += ["--set", "run.search='pairs'", "--set", "stop.time=1", "-o"]
