@@ -5,7 +5,7 @@ module namelist_input
   use input_text, only: unix_lines
   use input_words, only: store_values
   use namelist_tokens, only: assignment_t, content, cut, ending, plain, token_t, unclosed, word
-  use texts, only: digits, joined, lower_case, place_of, shown, suggestion, text_t, written
+  use texts, only: digits, joined, lower_case, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none
   private
@@ -45,7 +45,7 @@ contains
     allocate (found(size(group_names) + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
     do k = 1, size(group_names)                                     ! groups that cannot be repeated exist from the start
-      if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0)
+      if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
     end do
     call open_source(unix_lines(text))
     call read_text()
@@ -86,9 +86,9 @@ contains
     end function follow
 
     !> Adds a group with the defaults of the table.
-    subroutine add_group(name, line)
+    subroutine add_group(name, line, number)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: line
+      integer, intent(in) :: line, number                 !! number: among those of its name
       integer, allocatable :: rows(:)
       integer :: v
 
@@ -96,7 +96,7 @@ contains
       rows = pack([(v, v=1, size(table))], table%group == name)
       associate (group => found(n))
         group%name = name
-        group%number = count(found(:n)%name == name)
+        group%number = number
         group%line = line
         allocate (group%values(size(rows)))
         do v = 1, size(rows)
@@ -225,7 +225,9 @@ contains
 
       if (follow("("//word//")")) then
         associate (number => source(token(at + 1)%first:token(at + 1)%last))
+          status = 1
           if (verify(number, digits) == 0) read (number, *, iostat=status) assignment%element
+          if (status /= 0) assignment%element = 0
         end associate
       end if
       if (assignment%element > 0) then
@@ -302,22 +304,25 @@ contains
     !> Finds the group to which the following assignments belong.
     subroutine enter_group(name)
       character(len=*), intent(in) :: name
+      integer :: instances
 
       own = plain(name)
-      group = 0
+      group = findloc(found(:n)%name, name, dim=1, back=.true.)
+      instances = 0
+      if (group > 0) instances = found(group)%number
       if (all(group_names /= name)) then
         complete = .false.
         call problems%add(opened, "&"//own, "unknown group; "//suggestion(name, group_names))
       else if (.not. is_repeated(name)) then
-        group = place_of(name, found(:n)%name)
         if (found(group)%line > 0) call problems%add(opened, name, &
           "a second group of this name; the first is in line "//written(found(group)%line))
         if (found(group)%line == 0) found(group)%line = opened
-      else if (count(found(:n)%name == name) == most_instances) then
-        call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name")
-      else
-        call add_group(name, opened)
+      else if (instances < most_instances) then
+        call add_group(name, opened, instances + 1)
         group = n
+      else
+        call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name")
+        group = 0
       end if
       if (group > 0) found(group)%first = token(at)%first
     end subroutine enter_group

@@ -7,18 +7,24 @@ the lines name the file; accepted, --print-input says what an independent readin
     python tests/runs/fuzz_input.py --count 10000 --program build/ricochet
 """
 
+import argparse
 import json
+import os
 import random
 import re
+import signal
+import subprocess
 import sys
 import tempfile
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import fuzzing
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests"))
+from whole_runs import PATIENCE, within  # noqa: E402
 
 MOST_SECONDS = 5  # of processor time
-HARMLESS = {"accepted", "refused"}
 
 SEEDS = [
     """! a comment with a / and an ' in it
@@ -236,6 +242,11 @@ def plain_value(value: str) -> object:
     return float(value.lower().replace("d", "e"))
 
 
+def alike(found: object, wanted: object) -> bool:
+    """Whether two values are the same; a real may be written as an integer."""
+    return found == (float(wanted) if isinstance(found, float) else wanted)
+
+
 def contradiction(data: bytes, groups: list[dict]) -> str | None:
     """What the independent reading has against the groups of --print-input; None if nothing."""
     try:
@@ -250,8 +261,9 @@ def contradiction(data: bytes, groups: list[dict]) -> str | None:
             found = group["values"].get(variable)
             found = found[element - 1] if element and isinstance(found, list) else found
             found = found if isinstance(found, list) else [found]
-            if found != plain(written):
-                return f"{name}.{key} is {plain(written)}, taken as {found}"
+            wanted = plain(written)
+            if len(found) != len(wanted) or not all(map(alike, found, wanted)):
+                return f"{name}.{key} is {wanted}, taken as {found}"
         surplus = group["values"].keys() - {
             key[0] if isinstance(key, tuple) else key for key in variables
         }
@@ -264,10 +276,15 @@ def judge(program: str, data: bytes, path: Path) -> tuple[str, str]:
     """('accepted' or 'refused' or the fault, details)."""
     path.write_bytes(data)
     runs = [
-        fuzzing.limited([program, path, option], MOST_SECONDS)
+        subprocess.run(
+            [*within(MOST_SECONDS), program, path, option],
+            check=False,
+            capture_output=True,
+            timeout=PATIENCE,
+        )
         for option in ("--check", "--print-input")
     ]
-    if not all(runs):
+    if any(run.returncode == -signal.SIGKILL for run in runs):
         return "hang", ""
     errors = runs[0].stderr.decode("utf-8", "replace").rstrip("\n")
     if runs[0].returncode not in (0, 2) or re.search(r"backtrace|SIG[A-Z]+|libgfortran", errors):
@@ -293,14 +310,25 @@ def cases(count: int, seed: int):
 
 def fuzz(program: str, count: int, seed: int) -> Counter:
     """Verdicts by kind; faulty files are shown on stderr."""
-    with tempfile.TemporaryDirectory() as folder:
-
-        def verdict(case):
-            number, data = case
-            return judge(program, data, Path(folder) / f"{number}.nml")
-
-        return fuzzing.tally(verdict, enumerate(cases(count, seed)), HARMLESS)
+    verdicts: Counter = Counter()
+    files = list(cases(count, seed))
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        paths = [Path(folder) / f"{number}.nml" for number in range(count)]
+        for data, (verdict, details) in zip(
+            files, pool.map(judge, [program] * count, files, paths), strict=True
+        ):
+            verdicts[verdict] += 1
+            if verdict not in ("accepted", "refused"):
+                print(f"--- {verdict}: {details}\n{data!r}", file=sys.stderr)
+    return verdicts
 
 
 if __name__ == "__main__":
-    sys.exit(fuzzing.run(__doc__, fuzz, HARMLESS, count=10_000))
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--count", type=int, default=10_000, help="number of cases (%(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="of the cases (%(default)s)")
+    parser.add_argument("--program", default=ROOT / "build/ricochet", help="default %(default)s")
+    options = parser.parse_args()
+    found = fuzz(str(Path(options.program).resolve()), options.count, options.seed)
+    print(", ".join(f"{number} {verdict}" for verdict, number in sorted(found.items())))
+    sys.exit(not set(found) <= {"accepted", "refused"})

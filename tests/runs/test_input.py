@@ -5,7 +5,6 @@ import math
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import fuzz_input
@@ -15,14 +14,13 @@ from ricochet.program import namelist
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
-NAMES = {"species": ["gas"], "obstacle": ["pin"], "wall": ["ramp"]}
-OBSTACLES = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
+OTHERS = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
 &wall name = 'ramp' from = 0.1, 0.1 to = 0.3, 0.2 /
+&side name = 'top' /
 """
 GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 0.1 /
 """
-NO_NUMBERS = ["nan", "inf", "-inf", "1e999", "1e-320", "1e-400", "1d", "0x1", "1e101", "''"]
 USAGE, FILES = 2, 3
 
 
@@ -117,31 +115,6 @@ def test_of_a_wrong_input_what_is_understood_is_printed(ricochet, tmp_path):
     assert json.loads(run.stdout)[0]["values"] == {"name": "gas", "count": 20, "speed": 1}
 
 
-def test_the_limits_that_are_printed_are_those_that_hold(ricochet, tmp_path):
-    (tmp_path / "gas.nml").write_text(GOOD + OBSTACLES + "&side name = 'top' /")
-    table = json.loads(ricochet("--print-variables").stdout)
-    tried = set()
-    for group, variables in table.items():
-        place = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
-        for name, row in variables.items():
-            for limit, value in row.items():
-                if limit not in ("above", "from", "below", "to") or value is None:
-                    continue
-                step = 1 if row["type"] == "integer" else 1e-6
-                for shift in (-step, 0, step):
-                    inside = shift > 0 if limit in ("above", "from") else shift < 0
-                    number = value + shift
-                    if row["type"] == "integer":
-                        number = round(number)
-                    words = ",".join([repr(number)] * (row["size"] or 1))
-                    variable = f"{group}{place.get(group, '')}.{name}={words}"
-                    said = ricochet("--print-input", "gas.nml", "--set", variable).stderr
-                    taken = "out of range" not in said
-                    assert taken == (inside or (shift == 0 and limit in ("from", "to"))), variable
-                    tried.add(limit)
-    assert tried == {"above", "from", "below", "to"}
-
-
 def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):
     table = json.loads(ricochet("--print-variables").stdout)
     files = {name: {} for name in table}
@@ -166,20 +139,15 @@ def test_the_readme_of_the_inputs_lists_every_file():
 def test_the_output_file_holds_every_value_as_used(ricochet, tmp_path):
     (tmp_path / "gas.nml").write_text(GOOD)
     sets = ["species.gas.packing_fraction=0.1", "species.gas.radius=", "run.title=it's"]
+    sets += ["run.seed=2", "run.seed=3"]  # the last one counts
     run = ricochet("gas.nml", "-o", "a.h5", *(word for s in sets for word in ("--set", s)))
     assert run.returncode == 0
     values = read_run(tmp_path / "a.h5").parameters
     gas = values["species"]["gas"]
-    assert (values["run"]["seed"], values["run"]["title"]) == (1, "it's")
+    assert (values["run"]["seed"], values["run"]["title"]) == (3, "it's")
     assert list(values["box"]["boundary"]) == ["wall", "wall"]
     assert gas["radius"] == pytest.approx((0.1 / 20 / math.pi) ** 0.5)
     assert gas["velocities"] == "equal_speed" and "temperature" not in gas
-
-
-def test_one_disk_is_a_disk(checked):
-    one = checked("&species radius = 0.1 count = 1 /\n&stop time = 1 /\n")
-    assert ": valid; 1 disk; " in one.stdout
-    assert ": valid; 20 disks; " in checked(GOOD).stdout
 
 
 def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
@@ -200,8 +168,6 @@ def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):
         (b"", "gas.nml: is empty, or a pipe or a device instead of a file"),
         (b"\n", "gas.nml: species: there is none"),
         (bytes(range(256)), "is not a text file: byte 1"),
-        (GOOD.encode() + b"\0", "is not a text file"),
-        (b"\x7fELF\x02\x01", "is not a text file"),
         (GOOD.encode("utf-16"), "is not a text file"),
         (b"\xff\xfe" + GOOD.encode(), "text outside a group"),
         (b"! " + b"x" * 5_000_000, "has 5000002 bytes; an input file has at most 4194304"),
@@ -239,9 +205,11 @@ def test_four_megabytes_of_positions_are_read_in_time(checked, tmp_path):
     assert str(side**2) in run.stdout
 
 
-@pytest.mark.parametrize("kind", ["missing", "folder", "pipe", "device", "link to nothing"])
+@pytest.mark.parametrize(
+    "kind", ["missing", "folder", "pipe", "device", "link to nothing", "secret", "x" * 5000]
+)
 def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
-    path = tmp_path / "thing.nml"
+    path = tmp_path / kind
     if kind == "folder":
         path.mkdir()
     elif kind == "pipe":
@@ -250,19 +218,11 @@ def test_what_is_no_file_is_refused_without_waiting(ricochet, tmp_path, kind):
         path = Path("/dev/zero")
     elif kind == "link to nothing":
         path.symlink_to(tmp_path / "nothing")
+    elif kind == "secret":
+        path.touch(0)  # empty to those who may read everything
     run = ricochet(path, "--check")
-    assert run.returncode in (USAGE, FILES)
+    assert run.returncode == (USAGE if kind in ("pipe", "device", "secret") else FILES)
     assert [str(path) in line for line in lines_of(run)] == [True]
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_without_permission_is_refused(ricochet, tmp_path):
-    path = tmp_path / "secret.nml"
-    path.write_text(GOOD)
-    path.chmod(0)
-    run = ricochet(path, "--check")
-    assert run.returncode == FILES
-    assert len(lines_of(run)) == 1
 
 
 @pytest.mark.parametrize(
@@ -272,18 +232,6 @@ def test_files_may_have_any_name(ricochet, tmp_path, name):
     (tmp_path / name).write_text(GOOD)
     run = ricochet("--check", "--", name)
     assert (run.returncode, run.stderr) == (0, "")
-
-
-def test_names_too_long_for_the_system_are_reported(ricochet):
-    run = ricochet("x" * 5000, "--check")
-    assert run.returncode == FILES
-    assert len(lines_of(run)) == 1
-
-
-def test_a_file_that_is_not_there_is_reported(ricochet):
-    run = ricochet("other.nml")
-    assert run.returncode == FILES
-    assert lines_of(run) == ["other.nml: there is no such file"]
 
 
 @pytest.mark.parametrize("command", [["--help"], ["--check", "gas.nml"], ["--quiet", "gas.nml"]])
@@ -319,62 +267,38 @@ def test_wrong_usage_is_one_line(ricochet, command):
     assert len(lines_of(run)) == 1
 
 
-def test_numbers_that_are_none_or_mean_nothing_never_harm(ricochet, checked):
-    """Of every variable: refused by its name, and what may be a number is refused or accepted."""
-    table = json.loads(ricochet("--print-variables").stdout)
+def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
+    """Of every variable; what is absurd but allowed is refused in other words, or valid."""
+    instance = {"species": ".gas", "obstacle": ".pin", "wall": ".ramp", "side": ".top"}
     numbers = [
-        (".".join([group, *NAMES.get(group, []), name]), row)
-        for group, variables in table.items()
+        (group, name, row)
+        for group, variables in json.loads(ricochet("--print-variables").stdout).items()
         for name, row in variables.items()
-        if row["type"] in ("integer", "real") and group != "side"
+        if row["type"] in ("integer", "real")
     ]
     assert len(numbers) > 50
-    for name, row in numbers:
-        for value in [*NO_NUMBERS, "0", "-1", "1e-99", "1e99"]:
-            run = checked(
-                GOOD + OBSTACLES, "--set", f"{name}=" + ",".join([value] * (row["size"] or 1))
-            )
+    for group, name, row in numbers:
+        whole = row["type"] == "integer"
+        limits = [row[key] for key in ("above", "from", "below", "to") if row[key] is not None]
+        near = [limit + shift for limit in limits for shift in (-1, -1e-6, 0, 1e-6, 1)]
+        for value in [*near, 0, -1, 1e-99, 1e99]:
+            number = round(value) if whole else value
+            setting = f"{group}{instance.get(group, '')}.{name}="
+            setting += ",".join([repr(number)] * (row["size"] or 2))
+            run = checked(GOOD + OTHERS, "--quiet", "--set", setting)
             lines = lines_of(run)
-            assert run.returncode in (0, USAGE), (name, value, run.stderr)
-            assert bool(lines) == (run.returncode == USAGE), (name, value)
-            positive = row["above"] is not None or (row["from"] or -1) >= 0
-            if value in NO_NUMBERS or (value == "-1" and positive):
-                assert any(name.split(".")[-1] in line for line in lines), (name, value)
+            assert run.returncode == (USAGE if lines else 0), setting
+            inside = row["above"] is None or number > row["above"]
+            inside &= row["from"] is None or number >= row["from"]
+            inside &= row["below"] is None or number < row["below"]
+            inside &= row["to"] is None or number <= row["to"]
+            inside &= not whole or abs(number) < 2**63
+            told = re.search(rf' {group}\.{name}: "\S+ is out of range; allowed: ', run.stderr)
+            assert bool(told) != inside, setting
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "&specis count = 20 radius = 0.02 /\n&stop time = 1 /\n",
-        "&species name = 'gas count = 20 radius = 0.02 /\n&stop time = 1 /\n",
-        "&species /\ncount = 20 radius = 0.02 /\n&stop time = 1 /\n",
-        "&species count 20\n radius = 0.02 /\n&stop time = 1 /\n",
-        "&species count = 20 radius = 0.02\n&stop time = 1 /\n",
-        "&species count = 20 radius = 0.02 /\n&stop time = 1\n",
-    ],
-)
-def test_what_follows_from_a_slip_of_the_pen_is_not_reported(checked, content):
-    run = checked(content)
-    assert run.returncode == USAGE
-    assert len(lines_of(run)) == 1, run.stderr
-
-
-def test_the_last_override_of_a_variable_counts(ricochet, tmp_path):
-    (tmp_path / "gas.nml").write_text(GOOD)
-    run = ricochet("gas.nml", "-o", "a.h5", "--set", "run.seed=2", "--set", "run.seed=3")
-    assert run.returncode == 0
-    assert read_run(tmp_path / "a.h5").parameters["run"]["seed"] == 3
-    assert "the last one for a variable counts" in ricochet("--help").stdout
-
-
-def test_damaged_files_never_harm(program):
-    verdicts = fuzz_input.fuzz(str(program), 300, seed=2)
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.check)])
+def test_damaged_files_never_harm(program, count):
+    verdicts = fuzz_input.fuzz(str(program), count, seed=2)
     assert set(verdicts) == {"accepted", "refused"}
-    assert verdicts["accepted"] > 30
-
-
-@pytest.mark.check
-def test_ten_thousand_damaged_files_never_harm(program):
-    command = [sys.executable, fuzz_input.__file__, "--program", program, "--count", "10000"]
-    run = subprocess.run(command, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr[-5000:]
+    assert verdicts["accepted"] > 0.1 * count
