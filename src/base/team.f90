@@ -2,10 +2,10 @@
 !> How they wait is in `team.c`.
 module team
   use, intrinsic :: iso_c_binding, only: c_bool, c_int64_t
-!$ use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+!$ use omp_lib, only: omp_set_num_threads
   implicit none
   private
-  public :: make_team, many, team_size
+  public :: make_team, many
   public :: barrier_t, close_barrier, is_last_at, join, open_barrier, release
 
   !> Turns of a loop from which it pays to share it: threads that meet at its end cost each other some microseconds, and on
@@ -59,13 +59,5 @@ contains
 
 !$ call omp_set_num_threads(n)
   end subroutine make_team
-
-  !> How many threads share a loop.
-  function team_size() result(n)
-    integer :: n
-
-    n = 1
-!$ n = omp_get_max_threads()
-  end function team_size
 
 end module team

@@ -7,7 +7,6 @@ module epochs
   use renumbering, only: renumber
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
-  use team, only: many
   implicit none
   private
   public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
@@ -100,17 +99,13 @@ contains
     real(real64), intent(in) :: shift             !! [time]
     integer, allocatable :: moments(:)            ! rows of `extra`
     integer(int32) :: i
-    logical :: shared
 
     moments = pack(sim%extra_row, sim%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
-    shared = sim%n_disks() >= many
-    !$omp parallel do if (shared)
     do i = 1, sim%n_disks()
       sim%disk(i)%clock = sim%disk(i)%clock - shift
       sim%disk(i)%stamp = 0
       sim%extra(moments, i) = sim%extra(moments, i) - shift
     end do
-    !$omp end parallel do
     sim%now = sim%now - shift
     sim%epoch = sim%epoch + shift
     sim%last_advance = sim%last_advance - shift

@@ -4,7 +4,6 @@ module renumbering
   use disks, only: disk_t, tag_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
-  use team, only: many, team_size
   implicit none
   private
   public :: renumber
@@ -21,11 +20,7 @@ contains
     integer(int32), allocatable :: order(:)
 
     call sort_by_cells(sim, order)
-    if (team_size() > 1 .and. sim%n_disks() >= many) then
-      call copy_in_order(sim, order)
-    else
-      call move_in_order(sim, order)
-    end if
+    call move_in_order(sim, order)
   end subroutine renumber
 
   !> The order of the disks by cells: by tiles first, then by cells in each tile. Those of one cell keep their order.
@@ -38,23 +33,17 @@ contains
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
     n = (n + tile - 1)/tile                       ! tiles
     allocate (order(sim%n_disks()), place(sim%n_disks()), cell(sim%n_disks()))
-    !$omp parallel do private(c) if (sim%n_disks() >= many)
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*tile*n, 0.0_real64), tile*n - 1.0_real64), int32)
       cell(i) = tile**2*dot_product(c/tile, [1, n(1)]) + dot_product(modulo(c, tile), [1, tile])
     end do
-    !$omp end parallel do
     call sort_by_count(cell/tile**2 + 1, product(n), first, place)
-    !$omp parallel do if (sim%n_disks() >= many)
     do i = 1, sim%n_disks()
       order(place(i)) = i
     end do
-    !$omp end parallel do
-    !$omp parallel do if (sim%n_disks() >= many)
     do i = 1, product(n)
       call sort_tile(cell, order(first(i):first(i + 1) - 1))
     end do
-    !$omp end parallel do
   end subroutine sort_by_cells
 
   !> Sorts the disks of one tile by their cells.
@@ -97,38 +86,5 @@ contains
       sim%extra(:, to) = extra
     end do
   end subroutine move_in_order
-
-  !> The same by several threads, for which there is memory where there are several.
-  subroutine copy_in_order(sim, order)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: order(:)        !! as in `sort_by_cells`
-    type(disk_t), allocatable :: disk(:)
-    type(tag_t), allocatable :: tag(:)
-    real(real64), allocatable :: extra(:, :)
-    integer(int32) :: k
-
-    allocate (disk(sim%n_disks()))
-    !$omp parallel do
-    do k = 1, sim%n_disks()
-      disk(k) = sim%disk(order(k))
-    end do
-    !$omp end parallel do
-    call move_alloc(disk, sim%disk)
-    allocate (tag(sim%n_disks()))
-    !$omp parallel do
-    do k = 1, sim%n_disks()
-      tag(k) = sim%tag(order(k))
-    end do
-    !$omp end parallel do
-    call move_alloc(tag, sim%tag)
-    if (size(sim%extra) == 0) return
-    allocate (extra, mold=sim%extra)
-    !$omp parallel do
-    do k = 1, sim%n_disks()
-      extra(:, k) = sim%extra(:, order(k))
-    end do
-    !$omp end parallel do
-    call move_alloc(extra, sim%extra)
-  end subroutine copy_in_order
 
 end module renumbering

@@ -3,7 +3,6 @@
 module domain_cuts
   use kinds, only: int16, int32, real64
   use cell_faces, only: patch_t
-  use team, only: many
   implicit none
   private
   public :: domain_cuts_t
@@ -38,9 +37,7 @@ contains
     type(cuts_t) :: slabs, pieces
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
-    logical :: shared
 
-    shared = size(cell, 2) >= many
     self%whole = whole
     self%halo = halo
     n = numbers(self, periodic, wanted, threads)
@@ -48,21 +45,17 @@ contains
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
     allocate (weight(whole%n(1)), weights(whole%n(2), n(1)), source=0_int32)
-    !$omp parallel do reduction(+:weight) num_threads(threads) if (shared)
     do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
-    !$omp end parallel do
     call divide(weight, n(1), 2*halo + 1, slabs)
     do s = 1, n(1)
       self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
     end do
-    !$omp parallel do private(s) reduction(+:weights) num_threads(threads) if (shared)
     do i = 1, size(cell, 2, kind=int32)
       s = self%slab_of(cell(1, i))
       weights(cell(2, i), s) = weights(cell(2, i), s) + 1
     end do
-    !$omp end parallel do
     do s = 1, n(1)
       call divide(weights(:, s), n(2), 2*halo + 1, pieces)
       do r = 1, n(2)
