@@ -10,10 +10,10 @@ module event_driven
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
   use epochs, only: begin_first_epoch, last_time
   use errors, only: error_t, exit_broken, fail
-  use event_heap, only: event_t
   use event_log, only: event_log_t, is_full
   use event_queue, only: event_queue_t
   use evolution, only: evolution_t, limits_t
+  use neighbour_search, only: event_t
   use partners, only: is_wall
   use simulation_state, only: simulation_t
   use signals, only: stop_requested

@@ -1,20 +1,14 @@
 !> An array-backed min-heap of events with four children per node, at most one event per disk, with access by disk:
 !> earliest first, ties in a fixed order that does not depend on which disk expects the event or how it was filed.
 module event_heap
-  use kinds, only: int32, real64
-  use disks, only: disk_t, tag_t
+  use kinds, only: int32
+  use disks, only: tag_t
+  use neighbour_search, only: event_t, wins
   implicit none
   private
-  public :: event_t, event_heap_t, event_of, ids_of, need_order, precedes
+  public :: event_heap_t, need_order, precedes
 
   integer(int32), parameter :: arity = 4         !! children per node: half as deep as with 2, on the same cache lines
-
-  !> An event that a disk expects.
-  type :: event_t
-    real(real64) :: time = 0.0_real64            !! since the epoch [time]
-    integer(int32) :: disk = 0                   !! who expects it
-    integer(int32) :: partner = 0                !! whom it meets: a disk (> 0) or a code (<= 0)
-  end type event_t
 
   type :: event_heap_t
     integer(int32) :: n = 0                      !! number of events
@@ -29,48 +23,16 @@ module event_heap
 
 contains
 
-  !> The event of disk i.
-  pure function event_of(disk, i) result(event)
-    type(disk_t), intent(in) :: disk(*)
-    integer(int32), intent(in) :: i
-    type(event_t) :: event
-
-    event = event_t(disk(i)%event_time, i, disk(i)%partner)
-  end function event_of
-
-  !> Order of events: by time, then by the lower and the higher id of the disks concerned. Both disks of a pair may expect the
-  !> collision; its place does not depend on which of them does. The twin of this rule for candidates of one disk is
-  !> `neighbour_search: before`; change both or none.
+  !> Order of events: by time, then as `wins` says. Both disks of a pair may expect the collision; its place does not depend
+  !> on which of them does.
   pure function precedes(a, b, tag) result(yes)
     type(event_t), intent(in) :: a, b
     type(tag_t), intent(in) :: tag(*)
     logical :: yes
-    integer(int32) :: ids_a(2), ids_b(2)
 
-    if (a%time < b%time) then
-      yes = .true.
-    else if (a%time > b%time) then
-      yes = .false.
-    else
-      ids_a = ids_of(a, tag)
-      ids_b = ids_of(b, tag)
-      if (ids_a(1) /= ids_b(1)) then
-        yes = ids_a(1) < ids_b(1)
-      else
-        yes = ids_a(2) < ids_b(2)
-      end if
-    end if
+    yes = a%time < b%time
+    if (.not. (yes .or. a%time > b%time)) yes = wins(a, b, tag)
   end function precedes
-
-  !> The lower and the higher id of the disks concerned; of a single disk only the lower, and 0.
-  pure function ids_of(event, tag) result(ids)
-    type(event_t), intent(in) :: event
-    type(tag_t), intent(in) :: tag(*)
-    integer(int32) :: ids(2)
-
-    ids = [tag(event%disk)%id, 0]
-    if (event%partner > 0) ids = [min(ids(1), tag(event%partner)%id), max(ids(1), tag(event%partner)%id)]
-  end function ids_of
 
   !> Not zero if two simultaneous events need an order: most are one collision that both disks expect.
   elemental function need_order(a, b) result(bits)

@@ -8,7 +8,8 @@ module event_queue
   use kinds, only: int32, int64, never, real64
   use calendar, only: bucket_capacity, bucket_t, calendar_t, events_per_window, most_coming, window_none
   use disks, only: disk_t, tag_t
-  use event_heap, only: event_heap_t, event_of, event_t, need_order, precedes
+  use event_heap, only: event_heap_t, need_order, precedes
+  use neighbour_search, only: event_of, event_t
   implicit none
   private
   public :: event_queue_t

@@ -6,13 +6,20 @@ module neighbour_search
   use free_flight, only: flight, flight_velocity
   implicit none
   private
-  public :: prospect_t, earliest_contact, list_capacity, latest_clock, no_gravity
+  public :: event_t, prospect_t, earliest_contact, event_of, list_capacity, latest_clock, no_gravity, wins
 
   integer(int32), parameter :: list_capacity = 64
   !> What a caller knows beforehand, as a sum, so that the compiler makes a version of the kernel without the rest:
   !> no disk has a later clock than the one in question, which is now; nothing falls.
   integer(int32), parameter :: latest_clock = 1, no_gravity = 2
   real(real64), parameter :: margin_of_times = 32*epsilon(1.0_real64)    !! above all rounding in the kernel
+
+  !> An event that a disk expects.
+  type :: event_t
+    real(real64) :: time = 0.0_real64         !! since the epoch [time]
+    integer(int32) :: disk = 0                !! who expects it
+    integer(int32) :: partner = 0             !! whom it meets: a disk (> 0) or a code (<= 0)
+  end type event_t
 
   !> What a disk may meet next: the earliest event known, and other disks that might come before it. Not
   !> initialised, as one is made for each prediction.
@@ -31,10 +38,10 @@ contains
   !>
   !> The time is a pure function of the states of the two disks: both are advanced to the later of their clocks,
   !> and every term keeps its value, or changes sign, when they trade places. So it is the same to the last bit
-  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts the one with the lower ids
-  !> wins (`before`). A contact time before `now` is a rounding artefact: after a perfectly inelastic collision two
-  !> disks stay in contact to the last bits, and shifting one by a period can change those bits. Then the contact is
-  !> now or never, and as the shift is an event with a prediction, that is decided then, whoever looks at the pair later.
+  !> whenever, and for whichever of the two, it is predicted. Of simultaneous contacts one `wins`. A
+  !> contact time before `now` is a rounding artefact: after a perfectly inelastic collision two disks stay in contact
+  !> to the last bits, and shifting one by a period can change those bits. Then the contact is now or never, and as the
+  !> shift is an event with a prediction, that is decided then, whoever looks at the pair later.
   !>
   !> The root of |dx + dv s| = sigma is c/(sqrt(disc) - b), which does not cancel near contact, and the discriminant
   !> sigma**2 dv**2 - (dx x dv)**2, which does not cancel for distant grazing pairs. Disks that touch, or overlap by
@@ -97,7 +104,7 @@ contains
         if (t_j < best) then
           best = t_j; partner = j + 1
         else if (.not. t_j > best) then       ! seldom
-          if (before(tag, near%disk, j + 1, partner)) partner = j + 1
+          if (wins(event_t(t_j, near%disk, j + 1), event_t(t_j, near%disk, partner), tag)) partner = j + 1
         end if
       end if
     end do
@@ -137,26 +144,36 @@ contains
     if (falling) after = flight_velocity(v, g, s)
   end function sped_up
 
-  !> Whether, of simultaneous events, i meets disk j before its other partner (a disk or, if <= 0, a wall). The twin of
-  !> this rule for events in the queue is `event_heap: precedes`; change both or none.
-  pure function before(tag, i, j, other) result(yes)
-    type(tag_t), intent(in) :: tag(*)
-    integer(int32), intent(in) :: i, j, other
-    logical :: yes
-    integer(int32) :: id, id_j, id_other
+  !> The event of disk i.
+  pure function event_of(disk, i) result(event)
+    type(disk_t), intent(in) :: disk(*)
+    integer(int32), intent(in) :: i
+    type(event_t) :: event
 
-    id = tag(i)%id
-    id_j = tag(j)%id
-    if (other <= 0) then
-      yes = id_j < id
-    else
-      id_other = tag(other)%id
-      if (min(id, id_j) /= min(id, id_other)) then
-        yes = min(id, id_j) < min(id, id_other)
-      else
-        yes = max(id, id_j) < max(id, id_other)
-      end if
-    end if
-  end function before
+    event = event_t(disk(i)%event_time, i, disk(i)%partner)
+  end function event_of
+
+  !> Whether, of two simultaneous events, the first comes first, wherever one has to: by the lower id of the disks concerned,
+  !> then by the higher one, which is 0 for a single disk.
+  pure function wins(a, b, tag) result(yes)
+    type(event_t), intent(in) :: a, b
+    type(tag_t), intent(in) :: tag(*)
+    logical :: yes
+    integer(int32) :: ids_a(2), ids_b(2)
+
+    ids_a = ids_of(a)
+    ids_b = ids_of(b)
+    yes = ids_a(1) < ids_b(1) .or. (ids_a(1) == ids_b(1) .and. ids_a(2) < ids_b(2))
+  contains
+
+    !> The lower and the higher id.
+    pure function ids_of(event) result(ids)
+      type(event_t), intent(in) :: event
+      integer(int32) :: ids(2)
+
+      ids = [tag(event%disk)%id, 0]
+      if (event%partner > 0) ids = [min(ids(1), tag(event%partner)%id), max(ids(1), tag(event%partner)%id)]
+    end function ids_of
+  end function wins
 
 end module neighbour_search
