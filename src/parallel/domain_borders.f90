@@ -8,13 +8,13 @@ module domain_borders
   use tracks, only: track_t
   implicit none
   private
-  public :: refresh, verify
+  public :: compare_copies, refresh
 
 contains
 
   !> Finds out whether the k-th domain's own disks can have met anybody whose history was not the true one, and notes what
   !> is to be put right. Reads what the neighbours hold.
-  subroutine verify(domain, k)
+  subroutine compare_copies(domain, k)
     type(domain_t), intent(inout) :: domain(:)
     integer(int32), intent(in) :: k
     integer(int32) :: m, found
@@ -28,7 +28,7 @@ contains
       end do
       if (found < self%engine%tracks%n_copies()) self%good = .false.    ! a copy that nobody owns
     end associate
-  end subroutine verify
+  end subroutine compare_copies
 
   !> Compares with the histories of a neighbour's own disks.
   subroutine compare(self, other, found)

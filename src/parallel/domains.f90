@@ -7,7 +7,6 @@ module domains
   use disks, only: disk_t, n_columns, n_fixed, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
-  use event_heap, only: event_of, ids_of
   use event_log, only: event_log_t
   use evolution, only: limits_t
   use partners, only: nothing
@@ -16,8 +15,7 @@ module domains
   use system, only: seconds
   implicit none
   private
-  public :: copy_of, domain_t, due_t, forever, follow_event, gather, list_copies, load, merge_logs, move_on
-  public :: next_due, news_t
+  public :: copy_of, domain_t, forever, list_copies, load, merge_logs, move_on, news_t, next_time, write_back
 
   real(real64), parameter :: forever = 2.0e150_real64      !! later than any event
   real(real64), parameter :: longest_window = 5.0_real64   !! of one domain, after which it is given up [s]
@@ -52,15 +50,6 @@ module domains
     integer(int32), allocatable, private :: key(:), slot(:)  !! (0:) the copies by their ids: a hash table
     integer(int32), private :: last_key = 0        !! one less than a power of two
   end type domain_t
-
-  !> An event by what it is in all domains.
-  type :: due_t
-    real(real64) :: time = forever                 !! since the epoch [time]
-    integer(int32) :: ids(2) = 0                   !! of the disks concerned, as in `event_heap`
-    integer(int32) :: code = 0                     !! what a single disk meets; of a pair 0
-  contains
-    procedure :: precedes
-  end type due_t
 
 contains
 
@@ -230,48 +219,18 @@ contains
     self%turns = self%turns + turns - left
   end subroutine move_on
 
-  !> The next event.
-  function next_due(self) result(due)
+  !> When its next event is due.
+  function next_time(self) result(t)
     type(domain_t), intent(inout) :: self
-    type(due_t) :: due
+    real(real64) :: t                              !! since the epoch [time]
     integer(int32) :: i
 
     call self%engine%queue%first(self%sim%disk, self%sim%tag, i)
-    associate (disk => self%sim%disk(i))
-      due = due_t(disk%event_time, ids_of(event_of(self%sim%disk, i), self%sim%tag), min(disk%partner, 0))
-    end associate
-  end function next_due
-
-  !> Whether an event comes before another, as in a queue.
-  pure function precedes(self, other) result(yes)
-    class(due_t), intent(in) :: self
-    type(due_t), intent(in) :: other
-    logical :: yes
-    integer(int32) :: mine(3), theirs(3)
-    integer :: k
-
-    yes = self%time < other%time
-    if (yes .or. self%time > other%time) return
-    mine = [self%ids, self%code]
-    theirs = [other%ids, other%code]
-    do k = 1, 3
-      yes = mine(k) < theirs(k)
-      if (mine(k) /= theirs(k)) return
-    end do
-  end function precedes
-
-  !> Executes the next event, whatever the limits.
-  subroutine follow_event(self)
-    type(domain_t), intent(inout) :: self
-    type(error_t), allocatable :: error
-
-    call self%engine%advance(self%sim, limits_t(turns=1_int64), error, self%log)
-    self%turns = self%turns + 1
-    self%done = .not. allocated(error)
-  end subroutine follow_event
+    t = self%sim%disk(i)%event_time
+  end function next_time
 
   !> Writes the states of the own disks back into the whole simulation.
-  subroutine gather(self, sim)
+  subroutine write_back(self, sim)
     type(domain_t), intent(in) :: self
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: k
@@ -282,7 +241,7 @@ contains
       sim%tag(self%home(k)) = self%sim%tag(k)
       sim%extra(:, self%home(k)) = self%sim%extra(:, k)
     end do
-  end subroutine gather
+  end subroutine write_back
 
   !> Moves what all domains have logged to the log of the whole, in the order of time. Of simultaneous collisions in
   !> different domains nobody knows which comes first: then it is not good.

@@ -144,7 +144,7 @@ contains
     self%last_event = self%engine%last_event
     self%turns_left = self%engine%turns_left
     if (sim%tally%events - events >= sim%n_disks()) &
-      call self%parts%pace%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
+      call self%parts%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
   end subroutine advance_plainly
 
   !> Whether several domains can be faster than the plain engine.
@@ -183,7 +183,6 @@ contains
       end if
       self%holder = all_domains
     end if
-    t = sim%now
     call self%parts%run_windows(sim, limits, self%patience, t, windows, good)
     self%windows_done = self%windows_done + windows
     if (present(log)) then
@@ -197,8 +196,8 @@ contains
       self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
     end if
     if (outcome == kept) then
-      call self%parts%gather_all(sim, t)
-      if (t >= limits%time) self%arrived = self%parts%is_past(t)
+      call self%parts%write_back_all(sim, t)
+      self%arrived = t >= limits%time
       if (self%parts%threads > 1) call self%heed_cores(sim)
       if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
         outcome = left_alone
