@@ -190,14 +190,22 @@ def test_arrays_of_numpy_are_told_what_they_need(ricochet, tmp_path, name):
     assert run.returncode == USAGE and "write_start" in one_line(run)
 
 
+def put(file, name, disk, value):
+    file[f"particles/disks/{name}/value"][-1, disk, 0] = value
+
+
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
         (lambda file: file.__delitem__("particles/disks/radius"), "gas.h5: has no radius"),
         (lambda file: file["particles/disks/mass"].write_direct(np.zeros(120)), "0 is not a mass"),
+        (lambda file: put(file, "position", 3, np.nan), "row 4 of the last frame: NaN is out of"),
+        (lambda file: put(file, "position", 3, 99), "row 4 of the last frame: disk 4 at 99,"),
+        (lambda file: put(file, "velocity", 7, -np.inf), "row 8 of the last frame: -Infinity is"),
+        (lambda file: put(file, "velocity", 7, 1e101), "row 8 of the last frame: 1e101 is out of"),
     ],
 )
-def test_sizes_in_a_damaged_run_are_refused(ricochet, tmp_path, bed, damage, says):
+def test_numbers_in_a_damaged_run_are_refused(ricochet, tmp_path, bed, damage, says):
     finished(ricochet, "gas.h5")
     with h5py.File(tmp_path / "gas.h5", "r+") as file:
         damage(file)
