@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -99,6 +100,40 @@ def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
     path = Path(folder) / name
     path.write_text(text)
     return path
+
+
+#: A library that the program is started with instead of the system's own fsync.
+FSYNC = """#include <errno.h>
+#include <signal.h>
+#include <unistd.h>
+int fsync(int d) { (void)d; %s }
+"""
+
+
+def with_fsync(folder, body) -> dict[str, str]:
+    """The environment of a program for which fsync does something else."""
+    (folder / "fsync.c").write_text(FSYNC % body)
+    command = ["cc", "-shared", "-fPIC", "-o", "fsync.so", "fsync.c"]
+    subprocess.run(command, cwd=folder, check=True)
+    return {**os.environ, "LD_PRELOAD": str(folder / "fsync.so")}
+
+
+def occupy(path, kind, precious):
+    """Puts something in a place; links lead to a file of the user."""
+    if kind == "link":
+        path.symlink_to(precious)
+    elif kind == "hard link":
+        path.hardlink_to(precious)
+    elif kind == "link to nothing":
+        path.symlink_to(precious.with_name("new"))
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.write_text("notes")
 
 
 #: When a wait is given up [s]. It ends what hangs, and is no measure of anything: what takes a busy

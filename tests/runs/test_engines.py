@@ -7,7 +7,6 @@ import contextlib
 import getpass
 import os
 import shutil
-import signal
 import socket
 import subprocess
 from pathlib import Path
@@ -196,28 +195,19 @@ def test_parallel_reports_a_member_that_fails(ensemble):
     assert "failed: gas.radius_0.2" in result.stderr
 
 
-def stops_and_goes_on(ensemble, folder, *arguments, by=signal.SIGTERM):
-    """A signal while members run; then the same command ends well."""
-    running = ensemble(*arguments, *LONG, start=True)
+def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
+    """Then the same command ends well."""
+    arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-2", *LONG)
+    running, folder = ensemble(*arguments, start=True), tmp_path / "members"
     wait_for(lambda: sum(frames_in(path) > 0 for path in folder.glob("*.part")) == 2)
-    running.send_signal(by)
+    running.terminate()
     _, errors = running.communicate(timeout=PATIENCE)
     assert running.returncode == 75, errors
     assert len(list(folder.glob("*.h5.part"))) == 2
     assert not list(folder.glob("seed_?.h5"))
-    again = ensemble(*arguments, *LONG)
+    again = ensemble(*arguments)
     assert again.returncode == 0, again.stderr
     assert len(list(folder.glob("seed_?.h5"))) == 2
-
-
-def test_a_closed_terminal_stops_like_term(ensemble, tmp_path):
-    arguments = ("-j", 2, "--seeds", "1-2")
-    stops_and_goes_on(ensemble, tmp_path / "members", *arguments, by=signal.SIGHUP)
-
-
-def test_term_reaches_members_on_other_hosts(ensemble, hosts, tmp_path):
-    arguments = ("--engine", "parallel", "--sshloginfile", hosts, "-j", 1, "--seeds", "1-2")
-    stops_and_goes_on(ensemble, tmp_path / "members", *arguments)
 
 
 # --- Slurm ---

@@ -18,7 +18,6 @@ from whole_runs import (
     USAGE,
     committed,
     differences,
-    filled_pipe,
     is_beginning,
     one_line,
     write_input,
@@ -252,19 +251,6 @@ def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stag
         chosen = sorted({*numbers[::step], *numbers[-2:]})
         cases += [(option, f"inject={call}:signal=SIGTERM:when={number}") for number in chosen]
     assert problems(check_after_signal, program, stage, call, cases) == []
-
-
-def test_a_signal_just_before_the_summary_is_not_lost(program, stage):
-    """A summary that nobody reads does not keep the run: here TERM comes with the last unlock."""
-    folder = stage / "unread"
-    copy_folder(stage / "--force", folder)
-    inject = f"inject=unlink:signal=SIGTERM:when={positions(stage, '--force', 'unlink')[-1]}"
-    strace = ["strace", "-f", "-o", "trace", "-e", "trace=unlink", "-e", inject]
-    with filled_pipe() as inlet:
-        command = [*strace, program, *COMMAND, "--force"]
-        run = subprocess.run(command, cwd=folder, stdout=inlet, timeout=PATIENCE, check=False)
-    assert run.returncode == FINISHED
-    assert same_results(stage, folder / "gas.h5")
 
 
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])

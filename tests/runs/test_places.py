@@ -18,8 +18,10 @@ from whole_runs import (
     differences,
     frames_in,
     held,
+    occupy,
     one_line,
     wait_for,
+    with_fsync,
     write_input,
 )
 
@@ -30,36 +32,8 @@ SHORT = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 ENDLESS = SHORT.replace("time = 1 ", "time = 1e6 ").replace("0.1", "5")
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
 AT_ONCE = ["--set", "stop.wall_clock=1e-9"]
-#: A library that the program is started with instead of the system's own fsync.
-FSYNC = "#include <errno.h>\n#include <signal.h>\nint fsync(int d)\n{ (void)d; %s }\n"
 #: The first one finds the results complete, except what is written at the end: there it stops.
 PAUSE = "static int n; if (!n++) raise(SIGSTOP); return 0;"
-
-
-def with_fsync(folder, body) -> dict[str, str]:
-    """The environment of a program for which fsync does something else."""
-    (folder / "fsync.c").write_text(FSYNC % body)
-    command = ["cc", "-shared", "-fPIC", "-o", "fsync.so", "fsync.c"]
-    subprocess.run(command, cwd=folder, check=True)
-    return {**os.environ, "LD_PRELOAD": str(folder / "fsync.so")}
-
-
-def occupy(path, kind, precious):
-    """Puts something in a place; links lead to a file of the user."""
-    if kind == "link":
-        path.symlink_to(precious)
-    elif kind == "hard link":
-        path.hardlink_to(precious)
-    elif kind == "link to nothing":
-        path.symlink_to(precious.with_name("new"))
-    elif kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "device":
-        path.symlink_to("/dev/zero")
-    elif kind == "folder":
-        path.mkdir()
-    else:
-        path.write_text("notes")
 
 
 def everything_in(folder) -> dict[str, object]:

@@ -20,11 +20,9 @@ from whole_runs import (
     USAGE,
     contents,
     differences,
-    frames_in,
     let_work,
     one_line,
     processor_time_of,
-    wait_for,
     write_input,
 )
 
@@ -325,18 +323,6 @@ def test_a_finished_run_that_is_continued_needs_room(ricochet, small_disk, tmp_p
     assert ricochet(*command, "stop.time=2000", "--resume").returncode == FINISHED
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=2000").returncode == FINISHED
     assert differences(tmp_path / "whole.h5", disk / "gas.h5") == []
-
-
-def test_a_twin_of_a_continued_run_is_refused(ricochet, started, tmp_path):
-    write_input(tmp_path, MIXTURE)
-    assert ricochet(*COMMAND, "--set", "stop.time=0.5").returncode == FINISHED
-    command = [*COMMAND, "--resume", "--set", "stop.time=1e5"]
-    process = started(*command)
-    wait_for(lambda: frames_in(tmp_path / "gas.h5.part") > 9)
-    run = ricochet(*command)
-    assert run.returncode == FILES and "another run" in one_line(run)
-    process.terminate()
-    assert process.wait() == STOPPED
 
 
 def test_a_run_knows_its_overrides(ricochet, tmp_path):
