@@ -5,14 +5,15 @@ let pace;          // time of the film per second, at speed 1
 let usual = true;  // whether that is for the length of this film, not of another one
 
 function begin() {
-  newMoment();
+  [X, Y, VX, VY, UX, UY, HITS, ANCHOR, FALL] = Array.from({ length: 9 }, () => new Float64Array(disks));
   lookAtAll();
   state.colour = film.colour;
   state.traced = film.traced;
   state.sofar = disks < 200;
   state.total = spread(kinds.map(kind => kind.count)) < spread(kinds.map(() => 1));
   pace = usualPace();
-  choose('colour', [['species', 'species'], ...Object.keys(film.scales).map(name => [name, name])], state.colour);
+  const quantities = ['species', ...Object.keys(film.scales)];
+  $('colour').replaceChildren(...quantities.map(name => new Option(name, name, false, name === state.colour)));
   prepareFilm();
 }
 
@@ -38,10 +39,6 @@ function prepareFilm() {
 function spread(weights) {
   const totals = weights.map((weight, s) => weight * film.kinetic.reduce((sum, row) => sum + row[s], 0));
   return Math.max(...totals) / Math.min(...totals);
-}
-
-function choose(id, options, value) {
-  $(id).replaceChildren(...options.map(([key, words]) => new Option(words, key, false, key === value)));
 }
 
 // ---------- what is shown ----------
@@ -173,10 +170,6 @@ function pointerMoved(event) {
   look();
 }
 
-function pointerLifted(event) {
-  if (pointers.delete(event.pointerId) && moved < 6 * page.dots && event.type === 'pointerup') pick(...onStage(event));
-}
-
 // The disk nearest to a place, if one is near.
 function pick(px, py) {
   let nearest = [], least = 12 * page.dots;
@@ -202,10 +195,6 @@ function followOrNot() {
   look();
 }
 
-function fullScreen() {
-  if (document.fullscreenElement) document.exitFullscreen(); else $('view').requestFullscreen();
-}
-
 // ---------- what acts ----------
 
 function on(id, action) { $(id).addEventListener('click', action); }
@@ -215,7 +204,8 @@ const actions = {
   play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => go(nextTurn()),
   clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), now: turn('sofar', false), sofar: turn('sofar', true),
   mean: turn('total', false), total: turn('total', true), nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
-  whole: () => { lookAtAll(); look(); }, full: fullScreen, theme: () => { theme(!dark()); refresh(); },
+  whole: () => { lookAtAll(); look(); }, theme: () => { theme(!dark()); refresh(); },
+  full: () => { if (document.fullscreenElement) document.exitFullscreen(); else $('view').requestFullscreen(); },
 };
 const keys = {
   ' ': 'play', ArrowLeft: 'back', ArrowRight: 'next', n: 'event', Home: 'first', End: 'last', '+': 'nearer', '=': 'nearer', '-': 'farther',
@@ -227,6 +217,8 @@ function pressed(key) { actions[keys[key]]?.(); }
 function theme(night) { document.documentElement.dataset.theme = night ? 'dark' : 'light'; }
 
 function listen() {
+  for (const button of document.querySelectorAll('[data-path]'))
+    button.innerHTML = `<svg viewBox="0 0 24 24"><path d="${button.dataset.path}"/></svg>`;
   for (const [id, action] of Object.entries(actions)) on(id, action);
   $('full').hidden = !document.fullscreenEnabled;
   $('scrub').addEventListener('input', () => go(first() + $('scrub').value * (last() - first())));
@@ -239,7 +231,10 @@ function listen() {
     stage.setPointerCapture(event.pointerId);
   });
   stage.addEventListener('pointermove', pointerMoved);
-  for (const type of ['pointerup', 'pointercancel']) stage.addEventListener(type, pointerLifted);
+  stage.addEventListener('pointercancel', event => pointers.delete(event.pointerId));
+  stage.addEventListener('pointerup', event => {
+    if (pointers.delete(event.pointerId) && moved < 6 * page.dots) pick(...onStage(event));
+  });
   stage.addEventListener('wheel', event => {
     event.preventDefault();
     zoomBy(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), ...onStage(event));

@@ -363,12 +363,6 @@ function theme(night) {
   }
 }
 
-// Pictures are asked for while one looks at them: a choice need not wait for the rest.
-function lookAtInputs() {
-  for (const image of $('inputs').querySelectorAll('img:not([src])')) image.src = image.dataset.src;
-  $('inputs').showModal();
-}
-
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
@@ -376,7 +370,11 @@ function bare(on) {
 
 const actions = {
   run, pause: pauseOrGoOn, compare: compareOrNot, settings: () => bare(!document.body.classList.contains('bare')),
-  choose: lookAtInputs, theme: () => theme(!isDark()),
+  theme: () => theme(!isDark()),
+  choose: () => {  // pictures are asked for while one looks at them: a choice need not wait for the rest
+    for (const image of $('inputs').querySelectorAll('img:not([src])')) image.src = image.dataset.src;
+    $('inputs').showModal();
+  },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', c: 'compare', s: 'settings' };

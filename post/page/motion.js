@@ -10,21 +10,10 @@ let UX, UY;        // the same places in units of the box, without jumps since t
 let HITS;          // collisions of each disk since the frame before
 let ANCHOR, FALL;  // of its flight: the frame that it begins or ends in, else -1; what the square of its speed has won since
 
-function newMoment() {
-  [X, Y, VX, VY, UX, UY, HITS, ANCHOR, FALL] = Array.from({ length: 9 }, () => new Float64Array(disks));
-}
-
 const stands = gap => film.guesses[gap] > MANY * disks;
 
 // The last frame that is not later.
-function frameAt(time) {
-  let low = 0, high = frames - 1;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (film.time[middle] <= time) low = middle; else high = middle - 1;
-  }
-  return low;
-}
+const frameAt = time => Math.max(0, upTo(film.time, time) - 1);
 
 function move(time) {
   moment.time = Math.max(first(), Math.min(last(), time));
@@ -166,21 +155,11 @@ const codesBetween = {
   },
 };
 
-// How far a disk has turned; between frames evenly, as only they know its spin.
-function angleOf(i) {
-  const next = Math.min(moment.gap + 1, frames - 1), start = angles[moment.gap * disks + i];
-  return start + moment.share * (angles[next * disks + i] - start);
-}
-
 // The flights of a disk in a gap, in units of the box: [share of the gap, x, y] of each end, without jumps.
 function knots(gap, i) {
   const at = 2 * (gap * disks + i), to = at + 2 * disks, list = [[0, positions[at] / grain, positions[at + 1] / grain]];
-  let low = gapStart[gap], high = gapStart[gap + 1];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (turning[middle] < i) low = middle + 1; else high = middle;
-  }
-  for (let k = low; k < gapStart[gap + 1] && turning[k] === i; k++) list.push([...turns.subarray(3 * k, 3 * k + 3)]);
+  const first = gapStart[gap] + turning.subarray(gapStart[gap], gapStart[gap + 1]).indexOf(i);
+  for (let k = first; k >= gapStart[gap] && k < gapStart[gap + 1] && turning[k] === i; k++) list.push([...turns.subarray(3 * k, 3 * k + 3)]);
   const code = shifts ? shifts[(gap + 1) * disks + i] : 0x88;
   list.push([1, positions[to] / grain + (code >> 4) - 8, positions[to + 1] / grain + (code & 15) - 8]);
   return list;

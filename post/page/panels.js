@@ -6,7 +6,6 @@ const short = value => (Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e
 const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
-const remedy = 'output.event_log = .true. in the input would tell them';
 
 function tell() {
   const { time, frame, gap } = moment, collisions = collisionsNow();
@@ -21,7 +20,7 @@ function tell() {
     : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
     : `${stands(gap) ? 'Here the film shows frames as they are' : `Here ${unknown} of ${disks} disks stand until the next frame`}: `
       + `between two frames ${stands(gap) ? `${unknown} of ${disks} disks` : 'they'} have several collisions that are not in the file`
-      + (film.logged ? '.' : `; ${remedy}.`);
+      + (film.logged ? '.' : '; output.event_log = .true. in the input would tell them.');
 }
 
 // The colour of a species, to be chosen by the user.
@@ -242,18 +241,10 @@ function layEnergyOut() {
   $('guide').textContent = film.guesses.some(count => count) && sparse(x) ? 'Dots: frames. What happens along the pale lines between them is not in the file.' : '';
   cursorAt = x;
   const heads = ['', 'disks', 'kinetic', ...(film.potential ? ['potential (dashed)'] : [])];
-  const table = $('energies');
-  table.replaceChildren();
-  table.insertRow().innerHTML = heads.map(head => `<th>${head}</th>`).join('');
-  kinds.forEach(kind => {
-    const row = table.insertRow(), chip = document.createElement('span');
-    heads.forEach(() => row.insertCell());
-    chip.className = 'chip';
-    chip.textContent = kind.name;
-    chip.style.setProperty('--own', css(speciesColour(kind)));
-    row.cells[0].append(chip);
-    row.cells[1].textContent = kind.count;
-  });
+  const rows = kinds.map(({ name, count }) => [`<span class="chip">${safe(name)}</span>`, count, ...heads.slice(2).map(() => '')]);
+  const cells = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
+  $('energies').innerHTML = cells(heads, 'th') + rows.map(row => cells(row, 'td')).join('');
+  $('energies').querySelectorAll('.chip').forEach((chip, s) => chip.style.setProperty('--own', css(speciesColour(kinds[s]))));
 }
 
 // Whether frames lie so far apart on the axis of time that they can be told from one another.

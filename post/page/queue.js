@@ -9,13 +9,8 @@ const meeting = k => {
 function tellQueue() {
   if (!film.events) return;
   const { time } = film.events, next = nextEvent();
-  $('queue').replaceChildren(...time.slice(next, next + 20).map((when, k) => {
-    const item = document.createElement('li'), words = document.createElement('span');
-    item.textContent = meeting(next + k);
-    words.textContent = `t = ${long(when)}`;
-    item.append(words);
-    return item;
-  }));
+  const row = (when, k) => `<li>${meeting(next + k)}<span>t = ${long(when)}</span></li>`;
+  $('queue').innerHTML = time.slice(next, next + 20).map(row).join('');
   $('due').textContent = next < time.length ? `the first in ${short(time[next] - moment.time)}` : '';
   $('happened').textContent = next ? `Happened: ${meeting(next - 1)}.` : ' ';
 }

@@ -230,13 +230,14 @@ function drawMarks() {
   });
 }
 
-// A radius of each disk that is large enough for one shows how it turns.
+// A radius of each disk that is large enough for one shows how it turns; between frames evenly, as only they know its spin.
 function drawRadii() {
+  const at = moment.gap * disks, next = Math.min(moment.gap + 1, frames - 1) * disks;
   marks.strokeStyle = ink.stage;
   marks.lineWidth = 1.2 * page.dots;
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
-    const length = radii[sizeOf[i]], reach = length / view.unit, angle = angleOf(i);
+    const length = radii[sizeOf[i]], reach = length / view.unit, angle = angles[at + i] + moment.share * (angles[next + i] - angles[at + i]);
     if (length < 3 * page.dots) continue;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx), y = up(Y[i] + dy);
