@@ -14,25 +14,20 @@ from ricochet import Run, RunError
 from ricochet.drawing import plt
 from ricochet.files import destination
 from ricochet.film import animate
-from ricochet.script import command_line, film_frames, launch, positive, report
+from ricochet.script import chosen_frames, command_line, launch, positive, report
 
 from matplotlib import animation
 from tqdm import tqdm
 
 
-def find_ffmpeg() -> bool:
-    """Whether there is an ffmpeg: the system's, or that of the package imageio-ffmpeg."""
-    if not animation.FFMpegWriter.isAvailable():
+def film_path(wish: Path | None, run: Run) -> Path:
+    """Where to write: -o, else the name of the run in the current folder."""
+    if not animation.FFMpegWriter.isAvailable():  # by the system
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
 
             plt.rcParams["animation.ffmpeg_path"] = get_ffmpeg_exe()
-    return animation.FFMpegWriter.isAvailable()
-
-
-def film_path(wish: Path | None, run: Run) -> Path:
-    """Where to write: -o, else the name of the run in the current folder."""
-    ffmpeg = find_ffmpeg()
+    ffmpeg = animation.FFMpegWriter.isAvailable()
     path = wish or Path(run.path.stem)
     if not path.suffix:
         path = path.with_suffix(".mp4" if ffmpeg else ".gif")
@@ -51,7 +46,7 @@ def main() -> None:
     args = parser.parse_args()
     (run,) = args.runs
     path = film_path(args.output, run)
-    frames = film_frames(run, args)
+    frames = chosen_frames(run, args.frames, args.count)
     film = animate(run, frames, args.colour, args.fps)
     writer = (animation.FFMpegWriter if path.suffix == ".mp4" else animation.PillowWriter)(
         fps=args.fps

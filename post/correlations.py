@@ -27,22 +27,13 @@ power of r in a hexatic phase, and not at all in a crystal.
 
 from typing import NamedTuple
 
-from ricochet import Run, RunError, hard_disks
+from ricochet import Run, RunError, hard_disks, transport
 from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 from ricochet.statistics import Curve, SeriesMean, combined, estimate, excess_kurtosis, series_mean
 from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
 from ricochet.theory import RELAXATION
 from ricochet.thermodynamics import all_cool, equal_disks, later, loses_energy, mean_free_time
-from ricochet.transport import (
-    diffusion,
-    diffusion_lag,
-    displacement,
-    enskog_by_rate,
-    integrated_memory,
-    lags,
-    velocity_memory,
-)
 
 import numpy as np
 
@@ -82,16 +73,6 @@ def bins(run: Run) -> dict[str, np.ndarray]:
     return found | ({"S": np.linspace(0, 20, 101)} if run.periodic.all() else {})
 
 
-def shapes(run: Run, frames: list[int], psi: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """Curves of the structure of one run, in `bins`."""
-    edges = bins(run)
-    found = {"g": pair_correlation(run, frames, edges["g"])}
-    found["g6"] = bond_correlation(run, frames, psi, edges["g6"])
-    if "S" in edges:
-        found["S"] = structure_factor(run, frames, edges["S"])
-    return found
-
-
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
     """psi6 of each run, and the means of the curves; of a single run over blocks of its frames."""
     members, forms = {"psi6_local": [], "psi6_global": []}, []
@@ -101,8 +82,14 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
         members["psi6_local"].append(series_mean([np.abs(one).mean() for one in psi]))
         members["psi6_global"].append(series_mean([abs(one.mean()) for one in psi]))
         blocks = min(BLOCKS, len(some)) if len(runs) == 1 else 1
+        edges = bins(run)
         for part in np.array_split(np.arange(len(some)), blocks):
-            forms.append(shapes(run, [some[k] for k in part], [psi[k] for k in part]))
+            these, order = [some[k] for k in part], [psi[k] for k in part]
+            form = {"g": pair_correlation(run, these, edges["g"])}
+            form["g6"] = bond_correlation(run, these, order, edges["g6"])
+            if "S" in edges:
+                form["S"] = structure_factor(run, these, edges["S"])
+            forms.append(form)
     curves = {}
     for name, edges in bins(runs[0]).items():
         y, error = estimate([form[name] for form in forms])
@@ -114,20 +101,20 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
 def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
     """Curves against w t of memory and diffusion."""
     first, pairs = runs[0], list(zip(runs, frames, strict=True))
-    at = lags(min(f.stop - f.start for f in frames))
+    at = transport.lags(min(f.stop - f.start for f in frames))
     time, diameter = at * (first.time[1] - first.time[0]), 2 * first.radius.mean()
     wt = time / np.mean([mean_free_time(run) for run in runs])
-    msd = np.array([displacement(*one, at) for one in pairs])
+    msd = np.array([transport.displacement(*one, at) for one in pairs])
     curves = {
-        "vacf": Curve(wt, *estimate([velocity_memory(*one, at) for one in pairs])),
+        "vacf": Curve(wt, *estimate([transport.velocity_memory(*one, at) for one in pairs])),
         "msd": Curve(wt, *estimate(msd / diameter**2)),
     }
     if equal_disks(first):
         density = first.count / np.prod(first.edges)
-        tail = hard_disks.long_time_tail(time, density, *enskog_by_rate(first))
+        tail = hard_disks.long_time_tail(time, density, *transport.enskog_by_rate(first))
         curves["vacf_tail"] = Curve(wt, tail, np.full_like(tail, np.nan))
     if first.periodic.all():
-        memory = estimate([integrated_memory(*one, at) for one in pairs])
+        memory = estimate([transport.integrated_memory(*one, at) for one in pairs])
         curves["D_velocities(t)"] = Curve(wt, *memory)
         ends, slope = np.append(0, wt), np.diff(msd, prepend=0) / np.diff(time, prepend=0)
         middle = (ends[1:] + ends[:-1]) / 2
@@ -151,9 +138,9 @@ def analysed(runs: list[Run], skip: float | None, cool: bool) -> Found:
     else:
         curves = motion(runs, frames)
         curves["a2"] = kurtosis(runs, max(own.start for own in frames) + 1)
-        lag = diffusion_lag(runs, frames)
+        lag = transport.diffusion_lag(runs, frames)
         if runs[0].periodic.all():
-            both = [diffusion(*one, lag) for one in zip(runs, frames, strict=True)]
+            both = [transport.diffusion(*one, lag) for one in zip(runs, frames, strict=True)]
             members = dict(zip(NUMBERS, map(list, zip(*both, strict=True)), strict=False))
         step = runs[0].time[1] - runs[0].time[0]
         lag *= float(step / np.mean([mean_free_time(run) for run in runs]))
@@ -172,7 +159,7 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
             else:
                 row |= measured(name, None)
         known = equal_disks(runs[0]) and found.lag is not None
-        row["D_enskog"] = enskog_by_rate(runs[0])[0] if known else None
+        row["D_enskog"] = transport.enskog_by_rate(runs[0])[0] if known else None
         rows.append(row | {"g_first_bin": float(found.curves["g"].y[0])})
     return rows, notes
 
@@ -248,7 +235,15 @@ def draw(
         panels[name].set(**{"xlabel": "$w\\,t$", **style})
     equal = equal_disks(groups[0][1][0])
     if not cool:
-        draw_theory(panels, min(f.curves["vacf"].x[0] for f in results), equal)
+        wt = np.geomspace(min(f.curves["vacf"].x[0] for f in results), 5, 200)
+        if equal:
+            panels["vacf"].plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
+            panels["tail"].plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")
+        else:
+            panels["D"].set_ylabel("$D(t)$ / its largest value")
+        panels["D"].plot([], [], color="black", marker=".", label="from displacements")
+        panels["D"].plot([], [], color="black", marker="x", label="from velocities")
+        panels["tail"].set_ylim(1e-4, 1.2)
     start = min(found.curves["a2"].y[0] for found in results)
     if start < -0.4 and equal and not cool:
         dilute_limit(panels["a2"], RELAXATION)
@@ -263,19 +258,6 @@ def draw(
             panels[name].legend()
     figure.suptitle(caption([run for _, runs in groups for run in runs]))
     return figure
-
-
-def draw_theory(panels: dict[str, plt.Axes], first: float, equal: bool) -> None:
-    """What memory and diffusion are compared with, and the signs of the latter."""
-    wt = np.geomspace(first, 5, 200)
-    if equal:
-        panels["vacf"].plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
-        panels["tail"].plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")
-    else:
-        panels["D"].set_ylabel("$D(t)$ / its largest value")
-    panels["D"].plot([], [], color="black", marker=".", label="from displacements")
-    panels["D"].plot([], [], color="black", marker="x", label="from velocities")
-    panels["tail"].set_ylim(1e-4, 1.2)
 
 
 def main() -> None:

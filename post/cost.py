@@ -8,9 +8,9 @@ collision itself is not small compared with the search; above it disks no longer
 caches.
 """
 
-from ricochet import Run, RunError
+from ricochet import Run
 from ricochet.drawing import COLOURS, plt
-from ricochet.script import command_line, launch, report
+from ricochet.script import command_line, launch, recorded, report
 from ricochet.statistics import PowerLaw, fit_power_law
 from ricochet.thermodynamics import packing
 
@@ -23,20 +23,13 @@ LABELS = {
 }
 
 
-def microseconds(run: Run) -> float:
-    """Time per collision in microseconds."""
-    rate = float(run.provenance.get("collisions_per_second", 0))
-    if rate <= 0:
-        raise RunError(f"{run.path}: is not finished: records no collisions per second")
-    return 1e6 / rate
-
-
 def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Search -> N and the least time per collision, in ascending N."""
+    """Search -> N and the least time per collision in microseconds, in ascending N."""
     least: dict[str, dict[int, float]] = {}
     for run in runs:
         points = least.setdefault(str(run.parameter("run", "search", "cells")), {})
-        points[run.count] = min(microseconds(run), points.get(run.count, np.inf))
+        time = 1e6 / recorded(run, "collisions_per_second")
+        points[run.count] = min(time, points.get(run.count, np.inf))
     return {search: tuple(np.array(sorted(points.items())).T) for search, points in least.items()}
 
 

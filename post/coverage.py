@@ -26,17 +26,6 @@ def naive_error(run: Run, skip: float | None) -> float:
     return float(scipy.stats.sem(rest) / np.mean(s.time) / (2 * run.count * temperature(run)))
 
 
-def draw_runs(axes: plt.Axes, row: dict, z: np.ndarray, error: np.ndarray) -> None:
-    """The first runs in order of their mean, with error bars."""
-    first = np.argsort(z[:SHOWN])
-    for k, (mean, reach) in enumerate(zip(z[first], error[first], strict=True)):
-        style = {"color": COLOURS[0 if abs(mean - row["Z"]) < reach else 1], "ms": 2.5, "lw": 1}
-        axes.errorbar(k, mean, reach, marker="o", **style)
-    axes.axhline(row["Z"], color="black", lw=1)
-    axes.set_title(f"η = {row['packing']:g}: {row['within_%']:.0f} % of {row['runs']} hold it")
-    axes.set(xticks=[], xlabel=f"{len(first)} runs, in order of their mean")
-
-
 def main() -> None:
     args = command_line(__doc__, "coverage.png", skip=None).parse_args()
     groups, rows = by_packing(args.runs), []
@@ -53,8 +42,14 @@ def main() -> None:
         row |= {"within_%": float(100 * np.mean(np.abs(z - z.mean()) < error))}
         row |= {"naive_error": float(naive.mean())}
         row |= {"naive_within_%": float(100 * np.mean(np.abs(z - z.mean()) < naive))}
-        draw_runs(axes, row, z, error)
         rows.append(row)
+        first = np.argsort(z[:SHOWN])
+        for k, (mean, reach) in enumerate(zip(z[first], error[first], strict=True)):
+            style = {"color": COLOURS[0 if abs(mean - row["Z"]) < reach else 1], "ms": 2.5, "lw": 1}
+            axes.errorbar(k, mean, reach, marker="o", **style)
+        axes.axhline(row["Z"], color="black", lw=1)
+        axes.set_title(f"η = {eta:g}: {row['within_%']:.0f} % of {len(runs)} hold it")
+        axes.set(xticks=[], xlabel=f"{len(first)} runs, in order of their mean")
     panels[0, 0].set_ylabel("$Z = P\\,/\\,(n\\,kT)$ of a run")
     figure.suptitle(caption(args.runs))
     report(args, figure, rows)

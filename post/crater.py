@@ -11,18 +11,8 @@ takes part (wall hits are more than 1 % of the number of disks), or if the run e
 energy left than `stop.energy_fraction`.
 """
 
-from ricochet import Run
-from ricochet.crater import (
-    Crater,
-    bed,
-    box_takes_part,
-    crater,
-    displaced,
-    ended_by_time,
-    energy_fraction,
-    packing_field,
-    projectile,
-)
+from ricochet import Run, crater
+from ricochet.crater import Crater, bed, displaced, projectile
 from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, report
 
@@ -53,7 +43,7 @@ def draw_hull(axes: plt.Axes, run: Run) -> None:
 
 def draw_cavity(axes: plt.Axes, run: Run) -> None:
     """The outline of the hole: where the packing is half of what it was."""
-    before, after = packing_field(run, 0), packing_field(run, -1)
+    before, after = crater.packing_field(run, 0), crater.packing_field(run, -1)
     level = 0.5 * np.quantile(before[2][before[2] > 0.05], 0.5)
     axes.contour(*after, levels=[level], colors=[COLOURS[1]], linewidths=1.2, zorder=4)
     axes.plot([], [], color=COLOURS[1], lw=1.2, label="half of the first packing")
@@ -117,12 +107,13 @@ def main() -> None:
     args = command_line(__doc__, "crater.png").parse_args()
     rows, notes = [], []
     for run in args.runs:
-        size, name = crater(run), run.path.name
-        by_time, box = ended_by_time(run, size), box_takes_part(run, size.wall_collisions)
+        size, name = crater.crater(run), run.path.name
+        by_time = crater.ended_by_time(run, size)
+        box = crater.box_takes_part(run, size.wall_collisions)
         marks = {"ended_by_time": int(by_time), "box_takes_part": int(box)}
         rows.append({"run": name, **size._asdict(), **marks})
         left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, not the "
-        left += f"{100 * energy_fraction(run):g} % of stop.energy_fraction"
+        left += f"{100 * crater.energy_fraction(run):g} % of stop.energy_fraction"
         walls = f"{size.wall_collisions} wall hits"
         walls = f"{name}: the crater reaches the floor or the sides, {walls}"
         notes += [left] * by_time + [walls] * box

@@ -17,19 +17,10 @@ error over runs of one input, and its ratio to the theory.  Pictures: the end of
 each input, or of a single input its start and its end.
 """
 
-from ricochet import Run, RunError
-from ricochet.drawing import (
-    colours,
-    disk_collection,
-    draw_box,
-    numbers_of,
-    plt,
-    species_colours,
-    species_legend,
-    titled,
-)
+from ricochet import Run, RunError, drawing
+from ricochet.drawing import plt
 from ricochet.driven import cluster, demon_law, fuller, height, noise_law, share, temperature
-from ricochet.script import command_line, launch, measured, one_of, report
+from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate, windows
 
 import numpy as np
@@ -48,7 +39,7 @@ QUANTITIES = {
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
     """Runs that differ by their seed alone together, under what sets them apart from the others."""
-    own = [{"N": run.count, "ξ": run.restitution, **numbers_of(run)} for run in runs]
+    own = [{"N": run.count, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
     for run, numbers in zip(runs, own, strict=True):
@@ -59,7 +50,7 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
 
 def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict) -> None:
     """Solid what was measured, dashed what should last."""
-    for (key, curves), colour in zip(tracks.items(), colours(len(tracks)), strict=True):
+    for (key, curves), colour in zip(tracks.items(), drawing.colours(len(tracks)), strict=True):
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
             means = windows(time, value, (time[-1] - time[0]) / POINTS)
@@ -88,19 +79,19 @@ def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> 
     draw_curves(axes, tracks, laws)
     axes.set_ylabel(label)
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
-        draw_box(panel, run)
-        disk_collection(panel, run, run.position[frame], facecolors=species_colours(run))
+        drawing.draw_box(panel, run)
+        shades = drawing.species_colours(run)
+        drawing.disk_collection(panel, run, run.position[frame], facecolors=shades)
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
     if not any(species for _, species in tracks):  # else the curves name them, in their colours
-        species_legend(figure, runs[0])
-    figure.suptitle(titled(runs))
+        drawing.species_legend(figure, runs[0])
+    figure.suptitle(drawing.titled(runs))
     return figure
 
 
 def main() -> None:
     parser = command_line(__doc__, "driven.png")
-    known, words = one_of(*QUANTITIES), f"{', '.join(QUANTITIES)} [temperature]"
-    parser.add_argument("--show", type=known, default="temperature", metavar="WHAT", help=words)
+    parser.add_argument("--show", choices=QUANTITIES, default="temperature", help="[temperature]")
     args = parser.parse_args()
     for run in args.runs:
         if run.frames < 2 or not run.time[-1] > run.time[0]:

@@ -47,23 +47,18 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     return rows, notes
 
 
-def draw_curves(above: plt.Axes, below: plt.Axes) -> None:
-    """Published equations of state, and the deviation of one of them from the reference."""
-    fluid, solid = np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
-    published = hard_disks.simulated(fluid)
-    label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
-    above.plot(fluid, hard_disks.henderson(fluid), color="0.6", label="Henderson 1975")
-    above.plot(fluid, published, color="black", lw=1, label=label)
-    label = "crystal, Alder, Hoover and Young 1968"
-    above.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
-    below.plot(fluid, 100 * (hard_disks.henderson(fluid) / published - 1), color="0.6")
-
-
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     """Z above, its deviation from the reference below."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
     if one_radius(runs):
-        draw_curves(above, below)
+        fluid, solid = np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
+        published = hard_disks.simulated(fluid)
+        label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
+        above.plot(fluid, hard_disks.henderson(fluid), color="0.6", label="Henderson 1975")
+        above.plot(fluid, published, color="black", lw=1, label=label)
+        label = "crystal, Alder, Hoover and Young 1968"
+        above.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
+        below.plot(fluid, 100 * (hard_disks.henderson(fluid) / published - 1), color="0.6")
     else:
         below.set_visible(False)
         above.set_xlabel("packing fraction $\\eta$")

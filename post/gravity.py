@@ -73,19 +73,16 @@ def crowded_heights(
     ideal = [sharing(s.mass * pull * height, temperature, sum(numbers)) for s in species]
     density = [normalised(height, weight) for weight in ideal]
     for _ in range(50):
-        density = [
-            normalised(height, ideal[i] * np.exp(-taken(i, species, density, numbers) / width))
-            for i in range(len(species))
+        taken = [  # area per height, by the other disks from one of each species
+            sum(
+                np.pi * (one.radius + s.radius) ** 2 * (numbers[j] - (i == j)) * density[j]
+                for j, s in enumerate(species)
+            )
+            for i, one in enumerate(species)
         ]
+        pairs = zip(ideal, taken, strict=True)
+        density = [normalised(height, own * np.exp(-area / width)) for own, area in pairs]
     return density
-
-
-def taken(i: int, species: list[Samples], density: list, numbers: list[int]) -> np.ndarray:
-    """Area per height that the other disks take from one of species i."""
-    return sum(
-        np.pi * (species[i].radius + s.radius) ** 2 * (numbers[j] - (i == j)) * density[j]
-        for j, s in enumerate(species)
-    )
 
 
 def normalised(x: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -87,13 +87,11 @@ class Answers(Handler):
             return self.send_error(400)
         try:
             wish = json.loads(self.rfile.read(int(length)))
-            if not isinstance(wish, dict):
-                raise Refused("not a wish")
             body = json.dumps(actions[self.path](wish)).encode()
-        except (ValueError, RecursionError):
-            return self.send_error(400)
         except (Refused, RunError) as problem:
             return self.reply(409, "text/plain; charset=utf-8", f"{problem}\n".encode())
+        except (AttributeError, LookupError, RecursionError, TypeError, ValueError):
+            return self.send_error(400)  # it is no wish
         return self.reply(200, JSON, body)
 
 
@@ -135,31 +133,21 @@ def port(text: str) -> int:
     return int(text)
 
 
-def options() -> Namespace:
-    """The command line."""
+def main() -> None:
     raw = RawTextHelpFormatter
     parser = Parser(description=__doc__, formatter_class=raw, allow_abbrev=False)
     parser.add_argument("inputs", nargs="*", type=Path, metavar="INPUT.nml", help="more inputs")
-    parser.add_argument(
-        "--open", action=BooleanOptionalAction, help="open the page in your browser [no]"
-    )
+    opened = "open the page in your browser [no]"
+    parser.add_argument("--open", action=BooleanOptionalAction, help=opened)
     parser.add_argument("--port", type=port, default=0, metavar="N", help="the port [a free one]")
-    return parser.parse_args()
-
-
-def input_files(own: list[Path]) -> list[Path]:
-    """The user's own inputs, then those of the project; a name counts once."""
-    for path in own:
+    args = parser.parse_args()
+    for path in args.inputs:
         if path.suffix != ".nml" or not path.is_file():
             raise RunError(f"{path}: is no input file, whose name ends in .nml")
-    names = {path.stem for path in own}
-    return own + [path for path in sorted(INPUTS.glob("*.nml")) if path.stem not in names]
-
-
-def main() -> None:
-    args = options()
+    names = {path.stem for path in args.inputs}  # a name counts once
+    inputs = [path for path in sorted(INPUTS.glob("*.nml")) if path.stem not in names]
     with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
-        lab = Lab(input_files(args.inputs), Path(folder), filmed)
+        lab = Lab(args.inputs + inputs, Path(folder), filmed)
         try:
             with (
                 suppress(KeyboardInterrupt),

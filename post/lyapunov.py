@@ -27,13 +27,9 @@ class Divergence(NamedTuple):
     time: np.ndarray  # (T,)
     logarithm: np.ndarray  # (P, T)
     slope: np.ndarray  # (P,) [1/time]
+    exponent: Estimate  # of Lyapunov, the mean of the slopes
     begin: float
     end: float
-
-    @property
-    def exponent(self) -> Estimate:
-        """The Lyapunov exponent with its standard error."""
-        return estimate(self.slope)
 
 
 def distance(one: Run, other: Run) -> np.ndarray:
@@ -56,7 +52,8 @@ def divergence(time: np.ndarray, apart: np.ndarray, largest: float, begin: float
         raise RunError("nothing to fit: starts equal or too far apart, or too few frames")
     fitted = time[first:last]
     slope = np.polyfit(fitted, logarithm[:, first:last].T, 1)[0]
-    return Divergence(time, logarithm, slope, float(fitted[0]), float(fitted[-1]))
+    ends = float(fitted[0]), float(fitted[-1])
+    return Divergence(time, logarithm, slope, estimate(slope), *ends)
 
 
 def draw(found: Divergence) -> plt.Figure:

@@ -12,7 +12,7 @@ the share of the disk in the mass of all.
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, bars, caption, plt
 from ricochet.script import command_line, late_frames, launch, measured, report
-from ricochet.speeds import means, speeds_of
+from ricochet.speeds import means
 from ricochet.statistics import binned, hold_against
 from ricochet.theory import maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import kinds_of_disks, mean_energy
@@ -22,8 +22,8 @@ import numpy as np
 
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
     """All speeds of a species in these frames."""
-    each = [speeds_of(run, own, name) for run, own in zip(runs, frames, strict=True)]
-    return np.concatenate(each)
+    each = zip(runs, frames, strict=True)
+    return np.concatenate([run.speed(k)[run.of_species(name)] for run, own in each for k in own])
 
 
 def table(runs: list[Run], frames: list[list[int]]) -> list[dict]:
@@ -58,7 +58,12 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         label = f"Maxwell: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}"
         law = maxwell_pdf(v / thermal) / thermal
         row[1].plot(v, law, color="black", lw=1.2, label=label, zorder=3)
-        for axes, chosen, words in zip(row, sides, moments(found), strict=True):
+        moments = (
+            "⟨v⟩ = {v_start:.4g},  ⟨K⟩ = {K_start:.4g}".format(**found),
+            "⟨v⟩ = {v:.4f} ± {v_error:.4f} (theory {v_theory:.4f})\n"
+            "⟨K⟩ = {K:.4f} ± {K_error:.4f} (theory {K_theory:.4f})".format(**found),
+        )
+        for axes, chosen, words in zip(row, sides, moments, strict=True):
             speeds = pooled(runs, chosen, kind.name)
             style = {"color": colour, "label": f"{kind.label}: {len(speeds)} speeds"}
             bars(axes, binned(speeds, bins), bins, fill=True, alpha=0.45, **style)
@@ -71,15 +76,6 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         axes.set(xlabel="speed v (reduced units)", xlim=(0, top))
     figure.suptitle(caption(runs))
     return figure
-
-
-def moments(row: dict) -> tuple[str, str]:
-    """Mean speed and energy at the start and in equilibrium, for the legend."""
-    return (
-        f"⟨v⟩ = {row['v_start']:.4g},  ⟨K⟩ = {row['K_start']:.4g}",
-        f"⟨v⟩ = {row['v']:.4f} ± {row['v_error']:.4f} (theory {row['v_theory']:.4f})\n"
-        f"⟨K⟩ = {row['K']:.4f} ± {row['K_error']:.4f} (theory {row['K_theory']:.4f})",
-    )
 
 
 def main() -> None:

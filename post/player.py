@@ -29,12 +29,12 @@ from functools import partial
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, values_of
+from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, scale_top, values_of
 from ricochet.files import destination
 from ricochet.live import serve
 from ricochet.paths import MOST_AT_ONCE, Paths
 from ricochet.reader import span
-from ricochet.script import chosen_disks, command_line, film_frames, launch, report
+from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 from ricochet.thermodynamics import SIDES, has_log
 
 import numpy as np
@@ -159,14 +159,6 @@ def events_of(run: Run, paths: Paths, frames: list[int]) -> dict:
     some = slice(some.start, min(some.stop, some.start + MOST_EVENTS))
     parts = {"time": time[some], "i": i[some] - 1, "j": j[some] - 1}
     return {"events": {name: own.tolist() for name, own in parts.items()}, "surfaces": surfaces}
-
-
-def scale_top(run: Run, frames: list[int], name: str) -> float:
-    """The upper end of a colour scale, from some frames, without the few largest values."""
-    some = frames[:: max(1, len(frames) // 40)]
-    values = values_of(run, sorted({*some, frames[-1]}), name)
-    moved = values[values > 0]
-    return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
 
 
 def species(run: Run) -> list[dict]:
@@ -367,7 +359,7 @@ def chosen_film(
     run: Run, args: Namespace, room: float, watched: Callable[[list], Iterable] = iter
 ) -> tuple[list[int], tuple[dict, dict]]:
     """The film that the options ask for, and its frames; `watched` is as in `film`."""
-    frames = film_frames(run, args, frames_that_fit(run, room))
+    frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room, watched)
 

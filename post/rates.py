@@ -16,30 +16,12 @@ collisions and have no equilibrium only the free paths are found, in the frames 
 else 15 collisions per disk.
 """
 
-from ricochet import Run, RunError
+from ricochet import Run, RunError, statistics
+from ricochet import thermodynamics as td
 from ricochet.drawing import COLOURS, band, bars, caption, plt
 from ricochet.free_paths import BINS, mean_and_density, path_density
 from ricochet.script import command_line, launch, points, report
-from ricochet.statistics import (
-    FINE,
-    Curve,
-    Estimate,
-    SeriesMean,
-    combined,
-    doubts,
-    estimate,
-    to_error,
-)
-from ricochet.thermodynamics import (
-    after_start,
-    all_cool,
-    equal_disks,
-    has_log,
-    packing,
-    rates,
-    start_of_equilibrium,
-    temperature,
-)
+from ricochet.statistics import FINE, Curve, Estimate, SeriesMean, estimate
 
 import numpy as np
 
@@ -48,7 +30,7 @@ def check(runs: list[Run], cool: bool) -> None:
     """Refuse what is no gas in an empty box, and runs of different systems."""
     first = runs[0]
     for run in runs:
-        if cool and not has_log(run):
+        if cool and not td.has_log(run):
             raise RunError(
                 f"{run.path}: is not elastic: it loses energy in collisions, and has free paths "
                 "only; those need output.event_log = .true."
@@ -61,22 +43,22 @@ def check(runs: list[Run], cool: bool) -> None:
 
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
     """What has an error, at the mean temperature of the runs: hard disks only move faster."""
-    kt = float(np.mean([temperature(run) for run in runs]))
-    found = [rates(run, skip) for run in runs]
+    kt = float(np.mean([td.temperature(run) for run in runs]))
+    found = [td.rates(run, skip) for run in runs]
     means = {}
     for name in found[0]:
         power = 1.0 if name.startswith("pressure") else 0.5
-        ratios = [(kt / temperature(run)) ** power for run in runs]
+        ratios = [(kt / td.temperature(run)) ** power for run in runs]
         members = [one[name].scaled(ratio) for one, ratio in zip(found, ratios, strict=True)]
-        means[name] = combined(members)
-        notes += doubts(name, members)
+        means[name] = statistics.combined(members)
+        notes += statistics.doubts(name, members)
     return means
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
     """The mean pressure over the runs, at their mean kT, by the virial and by four walls."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
-    kts = np.array([[temperature(run)] for run in runs])
+    kts = np.array([[td.temperature(run)] for run in runs])
 
     def growth(name: str, scale: np.ndarray | float) -> np.ndarray:
         found = []
@@ -95,9 +77,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
     return {way: Curve(middle, *estimate(values)) for way, values in ways.items()}
 
 
-def draw_pressure(
-    axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float
-) -> None:
+def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:
     """The pressure in time with its error; its mean in equilibrium."""
     x = curves["virial"].x
     end = x[-1] + x[0]
@@ -116,7 +96,7 @@ def draw_pressure(
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
     """The free paths, and those without memory."""
     mean, height = paths
-    label = f"measured, $\\ell$ = {' ± '.join(to_error(*mean))}"
+    label = f"measured, $\\ell$ = {' ± '.join(statistics.to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
     if equal:
         fine = np.linspace(0, BINS[-1], 200)
@@ -130,8 +110,8 @@ def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> 
     """A row per quantity: exact ones first, then those with an error."""
     momentum = np.mean([run.observable("momentum").value for run in runs], axis=(0, 1))
     exact = {
-        "packing": packing(runs[0]),
-        "kT": float(np.mean([temperature(run) for run in runs])),
+        "packing": td.packing(runs[0]),
+        "kT": float(np.mean([td.temperature(run) for run in runs])),
         "momentum_x": float(momentum[0]),
         "momentum_y": float(momentum[1]),
         "equilibrium_from" if means else "from_time": start,
@@ -148,9 +128,10 @@ def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> 
 def main() -> None:
     args = command_line(__doc__, "rates.png", skip=None).parse_args()
     runs, notes = args.runs, []
-    cool = all_cool(runs)
+    cool = td.all_cool(runs)
     check(runs, cool)
-    start = max((after_start if cool else start_of_equilibrium)(run, args.skip) for run in runs)
+    begin = td.after_start if cool else td.start_of_equilibrium
+    start = max(begin(run, args.skip) for run in runs)
     paths = mean_and_density(runs, args.skip)
     means, curves = {}, {}
     count = (not cool) + bool(paths)
@@ -163,9 +144,9 @@ def main() -> None:
         draw_pressure(panels[0, 0], shown, means["pressure_virial"], start)
         curves = {(f"pressure_{way}(t)",): curve for way, curve in shown.items()}
     if paths:
-        draw_paths(panels[0, -1], paths, equal_disks(runs[0]))
+        draw_paths(panels[0, -1], paths, td.equal_disks(runs[0]))
         curves["free_path_density",] = Curve((BINS[1:] + BINS[:-1]) / 2, *paths[1])
-    figure.suptitle(f"{caption(runs)},  η = {packing(runs[0]):.4g}")
+    figure.suptitle(f"{caption(runs)},  η = {td.packing(runs[0]):.4g}")
     rows = table(runs, start, means, paths and paths[0])
     data = [row | {"x": ""} for row in rows]
     for point in points(("quantity", "x", "mean", "error"), curves):

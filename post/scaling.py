@@ -9,23 +9,15 @@ least and the largest.  runs/scaling.sh does it all.
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
-from ricochet.script import command_line, grouped, launch, report
+from ricochet.script import command_line, grouped, launch, recorded, report
 
 import numpy as np
-
-
-def wall_time(run: Run) -> float:
-    """Of the whole process, in seconds."""
-    seconds = float(run.provenance.get("wall_time", 0))
-    if seconds <= 0:
-        raise RunError(f"{run.path}: is not finished: records no wall time")
-    return seconds
 
 
 def table(runs: list[Run]) -> list[dict]:
     """A row for each number of disks and threads, in ascending order."""
     groups = grouped(runs, lambda run: (run.count, int(run.provenance.get("threads", 1))))
-    walls = {key: [wall_time(run) for run in same] for key, same in groups}
+    walls = {key: [recorded(run, "wall_time") for run in same] for key, same in groups}
     rows = []
     for (disks, threads), times in walls.items():
         if (disks, 1) not in walls:

@@ -12,35 +12,13 @@ side is drawn on both.
 
 import argparse
 
-from ricochet import Run
-from ricochet.drawing import (
-    LABELS,
-    caption,
-    chosen_colour,
-    colour_map,
-    disk_collection,
-    draw_box,
-    panel_grid,
-    plt,
-    radius_marks,
-    species_colours,
-    species_legend,
-    values_of,
-)
+from ricochet import Run, drawing
+from ricochet.drawing import plt
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
 from ricochet.thermodynamics import packing
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array
-
-
-def draw_arrows(axes: plt.Axes, run: Run, frame: int, longest: float, colours) -> None:
-    """Velocities as arrows; `longest` is the speed drawn as a tenth of the box."""
-    scale = longest / (0.1 * run.edges.max())
-    x, v = run.position[frame], run.velocity[frame]
-    axes.quiver(
-        *x.T, *v.T, angles="xy", scale_units="xy", scale=scale, width=0.005, color=colours, zorder=4
-    )
 
 
 def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
@@ -57,44 +35,47 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
     """One panel per frame."""
     aspect = run.edges[1] / run.edges[0]
-    rows, columns = panel_grid(len(frames), aspect)
+    rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
     figure, panels = plt.subplots(
         rows, columns, squeeze=False, figsize=(width * columns + 0.9, width * aspect * rows + 0.7)
     )
     if colour != "species":
-        values = np.array([values_of(run, frame, colour) for frame in frames])
+        values = np.array([drawing.values_of(run, frame, colour) for frame in frames])
         whole = scale(values, args.log, colour)
         beyond = "neither" if colour == "psi6" else "both" if args.log else "max"
-        bar = {"label": LABELS[colour], "extend": beyond}
+        bar = {"label": drawing.LABELS[colour], "extend": beyond}
     longest = max(float(np.max(run.speed(frame))) for frame in frames) or 1.0
+    # The longest arrow is a tenth of the box.
+    arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / (0.1 * run.edges.max())}
+    arrows |= {"width": 0.005, "zorder": 4, "color": "0.2"}
+    if colour == "species":  # the same hues, darker, to stand out against them
+        darker = (0.6, 0.6, 0.6, 1)
+        arrows["color"] = to_rgba_array(drawing.species_colours(run)) * darker
     for k, axes in enumerate(panels.flat):
         if k >= len(frames):
             axes.set_visible(False)
             continue
-        draw_box(axes, run)
+        drawing.draw_box(axes, run)
         if colour == "species":
-            style = {"facecolors": species_colours(run)}
+            style = {"facecolors": drawing.species_colours(run)}
         else:
             norm = scale(values[k], args.log, colour) if args.per_frame else whole
             seen = np.maximum(values[k], norm.vmin)  # 0 has no place on a logarithmic scale
-            style = {"array": seen, "norm": norm, "cmap": colour_map(colour)}
-        disks = disk_collection(axes, run, run.position[frames[k]], **style)
-        radius_marks(axes, run, frames[k])
+            style = {"array": seen, "norm": norm, "cmap": drawing.colour_map(colour)}
+        disks = drawing.disk_collection(axes, run, run.position[frames[k]], **style)
+        drawing.radius_marks(axes, run, frames[k])
         if colour != "species" and args.per_frame:
             figure.colorbar(disks, ax=axes, shrink=0.7, **bar)
         if args.quiver:
-            arrows = "0.2"
-            if colour == "species":  # the same hues, darker, to stand out against them
-                arrows = to_rgba_array(species_colours(run)) * (0.6, 0.6, 0.6, 1)
-            draw_arrows(axes, run, frames[k], longest, arrows)
+            axes.quiver(*run.position[frames[k]].T, *run.velocity[frames[k]].T, **arrows)
         axes.set_title(f"t = {run.time[frames[k]]:.4g}")
     if colour == "species":
-        species_legend(figure, run)
+        drawing.species_legend(figure, run)
     elif not args.per_frame:
         figure.colorbar(disks, ax=panels, shrink=0.8, aspect=30, **bar)
     dense = f",  η = {packing(run):.4g}" if colour == "psi6" else ""
-    figure.suptitle(caption([run]) + dense)
+    figure.suptitle(drawing.caption([run]) + dense)
     return figure
 
 
@@ -107,7 +88,7 @@ def main() -> None:
     (run,) = args.runs
     which = args.frames or (None if args.count else frame_list("-1"))
     frames = chosen_frames(run, which, args.count)
-    figure = draw(run, frames, chosen_colour(run, args.colour), args)
+    figure = draw(run, frames, drawing.chosen_colour(run, args.colour), args)
     rows = []
     for frame in frames:
         row = {"frame": frame, "time": float(run.time[frame])}

@@ -14,7 +14,7 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
-from .files import destination
+from .files import destination, did_you_mean
 from .reader import Run, RunError
 from .statistics import Estimate, kurtosis_noise
 from .structure import bond_order
@@ -38,7 +38,11 @@ def caption(runs: list[Run]) -> str:
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
         parts.append(f"ξ = {listed(restitutions)}")
-    parts += [f"{name} = {listed(values)}" for name, values in varying(runs).items()]
+    values: dict[str, set[float]] = {}
+    for run in runs:
+        for name, value in numbers_of(run).items():
+            values.setdefault(name, set()).add(value)
+    parts += [f"{name} = {listed(own)}" for name, own in values.items() if len(own) > 1]
     seeds = {run.seed for run in runs}
     parts.append(f"seed {min(seeds)}" if len(seeds) == 1 else f"{len(seeds)} seeds")
     return "\n".join(wrap(",  ".join(parts), 110))
@@ -56,20 +60,8 @@ def listed(values: set[float]) -> str:
     return ", ".join(words) if len(words) < 5 else f"{words[0]} to {words[-1]}"
 
 
-def varying(runs: list[Run]) -> dict[str, set[float]]:
-    """The numbers of the input that differ between the runs, by name, with what they are.
-
-    Not those that a caption names anyhow, nor how long the runs are and what they write.
-    """
-    values: dict[str, set[float]] = {}
-    for run in runs:
-        for name, value in numbers_of(run).items():
-            values.setdefault(name, set()).add(value)
-    return {name: own for name, own in values.items() if len(own) > 1}
-
-
 def numbers_of(run: Run) -> dict[str, float]:
-    """The numbers of the input that say what system it is, by name."""
+    """The numbers of the input that say what system it is, by name, less those of any caption."""
     found = {**run.parameters.get("box", {}), **run.parameters.get("contact", {})}
     if found.get("wall_restitution") == run.restitution:
         del found["wall_restitution"]
@@ -114,6 +106,14 @@ def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
     return run.displacement(frame) if colour == "displacement" else run.speed(frame)
 
 
+def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
+    """The upper end of a scale for a film, from some frames, without the few largest values."""
+    some = frames[:: max(1, len(frames) // 40)]
+    values = values_of(run, sorted({*some, frames[-1]}), colour)
+    moved = values[values > 0]
+    return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
+
+
 def colour_map(colour: str) -> str:
     """The colours of values; a direction comes back to where it was."""
     return "hsv" if colour == "psi6" else "viridis"
@@ -121,8 +121,10 @@ def colour_map(colour: str) -> str:
 
 def chosen_colour(run: Run, wish: str | None) -> str:
     """The wish if the run has the data; without one by species where there are several."""
-    if wish not in (None, "species", *LABELS):
-        raise RunError(f"colour {wish!r}: choose species, {', '.join(LABELS)}")
+    known = ("species", *LABELS)
+    if wish not in (None, *known):
+        hint = did_you_mean(wish, known)
+        raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")
     if wish == "collisions" and run.collisions is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     return wish or ("species" if len(run.names) > 1 else "speed")
@@ -278,12 +280,8 @@ def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})
     origin = f"{sources} (ricochet {', '.join(commits)})"
-    keys = {
-        ".pdf": {"Title": title, "Subject": origin},
-        ".svg": {"Title": title, "Description": origin},
-        ".png": {"Title": title, "Description": origin},
-    }
-    if path.suffix not in keys:
-        raise RunError(f"{path}: a figure ends in {', '.join(keys)}")
-    figure.savefig(destination(path), metadata=keys[path.suffix])
+    if path.suffix not in (".pdf", ".svg", ".png"):
+        raise RunError(f"{path}: a figure ends in .pdf, .svg, .png")
+    key = "Subject" if path.suffix == ".pdf" else "Description"
+    figure.savefig(destination(path), metadata={"Title": title, key: origin})
     plt.close(figure)

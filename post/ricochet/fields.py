@@ -1,9 +1,6 @@
 """Fields of a run in its steady state, in the cells of a grid, and the profiles between two walls.
 
-Per cell, of the disks with their centres in it: number density n, flow u (mean of v by mass), kT
-(mean of m (v - u)^2 / 2), kT_rot (mean of I omega^2) of disks that can turn, the stress that disks
-carry (sum of m c_a c_b over the area, c = v - u) and the heat that they carry (sum of m c^2 c / 2);
-what collisions hand on over the distance of two centres comes on top of both.
+What the fields are is in fields.py.
 """
 
 from typing import NamedTuple
@@ -72,17 +69,13 @@ def estimates(runs: list[Run], skip: float | None, cells: tuple[int, int]) -> di
         for frames in [steady_frames(run, skip)]
         for part in np.array_split(frames, min(BLOCKS, len(frames)))
     ]
-    return {name: over_blocks(np.array([block[name] for block in blocks])) for name in blocks[0]}
-
-
-def over_blocks(values: np.ndarray) -> Estimate:
-    """Mean and error of each column of (B, C) values, over the blocks whose cell is not empty.
-
-    Both are NaN where fewer than two blocks have disks in the cell.
-    """
-    columns = (column[~np.isnan(column)] for column in values.T)
-    known = [estimate(column) if len(column) > 1 else (np.nan, np.nan) for column in columns]
-    return Estimate(*np.transpose(known))
+    found = {}
+    for name in blocks[0]:
+        cells_in_time = np.array([block[name] for block in blocks]).T
+        known = (cell[~np.isnan(cell)] for cell in cells_in_time)  # the blocks with disks in it
+        means = [estimate(one) if len(one) > 1 else (np.nan, np.nan) for one in known]
+        found[name] = Estimate(*np.transpose(means))
+    return found
 
 
 def growth(run: Run, name: str, start: float) -> np.ndarray:

@@ -1,8 +1,4 @@
-"""Free paths of disks between their collisions, by the event log.
-
-In a frame each disk is on one path, as long as its speed times the time between its collisions
-before and after.  Frames meet long paths more often; therefore each counts 1 over its time.
-"""
+"""Free paths of disks between their collisions, by the event log: what they are is in rates.py."""
 
 import numpy as np
 import scipy

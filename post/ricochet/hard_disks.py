@@ -11,25 +11,14 @@ from functools import cache
 import numpy as np
 import scipy
 
+CLOSE_PACKING = math.pi / math.sqrt(12)
 # Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
 # above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
-FLUID = np.array(
-    [
-        (0.05, 1.10839),
-        (0.10, 1.23614),
-        (0.15, 1.38804),
-        (0.20, 1.57037),
-        (0.25, 1.79159),
-        (0.30, 2.06326),
-        (0.35, 2.40150),
-        (0.40, 2.82933),
-        (0.45, 3.38054),
-        (0.50, 4.10636),
-        (math.pi / math.sqrt(12) / 1.6, 5.4963),
-        (math.pi / math.sqrt(12) / 1.5, 6.6074),
-        (math.pi / math.sqrt(12) / 1.4, 8.306),
-    ]
-)
+FLUID = np.array([
+    (0.05, 1.10839), (0.10, 1.23614), (0.15, 1.38804), (0.20, 1.57037), (0.25, 1.79159),
+    (0.30, 2.06326), (0.35, 2.40150), (0.40, 2.82933), (0.45, 3.38054), (0.50, 4.10636),
+    (CLOSE_PACKING / 1.6, 5.4963), (CLOSE_PACKING / 1.5, 6.6074), (CLOSE_PACKING / 1.4, 8.306),
+])  # fmt: skip
 # Z_N = Z + c / N in a periodic box, at the first ten packing fractions.
 SHIFT = np.array(
     [-0.1036, -0.2152, -0.3361, -0.4680, -0.6131, -0.7741, -0.9549, -1.1605, -1.3981, -1.6776]
@@ -52,7 +41,6 @@ MELTING = {
         (0.714, 9.18195), (0.716, 9.18327), (0.718, 9.19507), (0.72, 9.23083),
     ],
 }  # fmt: skip
-CLOSE_PACKING = math.pi / math.sqrt(12)
 
 
 @cache
@@ -101,27 +89,20 @@ def contact_value(z: float, eta: float) -> float:
     return (z - 1) / (2 * eta)
 
 
-def finite_rate(free: float) -> float:
-    """c_N: mean relative speed for fixed energy over that of the Maxwell law.
-
-    `free` = N between walls, N - 1 in a periodic box.
-    """
-    return math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
-
-
 def collision_rate(z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0):
-    """The w that follows from Z."""
-    return 4 * (z - 1) * finite_rate(free) / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
-
-
-def cooling_kurtosis(xi: float) -> float:
-    """a2 of the homogeneously cooling gas, van Noije and Ernst, Granular Matter 1, 57 (1998)."""
-    return 16 * (1 - xi) * (1 - 2 * xi**2) / (57 - 25 * xi + 30 * xi**2 * (1 - xi))
+    """The w that follows from Z; `free` = N between walls, N - 1 in a periodic box."""
+    # Mean relative speed for fixed energy over that of the Maxwell law.
+    c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
+    return 4 * (z - 1) * c_n / (math.sqrt(math.pi) * diameter) * math.sqrt(kt / mass)
 
 
 def haff_rate(xi: float) -> float:
-    """-d ln K / d tau, tau collisions per disk, while the gas stays homogeneous."""
-    return float((1 - xi**2) * (1 + cooling_kurtosis(xi) / 4) / 2)
+    """-d ln K / d tau, tau collisions per disk, while the gas stays homogeneous.
+
+    a2 by van Noije and Ernst, Granular Matter 1, 57 (1998).
+    """
+    a2 = 16 * (1 - xi) * (1 - 2 * xi**2) / (57 - 25 * xi + 30 * xi**2 * (1 - xi))
+    return float((1 - xi**2) * (1 + a2 / 4) / 2)
 
 
 def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:

@@ -31,18 +31,6 @@ Table = dict[str, Iterable] | list[dict]  # columns by name, or rows
 # --- options ---
 
 
-def one_of(*words: str) -> Callable[[str], str]:
-    """A word on the command line, one of a few."""
-
-    def chosen(text: str) -> str:
-        if text not in words:
-            hint = did_you_mean(text, words)
-            raise argparse.ArgumentTypeError(f"'{text}' is not one of {', '.join(words)}{hint}")
-        return text
-
-    return chosen
-
-
 def frame_list(text: str) -> tuple[int | slice, ...]:
     """Frame numbers and ranges (first:end:step, as in Python) such as '0,10,-1' or '100:200'."""
 
@@ -91,20 +79,7 @@ OPTIONS = {
     "skip": (not_negative, "X", "leave out the first X collisions per disk [until nothing drifts]"),
     "apart": (float, "X", "take frames at least X collisions per disk apart"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
-    "colour": (
-        one_of("species", *LABELS),
-        "WHAT",
-        f"species, {', '.join(LABELS)} [species; speed if there is one]",
-    ),
-}
-
-#: Options of earlier versions, and what to write instead.
-FORMER = {
-    "--after": "--skip X",
-    "--disk": "--disks IDS",
-    "--every": "--frames ::N",
-    "--first": "--frames 0:N, or N: for all from N on",
-    "--skip": "--fit-from SHARE",
+    "colour": (str, "WHAT", f"species, {', '.join(LABELS)} [species; speed if there is one]"),
 }
 
 
@@ -115,15 +90,9 @@ class Parser(argparse.ArgumentParser):
         words = joined(sys.argv[1:] if args is None else args)
         known, unknown = self.parse_known_args(words, namespace)
         if unknown:
-            self.error(self.complaint(unknown[0].split("=")[0]))
+            word = unknown[0].split("=")[0]
+            self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         return known
-
-    def complaint(self, word: str) -> str:
-        """What is wrong with a word that argparse could not place."""
-        former = FORMER.get(word)
-        if former and former.split()[0] in self._option_string_actions:
-            return f"{word} is now {former}"
-        return f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}"
 
 
 def joined(words: Iterable[str]) -> list[str]:
@@ -183,23 +152,20 @@ def late_frames(
     return frames_from(run, begin(run, args.skip), args.apart, frames) or frames[-1:]
 
 
-def film_frames(run: Run, args: argparse.Namespace, most: int | None = None) -> list[int]:
-    """The frames of a film, --count or else at most so many.
-
-    A single number is refused, it would once have been their count.
-    """
-    match args.frames:
-        case [int(number)] if run.frames > 1:
-            raise RunError(f"--frames {number} is a single frame; use --count for how many")
-    return chosen_frames(run, args.frames, args.count or most)
-
-
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
     """Indices of the disks of --disks, whose ids count from 1."""
     for number in ids:
         if not 1 <= number <= run.count:
             raise RunError(f"{run.path}: no disk {number}, there are {run.count}")
     return [number - 1 for number in ids]
+
+
+def recorded(run: Run, name: str) -> float:
+    """A number above 0 that a run records when it has finished."""
+    value = float(run.provenance.get(name, 0))
+    if value <= 0:
+        raise RunError(f"{run.path}: is not finished: records no {name.replace('_', ' ')}")
+    return value
 
 
 def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[float, list[Run]]]:

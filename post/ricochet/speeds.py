@@ -23,11 +23,6 @@ def reduced_speeds(run: Run, frames: list[int], each: bool = False) -> np.ndarra
     return np.sqrt(energy).ravel()
 
 
-def speeds_of(run: Run, frames: list[int], name: str) -> np.ndarray:
-    """(F * n,) speeds of a species in these frames."""
-    return np.concatenate([run.speed(k)[run.of_species(name)] for k in frames])
-
-
 def independent_frames(run: Run, frames: list[int]) -> int:
     """How many independent frames these count as."""
     tau = run.collisions_per_disk_at(run.time)[frames]

@@ -40,11 +40,10 @@ class LawTest(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """y = factor x^exponent with the standard errors of a weighted fit."""
+    """y = factor x^exponent; its error is that of a weighted fit."""
 
     factor: float
     exponent: float
-    factor_error: float
     exponent_error: float
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
@@ -61,11 +60,7 @@ def hold_against(
     n = len(sample) if independent is None else independent
     distance = float(scipy.stats.ks_1samp(sample, cdf).statistic)
     counts, _ = np.histogram(cdf(np.asarray(sample)), bins=bins, range=(0, 1))
-    chi2 = (
-        scipy.stats.chisquare(counts, np.full(bins, counts.sum() / bins)).statistic
-        * n
-        / len(sample)
-    )
+    chi2 = scipy.stats.chisquare(counts).statistic * n / len(sample)
     return LawTest(
         n,
         distance,
@@ -267,6 +262,5 @@ def fit_power_law(x: np.ndarray, y: np.ndarray, y_error: np.ndarray) -> PowerLaw
     log_x, log_y, weight = np.log(x[good]), np.log(y[good]), y[good] / y_error[good]
     line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
     chi2 = np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / max(1, good.sum() - 2)
-    slope_error, offset_error = np.sqrt(np.diag(covariance) * max(1.0, chi2))
-    factor = float(np.exp(line[1]))
-    return PowerLaw(factor, float(line[0]), factor * offset_error, slope_error)
+    error = np.sqrt(covariance[0, 0] * max(1.0, chi2))
+    return PowerLaw(float(np.exp(line[1])), float(line[0]), error)

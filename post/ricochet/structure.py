@@ -77,9 +77,13 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int:
 
 def bond_order(run: Run, frame: int) -> np.ndarray:
     """(N,) complex psi6 of each disk, over its Delaunay neighbours."""
-    x = run.position[frame]
     near = 4 * np.sqrt(np.prod(run.edges) / run.count)
-    points = padded(x, run, near)
+    points = run.position[frame]  # then their periodic copies near the box
+    for axis in np.flatnonzero(run.periodic):
+        shift = np.where(np.arange(2) == axis, run.edges, 0.0)
+        low = points[:, axis] < run.lower[axis] + near
+        high = points[:, axis] > run.upper[axis] - near
+        points = np.concatenate([points, points[low] + shift, points[high] - shift])
     start, neighbours = scipy.spatial.Delaunay(points).vertex_neighbor_vertices
     centre = np.repeat(np.arange(len(points)), np.diff(start))
     inside = centre < run.count
@@ -89,17 +93,6 @@ def bond_order(run: Run, frame: int) -> np.ndarray:
         centre[inside], turns.imag, run.count
     )
     return sums / np.bincount(centre[inside], minlength=run.count)
-
-
-def padded(x: np.ndarray, run: Run, width: float) -> np.ndarray:
-    """The points, then their periodic copies within `width` of the box."""
-    points = x
-    for axis in np.flatnonzero(run.periodic):
-        shift = np.where(np.arange(2) == axis, run.edges, 0.0)
-        low = points[:, axis] < run.lower[axis] + width
-        high = points[:, axis] > run.upper[axis] - width
-        points = np.concatenate([points, points[low] + shift, points[high] - shift])
-    return points
 
 
 def bond_correlation(

@@ -224,12 +224,9 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
         raise RunError(f"{run.path}: falls, it has no equation of state")
     empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
     walled = empty and np.ptp(run.radius) == 0
-    ways = {
-        "virial": (z_virial, True),
-        "rate": (z_rate, equal_disks(run)),
-        "walls": (z_wall, walled),
-    }
-    return {name: way(run, skip) for name, (way, applies) in ways.items() if applies}
+    ways = {"virial": z_virial} | ({"rate": z_rate} if equal_disks(run) else {})
+    ways |= {"walls": z_wall} if walled else {}
+    return {name: way(run, skip) for name, way in ways.items()}
 
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:

@@ -19,17 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
+from . import thermodynamics as td
 from .reader import Events, Run, RunError, read_run
 from .statistics import Curve, SeriesMean, estimate, series_mean
-from .thermodynamics import (
-    drift,
-    equal_disks,
-    free_disks,
-    mean_free_time,
-    packing,
-    start_of_equilibrium,
-    temperature,
-)
 
 PER_FREE_TIME = 10  # samples of the moments
 #: Mean free times after which fluxes are forgotten: in a dilute gas as exp(-w t / 2.06), that of
@@ -81,7 +73,7 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     Or an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
-    sound = hard_disks.speed_of_sound(packing(run), temperature(run), run.mass.mean())
+    sound = hard_disks.speed_of_sound(td.packing(run), td.temperature(run), run.mass.mean())
     crossing = float(run.edges.min()) / sound / (run.time[1] - run.time[0])
     return int(np.clip(crossing, 2, max(2, shortest // 8)))
 
@@ -112,7 +104,7 @@ def check(run: Run) -> None:
     """Refuse all but the gases that the moments are for."""
     alone = run.periodic.all() and not (run.gravity.any() or run.obstacles or len(run.walls))
     driven = run.kicked or run.shear_rate != 0 or "angular_velocity" in run.elements
-    if not alone or driven or run.time_step or not equal_disks(run) or run.restitution != 1:
+    if not alone or driven or run.time_step or not td.equal_disks(run) or run.restitution != 1:
         raise RunError(
             f"{run.path}: transport takes equal elastic smooth disks in a periodic box, by events "
             "and at rest: no gravity, walls, shear or kicks"
@@ -131,7 +123,7 @@ def velocities(run: Run, events: Events) -> tuple[np.ndarray, np.ndarray]:
 
     Raises RunError if the log does not lead from the first frame to the last.
     """
-    start, end = run.velocity[[0, -1]] - drift(run)
+    start, end = run.velocity[[0, -1]] - td.drift(run)
     _, i, j, _, change = events
     disk = np.stack([i, j], axis=1).ravel() - 1
     change = np.stack([change, -change], axis=1).reshape(-1, 2) / run.mass[disk, None]
@@ -173,7 +165,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     events = log(run)
     before, after = velocities(run, events)
     mass = run.mass[0]
-    carried = flux(run.velocity[0] - drift(run), mass).sum(axis=0)
+    carried = flux(run.velocity[0] - td.drift(run), mass).sum(axis=0)
     changes = (flux(after, mass) - flux(before, mass)).sum(axis=1)
     carried = carried + np.cumsum(np.vstack([np.zeros(5), changes]), axis=0)
     knots = np.concatenate([run.time[:1], events.time, run.time[-1:]])
@@ -181,7 +173,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     handed = handed_on(run, events.momentum_change, before, after)
     handed = np.cumsum(np.vstack([np.zeros(5), handed]), axis=0)
 
-    step = mean_free_time(run) / PER_FREE_TIME
+    step = td.mean_free_time(run) / PER_FREE_TIME
     time = np.arange(start, run.time[-1], step)
     total = handed[np.searchsorted(events.time, time, "right")]
     total += np.stack([np.interp(time, knots, part) for part in flown.T], axis=1)
@@ -241,14 +233,14 @@ def enskog(eta: float, diameter: float = 1.0, kt: float = 1.0, mass: float = 1.0
 
 def enskog_of(run: Run) -> dict[str, float]:
     """The same of a run, in its units and at its temperature."""
-    return enskog(packing(run), 2 * run.radius[0], temperature(run), run.mass[0])
+    return enskog(td.packing(run), 2 * run.radius[0], td.temperature(run), run.mass[0])
 
 
 def enskog_by_rate(run: Run) -> tuple[float, float]:
     """Diffusion coefficient and kinematic viscosity of equal disks, with the Z of their rate."""
-    diameter, kt, mass = 2 * run.radius[0], temperature(run), run.mass[0]
-    unit = hard_disks.collision_rate(2.0, diameter, free_disks(run), kt, mass)
-    state = (1 + 1 / (mean_free_time(run) * unit), packing(run), diameter, kt, mass)
+    diameter, kt, mass = 2 * run.radius[0], td.temperature(run), run.mass[0]
+    unit = hard_disks.collision_rate(2.0, diameter, td.free_disks(run), kt, mass)
+    state = (1 + 1 / (td.mean_free_time(run) * unit), td.packing(run), diameter, kt, mass)
     return hard_disks.enskog_diffusion(*state), hard_disks.enskog_viscosity(*state)
 
 
@@ -265,7 +257,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     for name in MOMENTS:
         members, slopes = [], []
         for run, (step, one) in zip(runs, each, strict=True):
-            kt = temperature(run)
+            kt = td.temperature(run)
             unit = float(np.prod(run.edges)) * (kt**2 if name == "conductivity" else kt)
             unit = 1 / unit / enskog_of(run)[name]
             members.append(coefficient(one[name], step, lag).scaled(unit))
@@ -294,7 +286,7 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
     units = [1 / enskog_of(run)["D"] for run in runs]
     members = [diffusion(*one, lag)[1].scaled(unit) for one, unit in zip(pairs, units, strict=True)]
     slopes = [integrated_memory(*one, at) * unit for one, unit in zip(pairs, units, strict=True)]
-    step = np.mean([(run.time[1] - run.time[0]) / mean_free_time(run) for run in runs])
+    step = np.mean([(run.time[1] - run.time[0]) / td.mean_free_time(run) for run in runs])
     return Found(members, Curve(at * step, *estimate(slopes)), lag * step)
 
 
@@ -302,5 +294,5 @@ def coefficients(runs: list[Run], skip: float | None) -> dict[str, Found]:
     """All coefficients at one packing fraction."""
     for run in runs:
         check(run)
-    starts = [start_of_equilibrium(run, skip) for run in runs]
+    starts = [td.start_of_equilibrium(run, skip) for run in runs]
     return of_moments(runs, starts) | {"D": of_displacements(runs, starts)}

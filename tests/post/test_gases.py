@@ -122,27 +122,6 @@ def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
     assert td.temperature(stopped) == pytest.approx(expected), "an obstacle takes all"
 
 
-@pytest.mark.parametrize(
-    ("script", "system"),
-    [
-        *((name, "wall") for name in ("rates", "equation_of_state")),
-        *((name, "periodic") for name in ("melting", "coverage")),
-    ],
-)
-def test_a_gas_that_walls_cool_has_no_equilibrium(simulated, tmp_path, capsys, script, system):
-    """Its disks are elastic; the walls, or an obstacle in a periodic box, take energy."""
-    text = f"""&box boundary = '{system}', '{system}' /
-    &species count = 64 radius = 0.02 temperature = 1 /
-    &contact restitution = 1 wall_restitution = 0.9 / &stop collisions_per_disk = 40 /
-    &output frames_every_time = 0.05 observables_every_time = 0.05 /"""
-    text += (system == "periodic") * "&obstacle centre = 0.5, 0.5 radius = 0.1 /"
-    seeds = range(1, 11 if script == "coverage" else 2)
-    runs = [simulated(text, f"{seed}", f"run.seed={seed}") for seed in seeds]
-    assert run_script(script, *runs, "-o", tmp_path / "no.png") == 2
-    said = capsys.readouterr().err
-    assert "1.h5: is not elastic: it loses energy in collisions" in said and said.count("\n") == 1
-
-
 def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
     """Of twelve gases whose pressure scatters without a memory, as the naive errors have it."""
     runs = []

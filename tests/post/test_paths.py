@@ -25,8 +25,7 @@ SYSTEMS = {
     "&side name = 'left' restitution = 0.3 /\n" + SHAPES.replace("/", "restitution = 0.7 /", 1),
     "container": "&obstacle name = 'c' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n",
     "grains": "&contact restitution = 0.9 tangential_restitution = 0.5 friction = 0.3\n"
-    "wall_rule = 'normal' /\n"
-    + SHAPES,
+    "wall_rule = 'normal' /\n" + SHAPES,
     "driven": "&side name = 'left' temperature = 2 /\n"
     "&side name = 'top' temperature = 1 speed = 3 /\n"
     + SHAPES.replace("/", "temperature = 3 /", 1),
