@@ -60,21 +60,9 @@ def test_disks_in_the_file_of_a_run_need_no_count(onward, tmp_path):
         assert packing == pytest.approx(150 * math.pi * 0.02**2)
 
 
-@pytest.mark.parametrize(
-    ("lines", "count"), [("0.2 0.2\n# x\n\n .5,0.5 # y\n0.7 0.7", 3), ("1e-1 .1 1 0\n", 1)]
-)
-def test_disks_in_a_text_need_no_count(ricochet, tmp_path, lines, count):
-    (tmp_path / "disks").write_text(lines)
-    text = "&species radius = 0.05 file = 'disks' velocities = 'rest' / &stop time = 1 /"
-    write_input(tmp_path, text)
-    run = ricochet("gas.nml", "-o", "gas.h5")
-    assert run.returncode == FINISHED and f"disks = {count}\n" in run.stdout
-
-
 @pytest.mark.parametrize("size", [0.9, 1.3])
 def test_positions_are_stretched_to_another_box(onward, tmp_path, size):
-    radius = 0.01
-    assert onward(size, radius, "scale_positions = .true.").returncode == FINISHED
+    assert onward(size, 0.01, "scale_positions = .true.").returncode == FINISHED
     (x, v), (y, w) = last_and_first(tmp_path)
     assert np.allclose(y, size * x, rtol=1e-14) and (v == w).all()
 
@@ -91,27 +79,28 @@ def test_disks_that_a_smaller_box_makes_overlap_are_named(onward):
 
 def test_disks_grow_from_the_places_in_a_file(ricochet, tmp_path):
     """A crystal stays one: its disks stay on their sites while it is compressed and grown."""
-    box = f"&box boundary = 'periodic', 'periodic' upper = 10, {5 * math.sqrt(3)!r} /\n"
+    box = "&box boundary = 'periodic', 'periodic' upper = {!r}, {!r} /\n"
+    edges = np.array([10, 5 * math.sqrt(3)])
     light = "&species name = 'light' count = 100 packing_fraction = 0.75 placement = 'lattice'"
-    light += " temperature = 1 /\n"
-    write_input(tmp_path, box + light + "&stop collisions_per_disk = 20 /\n")
-    assert ricochet("gas.nml", "-o", "gas.h5", "--force").returncode == FINISHED
-    box = f"&box boundary = 'periodic', 'periodic' upper = 20, {10 * math.sqrt(3)!r} /\n"
-    radius = math.sqrt(0.84 / 0.75) * 2 * math.sqrt(0.75 * 50 * math.sqrt(3) / (100 * math.pi))
+    light += " temperature = 1 / &stop collisions_per_disk = 20 /"
+    write_input(tmp_path, box.format(*map(float, edges)) + light)
+    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
+    edges, radius = 2 * edges, math.sqrt(0.84 * 4 * np.prod(edges) / (100 * math.pi))
     grown = "&species name = 'light' file = 'gas.h5' placement = 'grown' scale_positions = .true."
-    write_input(tmp_path, box + grown + f" radius = {radius} / &stop time = 0 /\n", "next.nml")
+    grown += f" radius = {radius} / &stop time = 0 /"
+    write_input(tmp_path, box.format(*map(float, edges)) + grown, "next.nml")
     assert ricochet("next.nml", "-o", "next.h5").returncode == FINISHED
     (x, v), (y, w) = last_and_first(tmp_path)
-    edges = np.array([20, 10 * math.sqrt(3)])
     assert (v == w).all()
-    moved = y - 2 * x
-    moved -= np.round(moved / edges) * edges
-    moved -= np.median(moved, axis=0)
-    moved -= np.round(moved / edges) * edges
-    assert np.hypot(*moved.T).max() < 1  # half a spacing
-    apart = y[:, None] - y
-    apart -= np.round(apart / edges) * edges
-    assert (np.hypot(*apart.T) + 9 * np.eye(100)).min() > 2 * radius * (1 - 1e-12)
+    moved = nearest(y - 2 * x, edges)
+    assert np.hypot(*nearest(moved - np.median(moved, axis=0), edges).T).max() < 1  # half a spacing
+    apart = np.hypot(*nearest(y[:, None] - y, edges).T)
+    assert (apart + 9 * np.eye(100)).min() > 2 * radius * (1 - 1e-12)
+
+
+def nearest(vector, edges):
+    """To the nearest image."""
+    return vector - np.round(vector / edges) * edges
 
 
 def test_what_cannot_grow_is_told(onward):
@@ -119,38 +108,14 @@ def test_what_cannot_grow_is_told(onward):
     assert run.returncode == USAGE and "of the wanted packing 0.88" in one_line(run)
 
 
-@pytest.mark.parametrize("place", [-0.1, 1.5, 1e9, 1e99])
-def test_a_disk_that_is_to_grow_outside_its_region_is_named(onward, tmp_path, place):
-    assert onward(1, 0.02).returncode == FINISHED
-    with h5py.File(tmp_path / "gas.h5", "r+") as file:
-        file["particles/disks/position/value"][-1, 3, 0] = place
-    run = onward(1, 0.021, "placement = 'grown'")
-    assert run.returncode == USAGE
-    assert "gas.h5" in one_line(run) and "disk 4 at" in run.stderr
-    assert "is not wholly in its region" in run.stderr
-
-
-@pytest.mark.parametrize("box", ["wall", "periodic"])
-def test_a_temperature_is_exact_if_wanted(ricochet, tmp_path, box):
-    text = GAS.replace("'periodic', 'periodic'", f"'{box}', '{box}'")
-    write_input(tmp_path, text)
-    exact = [f"species.{name}.exact_temperature={t}" for name, t in [("light", 2), ("heavy", 0.5)]]
-    options = [word for value in exact for word in ("--set", value)]
-    assert ricochet("gas.nml", "-o", "sampled.h5").returncode == FINISHED
-    assert ricochet("gas.nml", "-o", "exact.h5", *options).returncode == FINISHED
-    for name, temperature in [("light", 2), ("heavy", 0.5)]:
-        assert abs(observable(tmp_path / "sampled.h5", f"{name}/temperature") - 1) > 1e-3
-        found = observable(tmp_path / "exact.h5", f"{name}/temperature")
-        assert found == pytest.approx(temperature, rel=1e-13)
-    momenta = [observable(tmp_path / f"{name}.h5", "momentum") for name in ("exact", "sampled")]
-    assert np.allclose(*momenta, atol=1e-12)
-
-
-def test_velocities_from_a_file_are_scaled_to_an_exact_temperature(onward, tmp_path):
-    assert onward(1, 0.02, "exact_temperature = 0.01").returncode == FINISHED
-    for name in ("light", "heavy"):
-        found = observable(tmp_path / "next.h5", f"{name}/temperature")
-        assert found == pytest.approx(0.01, rel=1e-13)
+def test_a_temperature_is_exact_if_wanted(onward, tmp_path):
+    """Of velocities from a file, and of drawn ones, whose mean stays."""
+    for more in ("", "velocities = 'maxwell'"):
+        assert onward(1, 0.02, f"exact_temperature = 0.01 {more}").returncode == FINISHED
+        for name in ("light", "heavy"):
+            found = observable(tmp_path / "next.h5", f"{name}/temperature")
+            assert found == pytest.approx(0.01, rel=1e-13)
+        assert np.allclose(observable(tmp_path / "next.h5", "momentum"), 0, atol=1e-12)
     run = onward(1, 0.02, "exact_temperature = 1 velocities = 'rest'")
     assert run.returncode == USAGE
     assert run.stderr.count("species.exact_temperature: the disks do not move relative") == 2
