@@ -50,7 +50,7 @@ def finished(ricochet, path, *options):
 def test_every_column_arrives_to_the_last_digit(ricochet, tmp_path, bed):
     names, disks = (tmp_path / "bed.txt").read_text().split("\n", 1)
     text = f"# a bed\n{names.upper()}\n\n" + disks.replace(" ", ",\t")
-    (tmp_path / "bed.txt").write_text(text.replace("\n", "\r\n") + "# its end")
+    (tmp_path / "bed.txt").write_text("\ufeff" + text.replace("\n", "\r\n") + "# its end")
     finished(ricochet, "gas.h5")
     run, there = read_run(tmp_path / "gas.h5"), by_species(bed)
     for name in ("radius", "mass"):
