@@ -61,7 +61,7 @@ def main() -> int:
             verdicts.append(verdict)
             print(line(verdict), flush=True)
     seconds = time.monotonic() - begin
-    print(report.summary(verdicts, seconds))
+    print(report.outcome([report.as_data(verdict) for verdict in verdicts], seconds))
     if args.report:
         report.write(args.report, verdicts, version.stdout.split("\n")[0], seconds)
     return 0 if all(verdict.passed for verdict in verdicts) else 1

@@ -7,16 +7,15 @@ import numpy as np
 
 from ricochet import Run
 from ricochet import hard_disks as hd
-from ricochet.statistics import estimate
 from ricochet.thermodynamics import later
 from ricochet.transport import velocity_memory
 
 from .case import Case, Member, within
-from .inputs import gas
+from .estimators import over
+from .inputs import gases
 
 N = 1024
 PACKINGS = (0.05, 0.2, 0.4)
-SEEDS = range(1, 9)
 
 
 def rate(eta: float) -> float:
@@ -25,20 +24,14 @@ def rate(eta: float) -> float:
     return hd.collision_rate(float(hd.simulated_finite(eta, N)), diameter, N - 1)
 
 
-def watched(eta: float, seed: int, step: float, frames: int) -> Member:
+def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, ...]:
     """Frames `step` mean free times apart."""
     interval = step / rate(eta)
-    return Member(
-        gas(
-            N, seed=seed, packing_fraction=eta, periodic=True, temperature=1.0,
-            stop={"time": interval * frames},
-            output={"frames_every_time": interval, "precision": "single", "event_log": step < 1},
-        )
+    return gases(
+        seeds, N, packing_fraction=eta, periodic=True, temperature=1.0,
+        stop={"time": interval * frames},
+        output={"frames_every_time": interval, "precision": "single", "event_log": step < 1},
     )  # fmt: skip
-
-
-def memory(eta: float) -> tuple[Member, ...]:
-    return tuple(watched(eta, seed, 0.25, 500) for seed in SEEDS)
 
 
 def mean_free_time(run: Run) -> float:
@@ -52,9 +45,6 @@ def half_and_one(run: Run) -> list[float]:
     t = lags * (run.time[1] - run.time[0]) / mean_free_time(run)
     psi = velocity_memory(run, later(run, None, cool=False), lags)
     return list(np.exp(np.interp((0.5, 1.0), t, np.log(psi))))
-
-
-SPREAD = tuple(watched(0.05, seed, 1.0, 1200) for seed in range(1, 7))
 
 
 def enskog_ratio(run: Run) -> float:
@@ -73,14 +63,14 @@ CASES = [
     *[
         Case(
             "P14-01", f"packing {eta}: velocity autocorrelation at w t = .5, 1",
-            memory(eta), lambda *runs: estimate([half_and_one(run) for run in runs]),
+            watched(8, eta, 0.25, 500), over(half_and_one),
             [0.609, 0.3755], within(0.01), "D, R",
         )
         for eta in PACKINGS
     ],
     Case(
         "P14-02", "packing .05: diffusion at w t = 8 to 28 over Enskog's",
-        SPREAD, lambda *runs: estimate([enskog_ratio(run) for run in runs]),
+        watched(6, 0.05, 1.0, 1200), over(enskog_ratio),
         1.05, within(0.04), "D, R",
     ),
 ]  # fmt: skip

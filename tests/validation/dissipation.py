@@ -7,11 +7,10 @@ import numpy as np
 
 from ricochet import Run
 from ricochet import hard_disks as hd
-from ricochet.statistics import Estimate, estimate
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
-from .estimators import at_collisions
-from .inputs import PERIODIC, disk, gas, namelist
+from .estimators import at_collisions, each, over
+from .inputs import PERIODIC, disk, gases, light_and_heavy, namelist
 from .laws import cooling_ratio
 
 # --- one kind of disk ---
@@ -21,15 +20,10 @@ ETA = 0.02
 
 def cooling(xi: float, tau: float) -> tuple[Member, ...]:
     """Thirty gases that start in equilibrium."""
-    return tuple(
-        Member(
-            gas(
-                1000, seed=seed, packing_fraction=ETA, periodic=True, temperature=1.0,
-                contact={"restitution": xi}, stop={"collisions_per_disk": tau},
-                output={"observables_every_collisions": 50},
-            )
-        )
-        for seed in range(1, 31)
+    return gases(
+        30, 1000, packing_fraction=ETA, periodic=True, temperature=1.0,
+        contact={"restitution": xi}, stop={"collisions_per_disk": tau},
+        output={"observables_every_collisions": 50},
     )  # fmt: skip
 
 
@@ -52,13 +46,12 @@ def left_at_time(run: Run, w0_t: float) -> float:
 
 
 ENDLESS = tuple(
-    Member(
-        gas(
-            100, seed=seed, packing_fraction=0.05, periodic=True, contact={"restitution": xi},
-            stop={"collisions": 10**9}, output={"observables_every_collisions": 1000},
-        )
-    )
+    member
     for seed, xi in ((1, 0.8), (2, 0.6))
+    for member in gases(
+        (seed,), 100, packing_fraction=0.05, periodic=True, contact={"restitution": xi},
+        stop={"collisions": 10**9}, output={"observables_every_collisions": 1000},
+    )
 )  # fmt: skip
 
 
@@ -73,15 +66,10 @@ SLOW = 0.99999
 
 def slow_loss(rule: str) -> tuple[Member, ...]:
     """Walls that take so little that the gas stays in equilibrium."""
-    return tuple(
-        Member(
-            gas(
-                1000, seed=seed, radius=0.001, temperature=1.0,
-                contact={"restitution": 1, "wall_restitution": SLOW, "wall_rule": rule},
-                stop={"collisions_per_disk": 400}, output={"observables_every_collisions": 5000},
-            )
-        )
-        for seed in range(1, 31)
+    return gases(
+        30, 1000, radius=0.001, temperature=1.0,
+        contact={"restitution": 1, "wall_restitution": SLOW, "wall_rule": rule},
+        stop={"collisions_per_disk": 400}, output={"observables_every_collisions": 5000},
     )  # fmt: skip
 
 
@@ -96,24 +84,24 @@ GAS = [
     *[
         Case(
             "P9-01", f"cooling, restitution {xi}: K / K0 after {tau} collisions per disk",
-            COOLING[xi], lambda *runs, tau=tau: estimate([left(run, tau) for run in runs]),
+            COOLING[xi], over(lambda run, tau=tau: left(run, tau)),
             hd.haff_by_collisions(tau, xi), relative(0.03), "van Noije and Ernst; R",
         )
         for xi, tau in ((0.9, 10), (0.9, 20), (0.8, 10))
     ],
     Case(
         "P9-02", "cooling, restitution 0.9: K / K0 at w0 t = 12.8",
-        COOLING[0.9], lambda *runs: estimate([left_at_time(run, 12.8) for run in runs]),
+        COOLING[0.9], over(lambda run: left_at_time(run, 12.8)),
         hd.haff_by_time(12.8, 0.9), relative(0.015), "Haff 1983; R",
     ),
     Case(
         "P9-12", "cooling without end: ends by itself, decades that T has fallen",
-        ENDLESS, lambda *runs: [fall(run) for run in runs], 26, within(1), "D",
+        ENDLESS, each(fall), 26, within(1), "D",
     ),
     *[
         Case(
             "P9-04", f"walls, rule '{rule}': mean loss per hit over (1 - xi^2) kT",
-            slow_loss(rule), lambda *runs: estimate([loss_per_hit(run) for run in runs]),
+            slow_loss(rule), over(loss_per_hit),
             share * 2000 / 2001, sigmas(3, 0.01), "D",
         )
         for rule, share in (("velocity", 1.5), ("normal", 1.0))
@@ -123,55 +111,43 @@ GAS = [
 # --- mixture ---
 
 
-def mixture(xi: float, seed: int, walls: bool) -> Member:
-    disks = {"count": 500, "radius": 0.004 if walls else 0.001, "speed": 1.0}
-    return Member(
-        namelist(
-            run={"seed": seed}, box={} if walls else PERIODIC,
-            species=[{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}],
-            contact={"restitution": xi}, stop={"collisions_per_disk": 20},
-            output={"observables_every_collisions": 100},
-        )
+def mixtures(xi: float, seeds: int, radius: float, **box) -> tuple[Member, ...]:
+    return light_and_heavy(
+        seeds, radius, box=box, contact={"restitution": xi}, stop={"collisions_per_disk": 20},
+        output={"observables_every_collisions": 100},
     )  # fmt: skip
 
 
-def mixtures(xi: float, walls: bool = False, seeds: int = 16) -> tuple[Member, ...]:
-    return tuple(mixture(xi, seed, walls) for seed in range(1, seeds + 1))
-
-
-def temperature_ratio(*runs: Run) -> Estimate:
+def temperature_ratio(run: Run) -> float:
     """K_heavy / K_light from 10 to 20 collisions per disk."""
-    tau = np.linspace(10, 20, 21)
-    parts = [
-        np.mean(
-            at_collisions(run, "heavy/kinetic_energy", tau)
-            / at_collisions(run, "light/kinetic_energy", tau)
-        )
-        for run in runs
-    ]
-    return estimate(parts)
+    heavy, light = (
+        at_collisions(run, f"{name}/kinetic_energy", np.linspace(10, 20, 21))
+        for name in ("heavy", "light")
+    )
+    return float(np.mean(heavy / light))
 
 
 def steps(*runs: Run) -> float:
     """Smallest rise of the ratio from one of three groups of runs to the next, in its errors."""
-    groups = [temperature_ratio(*part) for part in np.array_split(np.array(runs, object), 3)]
+    ratio, third = over(temperature_ratio), len(runs) // 3
+    groups = [ratio(*runs[k : k + third]) for k in range(0, len(runs), third)]
     return min((b.mean - a.mean) / np.hypot(a.error, b.error) for a, b in pairwise(groups))
 
 
-EXAM = mixtures(1.0, True) + mixtures(0.9, True) + mixtures(0.8, True)
+EXAM = tuple(member for xi in (1.0, 0.9, 0.8) for member in mixtures(xi, 16, 0.004))
 MIXTURE = [
     Case(
         "P9-05", "mixture between walls: ratio rises from xi = 1 to .9 to .8, in its errors",
         EXAM, steps, 3, AT_LEAST, "EX; Garzo and Dufty 1999",
     ),
     Case(
-        "P9-05", "the same, xi = 1: K_heavy / K_light after 10 collisions per disk",
-        EXAM[:16], temperature_ratio, 1, relative(0.03), "D",
+        "P9-05", "mixture between walls, xi = 1: K_heavy / K_light after 10 collisions per disk",
+        EXAM[:16], over(temperature_ratio), 1, relative(0.03), "D",
     ),
     *[
         Case(
             "P9-06", f"dilute periodic mixture, xi = {xi}: K_heavy / K_light",
-            mixtures(xi, seeds=64), temperature_ratio, cooling_ratio(4, xi),
+            mixtures(xi, 64, 0.001, **PERIODIC), over(temperature_ratio), cooling_ratio(4, xi),
             relative(0.03), "Garzo and Dufty 1999; D",
         )
         for xi in (0.9, 0.8)
@@ -201,13 +177,12 @@ def flagged(run: Run) -> np.ndarray:
 
 FLAG_TIMES = (0.01, 0.05, 0.1, 0.2, 0.5, 1, 2)
 ELASTIC = tuple(
-    Member(
-        gas(
-            1000, packing_fraction=eta, periodic=True, temperature=1.0,
-            stop={"collisions_per_disk": 400}, output={"event_log": True},
-        )
-    )
+    member
     for eta in (0.05, 0.1)
+    for member in gases(
+        1, 1000, packing_fraction=eta, periodic=True, temperature=1.0,
+        stop={"collisions_per_disk": 400}, output={"event_log": True},
+    )
 )  # fmt: skip
 
 
@@ -218,13 +193,14 @@ def flag_fractions(run: Run) -> np.ndarray:
     return np.mean(since[:, None] < FLAG_TIMES, axis=0)
 
 
-def flagged_gas(contact_time: float, seed: int = 1) -> Member:
-    return Member(
-        gas(
-            100, seed=seed, radius=0.02, contact={"restitution": 0.5, "contact_time": contact_time},
-            stop={"events": 2000}, output={"observables_every_events": 1, "event_log": True},
-        )
-    )  # fmt: skip
+FLAGGED = tuple(
+    member
+    for contact_time in (0.01, 1e-3, 1e9)
+    for member in gases(
+        1, 100, radius=0.02, contact={"restitution": 0.5, "contact_time": contact_time},
+        stop={"events": 2000}, output={"observables_every_events": 1, "event_log": True},
+    )
+)  # fmt: skip
 
 
 def wrong_flags(run: Run) -> int:
@@ -236,17 +212,12 @@ def wrong_flags(run: Run) -> int:
 TC = [
     Case(
         "P9-07", "packing .05, .1: collisions less than t_c after another, w t_c = .01 to 2",
-        ELASTIC, lambda *runs: np.ravel([flag_fractions(run) for run in runs]),
+        ELASTIC, each(flag_fractions),
         2 * [0.0186, 0.090, 0.172, 0.32, 0.62, 0.86, 0.98], within(0.01), "R",
     ),
     Case(
-        "P9-07", "TC model: events that are elastic and should not be, or the other way",
-        (flagged_gas(0.01), flagged_gas(1e-3)), lambda *runs: [wrong_flags(run) for run in runs],
-        [0, 0], EXACT, "Luding and McNamara 1998",
-    ),
-    Case(
-        "P9-08", "the same, t_c without limit: elastic from the second collision on",
-        (flagged_gas(1e9),), wrong_flags, 0, EXACT, "D",
+        "P9-07", "TC model, t_c up to no limit: events that are wrongly elastic, or wrongly not",
+        FLAGGED, each(wrong_flags), 0, EXACT, "Luding and McNamara 1998",
     ),
 ]  # fmt: skip
 
@@ -289,12 +260,12 @@ FIRST_SIX = [
 COLLAPSE = [
     Case(
         "P9-10", "three on a line, 1.03 and 1.4 of the critical xi: they part, with a speed of",
-        symmetric(1.03, 1.4), lambda *runs: [spread(run) for run in runs], 1e-12, AT_LEAST,
+        symmetric(1.03, 1.4), each(spread), 1e-12, AT_LEAST,
         "Bernu and Mazighi 1990",
     ),
     Case(
-        "P9-10", "the same, 0.97 and 0.7 of it: they collapse, the run ends, speed left",
-        symmetric(0.97, 0.7), lambda *runs: [spread(run) for run in runs], 1e-16, AT_MOST,
+        "P9-10", "three on a line, 0.97 and 0.7 of the critical xi: they collapse, speed left",
+        symmetric(0.97, 0.7), each(spread), 1e-16, AT_MOST,
         "Bernu and Mazighi 1990",
     ),
     Case(
@@ -302,7 +273,7 @@ COLLAPSE = [
         (COLLAPSED,), lambda run: run.events.time[:6], FIRST_SIX, within(1e-12), "D, 120 digits",
     ),
     Case(
-        "P9-11", "the same: time, velocities, place of the collapse",
+        "P9-11", "xi = .05: time, velocities, place of the collapse",
         (COLLAPSED,),
         lambda run: [run.events.time[26], *run.velocity[-1][:, 0], run.position[27][1, 0]],
         [7 / 45, 1 / 6, 1 / 6, 1 / 6, 0.525925925925926], within(1e-9), "D, 120 digits",

@@ -12,7 +12,7 @@ from ricochet.transport import MOMENTS, of_moments
 
 from .case import AT_LEAST, Case, Member, sigmas, within
 from .estimators import over
-from .inputs import PERIODIC, gas, namelist
+from .inputs import PERIODIC, ensemble, gases
 
 # --- one disk between a hot and a cold wall, which its centre finds 1 apart ---
 
@@ -23,21 +23,16 @@ FLUX = sqrt(2 / pi) * sqrt(HOT * COLD) * (sqrt(HOT) - sqrt(COLD))
 def between_walls(turning: bool) -> tuple[Member, ...]:
     """A disk, smooth or with a spin, in a box that is periodic along the walls."""
     spin = {"angular_velocity": 1.0} if turning else {}
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (1.2, 1), "boundary": ("wall", "periodic")},
-                side=[
-                    {"name": "left", "temperature": HOT},
-                    {"name": "right", "temperature": COLD},
-                ],
-                species={"name": "gas", "count": 1, "radius": 0.1, "temperature": 2.0, **spin},
-                stop={"time": 40000},
-                output={"frames_every_time": 40000, "observables_every_time": 4000},
-            )
-        )
-        for seed in range(1, 11)
+    return ensemble(
+        10,
+        box={"upper": (1.2, 1), "boundary": ("wall", "periodic")},
+        side=[
+            {"name": "left", "temperature": HOT},
+            {"name": "right", "temperature": COLD},
+        ],
+        species={"name": "gas", "count": 1, "radius": 0.1, "temperature": 2.0, **spin},
+        stop={"time": 40000},
+        output={"frames_every_time": 40000, "observables_every_time": 4000},
     )
 
 
@@ -55,18 +50,13 @@ def flux(run: Run) -> float:
 # --- a gas between walls of one temperature ---
 
 KT, COUNT = 2.0, 50
-HEATED = tuple(
-    Member(
-        namelist(
-            run={"seed": seed},
-            box={"upper": (20, 20), "boundary": ("wall", "periodic")},
-            side=[{"name": side, "temperature": KT} for side in ("left", "right")],
-            species={"name": "gas", "count": COUNT, "radius": 0.5, "temperature": KT},
-            stop={"time": 4000},
-            output={"frames_every_time": 100, "observables_every_time": 2},
-        )
-    )
-    for seed in range(1, 11)
+HEATED = ensemble(
+    10,
+    box={"upper": (20, 20), "boundary": ("wall", "periodic")},
+    side=[{"name": side, "temperature": KT} for side in ("left", "right")],
+    species={"name": "gas", "count": COUNT, "radius": 0.5, "temperature": KT},
+    stop={"time": 4000},
+    output={"frames_every_time": 100, "observables_every_time": 2},
 )
 
 
@@ -90,21 +80,16 @@ ETA, ROUGH_COUNT = 0.0025, 20000  # the references are those of the dilute limit
 def cooling(xi: float, beta: float) -> tuple[Member, ...]:
     """Dilute gases that start with the proportion of temperatures that they are to keep."""
     edge = sqrt(ROUGH_COUNT * pi / 4 / ETA)
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (edge, edge), **PERIODIC},
-                species={
-                    "name": "gas", "count": ROUGH_COUNT, "radius": 0.5, "temperature": 1.0,
-                    "rotational_temperature": ROUGH_RATIOS[xi, beta],
-                },
-                contact={"restitution": xi, "tangential_restitution": beta},
-                stop={"collisions_per_disk": 10},
-                output={"observables_every_collisions": 2000},
-            )
-        )
-        for seed in range(1, 7)
+    return ensemble(
+        6,
+        box={"upper": (edge, edge), **PERIODIC},
+        species={
+            "name": "gas", "count": ROUGH_COUNT, "radius": 0.5, "temperature": 1.0,
+            "rotational_temperature": ROUGH_RATIOS[xi, beta],
+        },
+        contact={"restitution": xi, "tangential_restitution": beta},
+        stop={"collisions_per_disk": 10},
+        output={"observables_every_collisions": 2000},
     )  # fmt: skip
 
 
@@ -122,18 +107,13 @@ def ratio(run: Run) -> float:
 
 def flowing(eta: float) -> tuple[Member, ...]:
     """Runs with all that the Helfand moments take."""
-    return tuple(
-        Member(
-            gas(
-                512, seed=seed, packing_fraction=eta, periodic=True, temperature=1.0,
-                stop={"collisions_per_disk": 2500},
-                output={
-                    "frames_every_collisions": 640000, "observables_every_collisions": 512,
-                    "event_log": True, "virial_tensor": True,
-                },
-            )
-        )
-        for seed in range(1, 9)
+    return gases(
+        8, 512, packing_fraction=eta, periodic=True, temperature=1.0,
+        stop={"collisions_per_disk": 2500},
+        output={
+            "frames_every_collisions": 640000, "observables_every_collisions": 512,
+            "event_log": True, "virial_tensor": True,
+        },
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from .case import Member
+
 EVERY_EVENT = {"frames_every_events": 1, "observables_every_events": 1, "event_log": True}
 PERIODIC = {"boundary": ("periodic", "periodic")}
 ROOT_2 = 1.4142135623730951  #: speed at which K = m, so kT = 1
@@ -28,23 +30,30 @@ def written(value: object) -> str:
     return repr(int(value)) if isinstance(value, int) else repr(float(value))
 
 
-def gas(count: int, *, seed: int = 1, stop: dict, output: dict | None = None, **more) -> str:
+def ensemble(seeds: int | Iterable[int], *, run: dict = {}, **groups) -> tuple[Member, ...]:  # noqa: B006
+    """Runs of one input with these seeds; a number stands for those from 1 on."""
+    seeds = range(1, seeds + 1) if isinstance(seeds, int) else seeds
+    return tuple(Member(namelist(run={"seed": seed} | run, **groups)) for seed in seeds)
+
+
+def gases(seeds: int | Iterable[int], count: int, *, periodic=False, **more) -> tuple[Member, ...]:
     """`count` equal disks, speeds sqrt 2, so kT = 1 between walls.
 
-    `more` goes to the group of that name, such as box or contact, or else to the species.
+    `more` goes to the group of that name, such as stop or contact, or else to the species.
     """
-    species = {"name": "gas", "count": count, "speed": ROOT_2}
-    groups = {"run": {"seed": seed}, "box": {}, "species": species, "contact": {}}
-    if more.pop("periodic", False):
-        groups["box"].update(PERIODIC)
-    for key, value in more.items():
-        if isinstance(value, dict):
-            groups.setdefault(key, {}).update(value)
-        else:
-            species[key] = value
-    if "temperature" in species:
-        del species["speed"]
-    return namelist(**groups, stop=stop, output=output or {})
+    groups = {"box": PERIODIC if periodic else {}}
+    groups |= {key: value for key, value in more.items() if isinstance(value, dict)}
+    own = {key: value for key, value in more.items() if key not in groups}
+    speed = {} if "temperature" in own else {"speed": ROOT_2}
+    species = {"name": "gas", "count": count} | speed | own
+    return ensemble(seeds, species=species, **groups)
+
+
+def light_and_heavy(seeds: int | Iterable[int], radius: float, **groups) -> tuple[Member, ...]:
+    """A gas of equal sizes and speeds, half of it with four times the mass of the others."""
+    disks = {"count": 500, "radius": radius, "speed": 1.0}
+    species = [{"name": "light", **disks}, {"name": "heavy", "mass": 4.0, **disks}]
+    return ensemble(seeds, species=species, **groups)
 
 
 def disk(position: tuple, velocity: tuple, radius: float, mass: float = 1.0) -> dict:

