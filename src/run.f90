@@ -246,8 +246,8 @@ contains
       text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
         eol//"collisions = "//written(sim%tally%collisions)// &
-        eol//"wall_collisions = "//written(sum(sim%tally%surface(:n_sides)%collisions))// &
-        eol//"obstacle_collisions = "//written(sum(sim%tally%surface(n_sides + 1:)%collisions))// &
+        eol//"wall_collisions = "//written(sum(sim%tally%hits(:n_sides)))// &
+        eol//"obstacle_collisions = "//written(sum(sim%tally%hits(n_sides + 1:)))// &
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
         eol//"total_energy = "//written(total_energy(sim))// &

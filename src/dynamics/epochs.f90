@@ -2,7 +2,7 @@
 !> to go on from it agree.
 module epochs
   use box_sides, only: keep_off_sides
-  use disks, only: columns, n_fixed
+  use disks, only: columns
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
@@ -100,7 +100,7 @@ contains
     integer, allocatable :: moments(:)            ! rows of `extra`
     integer(int32) :: i
 
-    moments = pack(sim%extra_row, sim%extra_row > 0 .and. columns(n_fixed + 1:)%is_moment)
+    moments = pack(sim%row, sim%row > 0 .and. columns%is_moment)
     do i = 1, sim%n_disks()
       sim%disk(i)%clock = sim%disk(i)%clock - shift
       sim%disk(i)%stamp = 0

@@ -76,7 +76,7 @@ contains
     type(random_stream_t) :: stream
     real(real64) :: z(2)
 
-    associate (drive => sim%drive, angle => sim%extra(sim%extra_row(angle_column), i))
+    associate (drive => sim%drive, angle => sim%extra(sim%row(angle_column), i))
       call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
       call stream%draw_normals(z)
       angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
@@ -95,7 +95,7 @@ contains
       if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
       call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
       call stream%draw_uniform(u)
-      sim%extra(sim%extra_row(angle_column), i) = 2*pi*u
+      sim%extra(sim%row(angle_column), i) = 2*pi*u
     end do
   end subroutine orient
 
@@ -117,7 +117,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: omega            !! [1/time]
 
-    associate (before => sim%extra(sim%extra_row(spin_column), i))
+    associate (before => sim%extra(sim%row(spin_column), i))
       call sim%tally%sum(drive_energy)%add(0.5_real64*sim%inertia_of(i)*(omega - before)*(omega + before))
       before = omega
     end associate

@@ -6,11 +6,11 @@
 !> A finished file keeps one. In that of a run that broke off there is none.
 module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int64, real64
+  use kinds, only: int32, int64, real64
   use build_info, only: build_flags
   use cadence, only: cadence_t
   use checksums, only: checksum
-  use disks, only: mass_column, n_columns, radius_column
+  use disks, only: mass_column, n_columns
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: checkpoint_group, parameters_group
@@ -361,8 +361,6 @@ contains
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: settled
-    real(real64), allocatable :: mass(:)
-    integer :: k
 
     call record%exchange(sim%epoch)
     call record%exchange(sim%now)
@@ -378,33 +376,65 @@ contains
     call record%exchange(sim%start_energy)
     call record%exchange(sim%kicks)
     call exchange_tally(record, sim)
+    call exchange_disks(record, sim)
+  end subroutine exchange_state
+
+  !> Writes or reads the disks.
+  subroutine exchange_disks(record, sim)
+    type(record_t), intent(inout) :: record
+    type(simulation_t), intent(inout) :: sim
+    real(real64), allocatable :: mass(:)
+    integer :: k
+
+    associate (disk => sim%disk, tag => sim%tag)
+      call record%exchange(disk%x(1))
+      call record%exchange(disk%x(2))
+      call record%exchange(disk%v(1))
+      call record%exchange(disk%v(2))
+      call record%exchange(disk%clock)
+      call exchange_short(record, tag%species)
+      call exchange_short(record, tag%id)
+      call record%exchange(tag%collisions)
+      call exchange_short(record, tag%met)
+      if (sim%with%own_sizes) call record%exchange(disk%radius)      ! else sizes follow from the input
+    end associate
     do k = 1, n_columns
-      if (.not. sim%has_column(k) .or. k == mass_column) cycle
-      if (k == radius_column .and. .not. sim%with%own_sizes) cycle        ! it follows from the input
-      call exchange_column(record, sim, k)
+      if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(sim%extra(sim%row(k), :))
     end do
     if (.not. sim%with%own_sizes) return
     mass = sim%masses()                         ! there is no column of them if they turn out to be equal
     call record%exchange(mass)
     if (record%way /= reading) return
-    sim%extra(sim%extra_row(mass_column), :) = mass
+    sim%extra(sim%row(mass_column), :) = mass
     call sim%settle_masses()
-  end subroutine exchange_state
+  end subroutine exchange_disks
+
+  !> Writes or reads integers of half a word.
+  subroutine exchange_short(record, values)
+    type(record_t), intent(inout) :: record
+    integer(int32), intent(inout) :: values(:)
+    integer(int64) :: words(size(values))
+
+    words = values
+    call record%exchange(words)
+    values = int(words, int32)
+  end subroutine exchange_short
 
   !> Writes or reads what collisions have gathered.
   subroutine exchange_tally(record, sim)
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
+    integer :: k
 
     call sim%tally%make_room(size(sim%box%surface))
     associate (tally => sim%tally)
       call record%exchange(tally%events)
       call record%exchange(tally%collisions)
       call exchange_sums(record, tally%sum)
-      call record%exchange(tally%surface%collisions)
-      call exchange_sums(record, tally%surface%impulse(1))
-      call exchange_sums(record, tally%surface%impulse(2))
-      call exchange_sums(record, tally%surface%energy)
+      call record%exchange(tally%hits)
+      do k = 1, size(tally%at_surface, 1)
+        call exchange_sums(record, tally%at_surface(k, :))
+      end do
     end associate
   end subroutine exchange_tally
 
@@ -423,18 +453,6 @@ contains
       sums(k)%units = transfer(halves(2*k - 1:2*k), sums(k)%units)
     end do
   end subroutine exchange_sums
-
-  !> Writes or reads a column of `disks: columns`.
-  subroutine exchange_column(record, sim, k)
-    type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: k
-    real(real64), allocatable :: values(:)
-
-    allocate (values, source=sim%values_of(k))
-    call record%exchange(values)
-    if (record%way == reading) call sim%take_values(k, values)
-  end subroutine exchange_column
 
   !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
   !> follows from them.

@@ -27,9 +27,9 @@ contains
     reals = merge(single_precision, double_precision, single)
     series = [step_and_time(position), series_t(position//value_of, reals, 2, [2, n]), &
       series_t(velocity//value_of, reals, 2, [2, n]), series_t(disk_collisions//value_of, long_integer, 1, [n, 1])]
-    if (sim%has_column(image_column)) series = [series, series_t(image//value_of, long_integer, 2, [2, n])]
+    if (sim%row(image_column) > 0) series = [series, series_t(image//value_of, long_integer, 2, [2, n])]
     do k = 1, n_columns
-      if (in_frames(sim, k)) series = [series, series_t(disks_group//trim(columns(k)%element)//value_of, &
+      if (in_frames(sim, k)) series = [series, series_t(disks_group//trim(columns(k)%name)//value_of, &
         reals, 1, [n, 1])]
     end do
   end function frame_series
@@ -40,7 +40,7 @@ contains
     integer, intent(in) :: k                      !! number in `disks: columns`
     logical :: yes
 
-    yes = columns(k)%element /= "" .and. sim%has_column(k)
+    yes = columns(k)%is_element .and. sim%row(k) > 0
   end function in_frames
 
   !> The frame of this moment, disks in the order of the input.
@@ -53,7 +53,7 @@ contains
     integer :: c, last
 
     n = sim%n_disks()
-    periodic = sim%has_column(image_column)
+    periodic = sim%row(image_column) > 0
     last = 2 + merge(7, 5, periodic)*n
     allocate (sample(last + n*count([(in_frames(sim, c), c=1, n_columns)]), 1))
     sample(:2, 1) = [real(step, real64), sim%time()]

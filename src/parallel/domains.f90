@@ -4,7 +4,7 @@
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
-  use disks, only: disk_t, n_columns, n_fixed, tag_t
+  use disks, only: disk_t, n_columns, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t
@@ -26,7 +26,7 @@ module domains
   type :: news_t
     type(disk_t) :: disk
     type(tag_t) :: tag
-    real(real64) :: extra(n_columns - n_fixed) = 0 !! the optional columns, as many as there are
+    real(real64) :: extra(n_columns) = 0           !! the optional columns, as many as there are
     integer(int32) :: home = 0                     !! number of the disk in the whole simulation
     integer(int32) :: cell(2) = 0                  !! in this domain's patch, or beyond its ends
     integer(int32) :: slot = 0                     !! of the copy; 0: none

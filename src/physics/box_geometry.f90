@@ -12,7 +12,7 @@ module box_geometry
   implicit none
   private
   public :: box_t, surface_t
-  public :: next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, surface_path, free_area
+  public :: next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
 
   !> What a disk bounces off: a side of the box, or an obstacle.
   type :: surface_t
@@ -313,15 +313,6 @@ contains
       end associate
     end if
   end function wall_normal
-
-  !> The name of surface k below /observables.
-  pure function surface_path(box, k) result(path)
-    type(box_t), intent(in) :: box
-    integer, intent(in) :: k
-    character(len=:), allocatable :: path
-
-    path = merge("sides/", "walls/", k <= n_sides)//box%surface(k)%name
-  end function surface_path
 
   !> Where disks can be: the box less the obstacles, or the smallest outline that encloses them.
   pure function free_area(box) result(area)

@@ -1,13 +1,12 @@
-!> What moves, and one table of all numbers that a disk has. The numbers are kept by access: a record of one cache line,
-!> which every prediction reads; a tag of half a line, which is needed only when a disk has an event of its own; and
-!> columns that are there only where something needs them. What is derived is not in the table: it is rebuilt at every
-!> start.
+!> What moves. The numbers of a disk are kept by access: a record of one cache line, which every prediction reads; a tag of
+!> half a line, which is needed only when a disk has an event of its own; and columns that are there only where something
+!> needs them. What is derived is in no checkpoint: it is rebuilt at every start.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
   implicit none
   private
-  public :: column_t, columns, disk_t, n_columns, n_fixed, species_t, tag_t
+  public :: columns, disk_t, species_t, tag_t
   public :: disks_before, land, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
@@ -44,27 +43,23 @@ module disks
     real(real64) :: mass = 1.0_real64           !! of each disk, or the largest [mass]
   end type species_t
 
-  !> A number that every disk has, or that it has only in some simulations: see `simulation_state: choose_columns`.
+  !> A number that disks have only in some simulations.
   type :: column_t
     character(len=16) :: name
     logical :: is_moment = .false.              !! a time since the epoch
-    character(len=20) :: element = ""           !! of frames that have it; position, velocity and image have more to them
+    logical :: is_element = .false.             !! of frames, by this name
     integer :: rate = 0                         !! number of the column by which it grows in time; 0: none
   end type column_t
 
-  !> The table. The first columns are in records and tags, the others are optional.
-  integer, parameter :: n_fixed = 10
-  integer, parameter, public :: radius_column = 6, species_column = 7, id_column = 8, met_column = 10
-  integer, parameter, public :: mass_column = 11, image_column = 12, contact_column = 14, spin_column = 15, angle_column = 16
+  !> The table of these. Which of them there are says `simulation_state: choose_columns`.
+  integer, parameter, public :: mass_column = 1, image_column = 2, contact_column = 4, spin_column = 5, angle_column = 6
   type(column_t), parameter :: columns(*) = [ &
-    column_t("x1"), column_t("x2"), column_t("v1"), column_t("v2"), column_t("clock", is_moment=.true.), &
-    column_t("radius"), column_t("species"), column_t("id"), column_t("collisions"), column_t("met"), &
     column_t("mass"), &                                           ! other than that of the species [mass]
-    column_t("image1"), column_t("image2"), &                     ! periods travelled
+    column_t("image1"), column_t("image2"), &                     ! periods travelled, whole numbers
     column_t("last_contact", is_moment=.true.), &                 ! time of the last collision, for the TC model [time]
-    column_t("angular_velocity", element="angular_velocity"), &   ! [1/time]
-    column_t("orientation", element="orientation", rate=15)]      ! at `clock`, not wrapped [radian]
-  integer, parameter :: n_columns = size(columns)
+    column_t("angular_velocity", is_element=.true.), &            ! [1/time]
+    column_t("orientation", is_element=.true., rate=spin_column)] ! at `clock`, not wrapped [radian]
+  integer, parameter, public :: n_columns = size(columns)
 
 contains
 

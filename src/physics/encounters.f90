@@ -91,9 +91,9 @@ contains
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (sim%extra_row(mass_column) > 0) then               ! as in `mass_of`, with one test for both
-      mass_i = sim%extra(sim%extra_row(mass_column), i)
-      mass_j = sim%extra(sim%extra_row(mass_column), j)
+    if (sim%row(mass_column) > 0) then               ! as in `mass_of`, with one test for both
+      mass_i = sim%extra(sim%row(mass_column), i)
+      mass_j = sim%extra(sim%row(mass_column), j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
@@ -252,7 +252,7 @@ contains
     associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
       d%stamp = d%stamp + 1
-      associate (image => sim%extra(sim%extra_row(image_column) + axis - 1, i))
+      associate (image => sim%extra(sim%row(image_column) + axis - 1, i))
         image = image + period
       end associate
     end associate
@@ -269,7 +269,7 @@ contains
     real(real64) :: v, columns
 
     images = sim%images()
-    associate (d => sim%disk(i), row => sim%extra_row(image_column), length => sim%box%upper(1) - sim%box%lower(1))
+    associate (d => sim%disk(i), row => sim%row(image_column), length => sim%box%upper(1) - sim%box%lower(1))
       v = d%v(1)
       associate (periods => sim%extra(row:row + 1, i))
         call images%climb(real(rows, real64), d%clock, d%x, d%v, periods)

@@ -4,8 +4,8 @@ module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: angle_column, columns, contact_column, disk_t, image_column, land, mass_column, n_columns, n_fixed, &
-    species_by_id, species_t, spin_column, tag_t
+  use disks, only: angle_column, columns, contact_column, disk_t, image_column, land, mass_column, n_columns, species_by_id, &
+    species_t, spin_column, tag_t
   use drive, only: drive_t
   use features, only: features_t
   use free_flight, only: flight, flight_velocity
@@ -37,8 +37,8 @@ module simulation_state
   type, extends(given_t) :: simulation_t
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    real(real64), allocatable :: extra(:, :)      !! (n_extra,n) the optional columns of `disks: columns` that are needed
-    integer :: extra_row(n_fixed + 1:n_columns) = 0   !! in which row of these a column is; 0: not there
+    real(real64), allocatable :: extra(:, :)      !! (rows,n) those of `disks: columns` that are needed
+    integer :: row(n_columns) = 0                 !! in which row of these a column is; 0: not there
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     logical :: settled = .false.                  !! all that happens up to `now` is behind
@@ -63,10 +63,7 @@ module simulation_state
     procedure :: settle_masses
     procedure :: image
     procedure :: images => images_now
-    procedure :: has_column
-    procedure :: values_of
     procedure :: values_now
-    procedure :: take_values
     procedure :: position
     procedure :: velocity
     procedure :: spin
@@ -118,7 +115,7 @@ contains
     self%tag%id = [(i, i=1, self%n_disks())]
     self%tag%species = species_by_id(self%species)
     do i = 1, merge(self%n_disks(), 0, self%with%own_sizes)
-      self%extra(self%extra_row(mass_column), i) = self%species(self%tag(i)%species)%mass
+      self%extra(self%row(mass_column), i) = self%species(self%tag(i)%species)%mass
     end do
   end subroutine list_disks
 
@@ -129,15 +126,15 @@ contains
     class(simulation_t), intent(in), optional :: like   !! whose columns they are to have
 
     call self%choose_columns()
-    if (present(like)) self%extra_row = like%extra_row
+    if (present(like)) self%row = like%row
     allocate (self%disk(n), self%tag(n))
-    allocate (self%extra(maxval(self%extra_row), n), source=0.0_real64)
+    allocate (self%extra(maxval(self%row), n), source=0.0_real64)
   end subroutine make_room
 
   !> Which of the optional columns the disks have.
   pure subroutine choose_columns(self)
     class(simulation_t), intent(inout) :: self
-    logical :: needed(n_fixed + 1:n_columns)
+    logical :: needed(n_columns)
     integer :: k
 
     needed(mass_column) = self%with%own_sizes
@@ -145,8 +142,7 @@ contains
     needed(contact_column) = self%law%contact_time > 0
     needed(spin_column) = self%with%rotation
     needed(angle_column) = self%with%orientation
-    self%extra_row = [(count(needed(:k)), k=n_fixed + 1, n_columns)]
-    where (.not. needed) self%extra_row = 0
+    self%row = merge([(count(needed(:k)), k=1, n_columns)], 0, needed)
   end subroutine choose_columns
 
   !> Mass of disk i.
@@ -155,8 +151,8 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: mass                          !! [mass]
 
-    if (self%extra_row(mass_column) > 0) then
-      mass = self%extra(self%extra_row(mass_column), i)
+    if (self%row(mass_column) > 0) then
+      mass = self%extra(self%row(mass_column), i)
     else
       mass = self%species(self%tag(i)%species)%mass
     end if
@@ -186,11 +182,11 @@ contains
         equal = equal .and. .not. minval(mass, mask=own) < self%species(s)%mass
       end associate
     end do
-    row = self%extra_row(mass_column)
+    row = self%row(mass_column)
     if (.not. equal .or. row == 0) return
     self%extra = self%extra(pack([(s, s=1, size(self%extra, 1))], [(s /= row, s=1, size(self%extra, 1))]), :)
-    self%extra_row = merge(self%extra_row - 1, self%extra_row, self%extra_row > row)
-    self%extra_row(mass_column) = 0
+    self%row = merge(self%row - 1, self%row, self%row > row)
+    self%row(mass_column) = 0
   end subroutine settle_masses
 
   !> Periods that disk i has travelled: its true position is x + image*edges.
@@ -200,7 +196,7 @@ contains
     integer(int64) :: periods(2)
 
     periods = 0
-    associate (row => self%extra_row(image_column))
+    associate (row => self%row(image_column))
       if (row > 0) periods = int(self%extra(row:row + 1, i), int64)
     end associate
   end function image
@@ -213,92 +209,18 @@ contains
     images = self%box%images(self%epoch)
   end function images_now
 
-  !> Whether disks have column k of `disks: columns`.
-  pure function has_column(self, k) result(yes)
-    class(simulation_t), intent(in) :: self
-    integer, intent(in) :: k
-    logical :: yes
-
-    yes = k <= n_fixed
-    if (.not. yes) yes = self%extra_row(k) > 0
-  end function has_column
-
-  !> Values of column k of `disks: columns`.
-  pure function values_of(self, k) result(values)
-    class(simulation_t), intent(in) :: self
-    integer, intent(in) :: k
-    real(real64) :: values(size(self%disk))
-
-    select case (columns(k)%name)
-    case ("x1")
-      values = self%disk%x(1)
-    case ("x2")
-      values = self%disk%x(2)
-    case ("v1")
-      values = self%disk%v(1)
-    case ("v2")
-      values = self%disk%v(2)
-    case ("clock")
-      values = self%disk%clock
-    case ("radius")
-      values = self%disk%radius
-    case ("species")
-      values = self%tag%species
-    case ("id")
-      values = self%tag%id
-    case ("collisions")
-      values = self%tag%collisions
-    case ("met")
-      values = self%tag%met
-    case ("mass")
-      values = self%masses()
-    case default
-      values = self%extra(self%extra_row(k), :)
-    end select
-  end function values_of
-
-  !> The same now: what grows in time has grown since the clock of its disk.
+  !> Values of column k of `disks: columns` now: what grows in time has grown since the clock of its disk.
   pure function values_now(self, k) result(values)
     class(simulation_t), intent(in) :: self
-    integer, intent(in) :: k
+    integer, intent(in) :: k                      !! of one that is there
     real(real64) :: values(size(self%disk))
+    integer :: rate
 
-    values = self%values_of(k)
-    if (columns(k)%rate == 0) return
-    if (self%has_column(columns(k)%rate)) values = values + self%values_of(columns(k)%rate)*(self%now - self%disk%clock)
+    values = self%extra(self%row(k), :)
+    rate = columns(k)%rate
+    if (rate > 0) rate = self%row(rate)
+    if (rate > 0) values = values + self%extra(rate, :)*(self%now - self%disk%clock)
   end function values_now
-
-  !> Sets the values of column k.
-  pure subroutine take_values(self, k, values)
-    class(simulation_t), intent(inout) :: self
-    integer, intent(in) :: k
-    real(real64), intent(in) :: values(:)         !! (n)
-
-    select case (columns(k)%name)
-    case ("x1")
-      self%disk%x(1) = values
-    case ("x2")
-      self%disk%x(2) = values
-    case ("v1")
-      self%disk%v(1) = values
-    case ("v2")
-      self%disk%v(2) = values
-    case ("clock")
-      self%disk%clock = values
-    case ("radius")
-      self%disk%radius = values
-    case ("species")
-      self%tag%species = int(values, int32)
-    case ("id")
-      self%tag%id = int(values, int32)
-    case ("collisions")
-      self%tag%collisions = int(values, int64)
-    case ("met")
-      self%tag%met = int(values, int32)
-    case default
-      self%extra(self%extra_row(k), :) = values
-    end select
-  end subroutine take_values
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
@@ -329,7 +251,7 @@ contains
     real(real64) :: omega                         !! [1/time]
 
     omega = 0
-    if (self%extra_row(spin_column) > 0) omega = self%extra(self%extra_row(spin_column), i)
+    if (self%row(spin_column) > 0) omega = self%extra(self%row(spin_column), i)
   end function spin
 
   !> Changes the angular momentum of disk i.
@@ -338,7 +260,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: change            !! [mass length**2/time]
 
-    associate (omega => self%extra(self%extra_row(spin_column), i))
+    associate (omega => self%extra(self%row(spin_column), i))
       omega = omega + change/self%inertia_of(i)
     end associate
   end subroutine spin_up
@@ -350,7 +272,7 @@ contains
     real(real64), intent(in) :: t
 
     if (self%with%rotation) then
-      associate (angle => self%extra(self%extra_row(angle_column), i))
+      associate (angle => self%extra(self%row(angle_column), i))
         angle = angle + self%spin(i)*(t - self%disk(i)%clock)
       end associate
     end if
@@ -364,7 +286,7 @@ contains
     real(real64), intent(in) :: t
     logical, intent(inout) :: elastic             !! already, or for this reason
 
-    associate (last => self%extra(self%extra_row(contact_column), i))
+    associate (last => self%extra(self%row(contact_column), i))
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
       last = t
     end associate

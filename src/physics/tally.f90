@@ -5,7 +5,7 @@ module tally
   use kinds, only: int64, real64
   implicit none
   private
-  public :: sums, surface_tally_t, tally_t
+  public :: sums, tally_t
 
   !> What one term of a sum may amount to, and so how fine it must be: see `simulation_state: choose_units`.
   integer, parameter, public :: energies = 1, impulses = 2, moments = 3
@@ -26,18 +26,15 @@ module tally
     sum_t("stress_xx", moments), sum_t("stress_xy", moments), &   ! change of momentum times distance over pairs [energy]
     sum_t("stress_yx", moments), sum_t("stress_yy", moments)]
 
-  !> What has happened at one surface of the box.
-  type :: surface_tally_t
-    integer(int64) :: collisions = 0
-    type(exact_sum_t) :: impulse(2)                !! given to it [mass length/time]
-    type(exact_sum_t) :: energy                    !! that disks have gained [energy]
-  end type surface_tally_t
+  !> And those at each surface of the box: the impulse given to it [mass length/time], and the energy that disks have gained.
+  integer, parameter, public :: impulse = 1, gain = 3
 
   type :: tally_t
     integer(int64) :: events = 0                   !! collisions of any kind
     integer(int64) :: collisions = 0               !! of pairs
     type(exact_sum_t) :: sum(size(sums))
-    type(surface_tally_t), allocatable :: surface(:)   !! those of the box
+    integer(int64), allocatable :: hits(:)         !! (surfaces) collisions at each
+    type(exact_sum_t), allocatable :: at_surface(:, :)     !! (3,surfaces) impulse along x, y; gain
   contains
     procedure :: make_room
     procedure :: choose_units
@@ -54,7 +51,9 @@ contains
     class(tally_t), intent(inout) :: self
     integer, intent(in) :: n
 
-    if (.not. allocated(self%surface)) allocate (self%surface(n))
+    if (allocated(self%hits)) return
+    allocate (self%hits(n), source=0_int64)
+    allocate (self%at_surface(gain, n))
   end subroutine make_room
 
   !> Makes the sums fine enough for terms up to these bounds.
@@ -63,9 +62,8 @@ contains
     real(real64), intent(in) :: bound(:)           !! by kind
 
     call self%sum%choose_unit(bound(sums%kind))
-    call self%surface%impulse(1)%choose_unit(bound(impulses))
-    call self%surface%impulse(2)%choose_unit(bound(impulses))
-    call self%surface%energy%choose_unit(bound(energies))
+    call self%at_surface(:gain - 1, :)%choose_unit(bound(impulses))
+    call self%at_surface(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
 
   !> Whether the units have been chosen.
@@ -89,31 +87,23 @@ contains
   pure subroutine include(self, other)
     class(tally_t), intent(inout) :: self
     type(tally_t), intent(in) :: other
-    integer :: k
 
     self%events = self%events + other%events
     self%collisions = self%collisions + other%collisions
     self%sum%units = self%sum%units + other%sum%units
-    self%surface%collisions = self%surface%collisions + other%surface%collisions
-    do k = 1, 2
-      self%surface%impulse(k)%units = self%surface%impulse(k)%units + other%surface%impulse(k)%units
-    end do
-    self%surface%energy%units = self%surface%energy%units + other%surface%energy%units
+    self%hits = self%hits + other%hits
+    self%at_surface%units = self%at_surface%units + other%at_surface%units
   end subroutine include
 
   !> Begins anew in the same units.
   pure subroutine clear(self)
     class(tally_t), intent(inout) :: self
-    integer :: k
 
     self%events = 0
     self%collisions = 0
     self%sum%units = 0
-    self%surface%collisions = 0
-    do k = 1, 2
-      self%surface%impulse(k)%units = 0
-    end do
-    self%surface%energy%units = 0
+    self%hits = 0
+    self%at_surface%units = 0
   end subroutine clear
 
 end module tally

@@ -7,7 +7,7 @@ module wall_hits
   use partners, only: is_side
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
-  use tally, only: dissipated, heat, work
+  use tally, only: dissipated, gain, heat, impulse, work
   implicit none
   private
   public :: collide_wall
@@ -61,7 +61,7 @@ contains
     call stream%draw_normals(normals)
     thermal = sqrt(temperature/sim%mass_of(i))
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
-    if (sim%with%rotation) sim%extra(sim%extra_row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
+    if (sim%with%rotation) sim%extra(sim%row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine leave_thermally
 
   !> The tangential part of a hit of disk i on a rough wall; the velocity along the normal has changed already.
@@ -92,24 +92,21 @@ contains
     logical, intent(in) :: heats                 !! it is a thermal wall
     real(real64), intent(in) :: u(2)             !! velocity of the surface [length/time]
     real(real64), intent(in) :: v(2), omega      !! of the disk before [length/time, 1/time]
-    real(real64) :: mass, gain, done
+    real(real64) :: mass, gained, done
 
     mass = sim%mass_of(i)
-    gain = 0.5_real64*mass*(dot_product(sim%disk(i)%v, sim%disk(i)%v) - dot_product(v, v))
-    if (sim%with%rotation) gain = gain + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
+    gained = 0.5_real64*mass*(dot_product(sim%disk(i)%v, sim%disk(i)%v) - dot_product(v, v))
+    if (sim%with%rotation) gained = gained + 0.5_real64*sim%inertia_of(i)*(sim%spin(i)**2 - omega**2)
     done = mass*dot_product(u, sim%disk(i)%v - v)
     sim%tally%events = sim%tally%events + 1
     if (heats) then
-      call sim%tally%sum(heat)%add(gain - done)
+      call sim%tally%sum(heat)%add(gained - done)
     else
-      call sim%tally%sum(dissipated)%add(done - gain)
+      call sim%tally%sum(dissipated)%add(done - gained)
     end if
     if (abs(done) > 0) call sim%tally%sum(work)%add(done)
-    associate (surface => sim%tally%surface(k))
-      surface%collisions = surface%collisions + 1
-      call surface%impulse%add(-mass*(sim%disk(i)%v - v))
-      call surface%energy%add(gain)
-    end associate
+    sim%tally%hits(k) = sim%tally%hits(k) + 1
+    call sim%tally%at_surface(impulse:gain, k)%add([-mass*(sim%disk(i)%v - v), gained])
   end subroutine count_hit
 
 end module wall_hits

@@ -113,9 +113,9 @@ contains
               sim%disk(k)%v = file%table(3:4, k - first + 1)
             end do
           end if
-          if (sim%with%own_sizes) sim%extra(sim%extra_row(mass_column), first:last) = file%table(mass_row, :)
-          if (species(s)%spin_in_file) sim%extra(sim%extra_row(spin_column), first:last) = file%table(spin_row, :)
-          if (species(s)%angle_in_file) sim%extra(sim%extra_row(angle_column), first:last) = file%table(angle_row, :)
+          if (sim%with%own_sizes) sim%extra(sim%row(mass_column), first:last) = file%table(mass_row, :)
+          if (species(s)%spin_in_file) sim%extra(sim%row(spin_column), first:last) = file%table(spin_row, :)
+          if (species(s)%angle_in_file) sim%extra(sim%row(angle_column), first:last) = file%table(angle_row, :)
           deallocate (file%table)
         end select
       end associate

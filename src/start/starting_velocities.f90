@@ -139,7 +139,7 @@ contains
 
       call stream%seed(settings%run%seed, [s, purpose_of_spins])
       do i = first, last
-        associate (species => settings%species(s), omega => sim%extra(sim%extra_row(spin_column), i))
+        associate (species => settings%species(s), omega => sim%extra(sim%row(spin_column), i))
           if (species%rotational_temperature >= 0) then
             call stream%draw_normals(normals)
             omega = sqrt(species%rotational_temperature/sim%inertia_of(int(i, int32)))*normals(1)

@@ -279,12 +279,9 @@ contains
     if (a%epoch_events /= b%epoch_events .or. a%events_then /= b%events_then) text = "an event that counts"
     if (any(differ([a%epoch, a%now, a%epoch_begin, a%epoch_end, a%blink, a%last_advance, a%tally%sum%value()], &
       [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, b%tally%sum%value()]))) text = "a time or a sum"
-    associate (s => a%tally%surface, t => b%tally%surface)
-      if (any(s%collisions /= t%collisions)) text = "collisions with walls"
-      if (any(differ([s%impulse(1)%value(), s%impulse(2)%value(), s%energy%value()], &
-        [t%impulse(1)%value(), t%impulse(2)%value(), t%energy%value()]))) text = "a sum of a wall"
-    end associate
-    if (any(a%extra_row /= b%extra_row)) text = "columns of the disks"
+    if (any(a%tally%hits /= b%tally%hits)) text = "collisions with walls"
+    if (any(differ(a%tally%at_surface%value(), b%tally%at_surface%value()))) text = "a sum of a wall"
+    if (any(a%row /= b%row)) text = "columns of the disks"
     do i = 1, a%n_disks()
       if (text /= "") return
       associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
