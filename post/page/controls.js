@@ -10,7 +10,6 @@ function begin() {
   state.colour = film.colour;
   state.traced = film.traced;
   state.sofar = disks < 200;
-  state.total = spread(kinds.map(kind => kind.count)) < spread(kinds.map(() => 1));
   pace = usualPace();
   const quantities = ['species', ...Object.keys(film.scales)];
   $('colour').replaceChildren(...quantities.map(name => new Option(name, name, false, name === state.colour)));
@@ -29,16 +28,10 @@ function prepareFilm() {
   $('coming').hidden = !film.events;
   $('speeds').hidden = !counted.length;
   $('pressures').hidden = !film.pressure;
-  $('now').parentElement.hidden = film.speeds.rest;
+  $('sofar').hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed. Curves: Maxwell’s law at the mean kinetic energy of the species.';
   $('guess').hidden = !film.guesses.some(count => count);
   $('event').hidden = !turning.length;
-}
-
-// How far apart the curves of the species would lie: largest over smallest energy, multiplied by these numbers.
-function spread(weights) {
-  const totals = weights.map((weight, s) => weight * film.kinetic.reduce((sum, row) => sum + row[s], 0));
-  return Math.max(...totals) / Math.min(...totals);
 }
 
 // ---------- what is shown ----------
@@ -60,11 +53,12 @@ function show(time, anew = false) {
 
 function layout() {
   if (!film) return;  // it is still to come
-  const plots = ['histogram', 'energy', 'pressure'];
-  for (const name of plots) $(name).style.height = plotHeight(name) + 'px';  // the stage gets the room that is left
-  tell();  // also to the words
+  tell();  // the stage gets the room that plots and words leave
   layOutStage();
-  for (const name of plots) layOutPlot($(name), plotHeight(name));
+  for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
+    const { clientWidth, clientHeight } = canvas;  // asked for once, for it takes long
+    Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
+  }
   layEnergyOut();
   show(moment.time, true);
 }
@@ -76,8 +70,7 @@ function press(pairs) {
 function refresh() {
   drawLegend();
   press({
-    now: !state.sofar, sofar: state.sofar, mean: !state.total, total: state.total, arrows: state.arrows,
-    follow: camera.follow >= 0,
+    sofar: state.sofar, total: state.total, arrows: state.arrows, follow: camera.follow >= 0,
   });
   const speed = 10 ** +$('pace').value;
   const perSecond = short(+(pace * speed).toPrecision(2));
@@ -199,11 +192,11 @@ function followOrNot() {
 
 function on(id, action) { $(id).addEventListener('click', action); }
 
-const turn = (name, value) => () => { state[name] = value ?? !state[name]; refresh(); };
+const turn = name => () => { state[name] = !state[name]; refresh(); };
 const actions = {
   play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => go(nextTurn()),
-  clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), now: turn('sofar', false), sofar: turn('sofar', true),
-  mean: turn('total', false), total: turn('total', true), nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
+  clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
+  nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
   whole: () => { lookAtAll(); look(); }, theme: () => { theme(!dark()); refresh(); },
   full: () => { if (document.fullscreenElement) document.exitFullscreen(); else $('view').requestFullscreen(); },
 };

@@ -51,20 +51,6 @@ function drawLegend() {
 
 // ---------- small plots ----------
 
-// Without what a telephone adds while something is too wide for it, as before it has been laid out anew.
-const screenHeight = () => document.documentElement.clientHeight;
-
-// By the style, which knows the size of the screen; lower than this nothing can be read.
-const plotHeight = name => Math.max(78, parseFloat(getComputedStyle($(name)).getPropertyValue('--height')) * screenHeight() / 100);
-
-// As wide as there is room; asked for once, for it takes long.
-function layOutPlot(canvas, height) {
-  const parent = canvas.parentElement, { paddingLeft, paddingRight } = getComputedStyle(parent);
-  const width = parent.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-  Object.assign(canvas, { width: Math.round(width * page.dots), height: Math.round(height * page.dots) });
-  canvas.style.width = width + 'px';
-}
-
 function prepare(canvas) {
   const pen = canvas.getContext('2d'), width = canvas.width / page.dots, height = canvas.height / page.dots;
   pen.setTransform(page.dots, 0, 0, page.dots, 0, 0);

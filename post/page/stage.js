@@ -47,7 +47,8 @@ function roomOfStage() {
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
   const width = frame.clientWidth - inner('paddingLeft') - inner('paddingRight');
-  const height = screenHeight() - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
+  // The height of the screen without what a telephone adds while something is too wide for it.
+  const height = document.documentElement.clientHeight - (full ? 0 : $('top').offsetHeight) - inner('paddingTop') - inner('paddingBottom') - 2;
   if (cssColour('flat')) return { width: width - Math.max(260, 0.45 * width), height };
   const between = bare ? $('speeds').offsetHeight : 0;
   return { width, height: Math.max(full ? 100 : isPart ? 200 : 300, height - $('controls').offsetHeight - between - 16) };

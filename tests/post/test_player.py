@@ -7,13 +7,8 @@ import pytest
 
 import player
 from ricochet import read_run
-from synthetic_run import maxwell_velocities, run_script, write_run
-from whole_runs import FINISHED, wait_for, write_input
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(9)
+from synthetic_run import maxwell_velocities, run_script, write_run, written
+from whole_runs import wait_for
 
 
 # --- the file, without a browser ---
@@ -80,7 +75,7 @@ def test_speeds_beside_disks_at_rest_are_counted_by_factors(tmp_path, rng):
     velocity = maxwell_velocities(rng, 5, 60) * np.array([1e-2, 1.0, 1.0])[np.arange(60) % 3, None]
     velocity[:, ::4] = 0
     observables = {"collisions": np.zeros(5)}
-    run = read_run(write_run(tmp_path / "a.h5", 0 * velocity, velocity, observables=observables))
+    run = written(tmp_path / "a.h5", 0 * velocity, velocity, observables=observables)
     facts, _ = filmed(run, [0, 4])
     edges, ((first,), _) = facts["speeds"]["edges"], facts["speeds"]["counts"]
     speeds = run.speed(0)
@@ -91,7 +86,7 @@ def test_speeds_beside_disks_at_rest_are_counted_by_factors(tmp_path, rng):
 def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
     """Of ten thousand disks, and of few disks and many frames."""
     still = np.broadcast_to(np.float32(0.5), (1, 10000, 2))
-    run = read_run(write_run(tmp_path / "a.h5", still, still, collisions=np.zeros((1, 10000))))
+    run = written(tmp_path / "a.h5", still, still, collisions=np.zeros((1, 10000)))
     assert player.frames_that_fit(run, player.ROOM) >= 300
     room = 200000
     monkeypatch.setattr(player, "ROOM", room)
@@ -256,7 +251,7 @@ def test_the_scrub_bar_and_the_choices_act(opened):
         opened.run(choose, colour)
         pictures.add(stage(opened))
     assert len(pictures) == 4
-    for canvas, button in (("histogram", "now"), ("energy", "total")):
+    for canvas, button in (("histogram", "sofar"), ("energy", "total")):
         before = opened.run("return $(arguments[0]).toDataURL()", canvas)
         opened.click(button)
         assert opened.run("return $(arguments[0]).toDataURL()", canvas) != before
@@ -352,20 +347,6 @@ LOGGED = ("output.frames_every_time=0.5", "output.event_log=.true.")
 def many(text):
     """More disks than have all digits in the page."""
     return text.replace("count = 8", "count = 24").replace("0.05", "0.02")
-
-
-@pytest.fixture
-def simulated(ricochet, tmp_path):
-    """`simulated(input, *settings)` is the run of it."""
-
-    def run(text, *settings, name="gas"):
-        write_input(tmp_path, text)
-        options = [part for setting in settings for part in ("--set", setting)]
-        done = ricochet("gas.nml", "-o", f"{name}.h5", "--force", *options)
-        assert done.returncode == FINISHED, done.stderr
-        return read_run(tmp_path / f"{name}.h5")
-
-    return run
 
 
 @pytest.mark.parametrize("box", BOXES)
