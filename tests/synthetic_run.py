@@ -8,6 +8,7 @@ from unittest import mock
 import h5py
 import numpy as np
 
+from ricochet import read_run
 from ricochet.script import launch
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,6 +75,11 @@ def write_run(
         write_parameters(file, parameters, names, species, obstacles, walls)
         file.create_group("provenance").attrs.update(provenance or {"git_commit": text("abc1234")})
     return Path(path)
+
+
+def written(path, position, velocity, **options):
+    """The same, read back."""
+    return read_run(write_run(path, position, velocity, **options))
 
 
 def add_element(group, name, time, value):

@@ -1,8 +1,33 @@
-"""What tests of the player share."""
+"""What tests of post/ share."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from browser import browsing
+from ricochet import read_run
+from whole_runs import FINISHED, write_input
+
+
+@pytest.fixture
+def rng():
+    """Random numbers, the same each time."""
+    return np.random.default_rng(8)
+
+
+@pytest.fixture
+def simulated(ricochet, tmp_path):
+    """`simulated(input, *settings)` is the run of a file or of its text."""
+
+    def run(system, *settings, name="gas"):
+        path = system if isinstance(system, Path) else write_input(tmp_path, system)
+        options = [word for one in settings for word in ("--set", one)]
+        done = ricochet(path, *options, "--quiet", "--force", "-o", f"{name}.h5")
+        assert done.returncode == FINISHED, done.stderr
+        return read_run(tmp_path / f"{name}.h5")
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ricochet import Run, mdanalysis_universe, read_run
+from ricochet import Run, mdanalysis_universe
 from synthetic_run import ROOT, run_script
 
 
@@ -17,23 +17,11 @@ def reader(module: str):
 
 
 @pytest.fixture
-def simulated(ricochet, tmp_path):
-    """`simulated(input, *settings)` is the run of an input of the project."""
-
-    def made(name, *settings) -> Run:
-        options = [word for one in settings for word in ("--set", one)]
-        path = ROOT / "input" / f"{name}.nml"
-        done = ricochet(path, "-o", f"{name}.h5", "--quiet", *options)
-        assert done.returncode == 0, done.stderr
-        return read_run(tmp_path / f"{name}.h5")
-
-    return made
-
-
-@pytest.fixture
 def run(simulated) -> Run:
     """Two species in a container whose lower corner is not the origin."""
-    return simulated("container", "stop.collisions_per_disk=2", "species.light.count=20")
+    return simulated(
+        ROOT / "input/container.nml", "stop.collisions_per_disk=2", "species.light.count=20"
+    )
 
 
 def exported(run: Run, name: str, *options) -> Path:
@@ -65,7 +53,7 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
 def test_ovito_knows_the_box_and_its_periodic_sides(run, simulated):
     import_file = reader("ovito.io").import_file
     strip = ("box.boundary=periodic,wall", "species.gas.count=50", "stop.time=0.1")
-    for one in (run, simulated("brownian", *strip)):
+    for one in (run, simulated(ROOT / "input/brownian.nml", *strip, name="strip")):
         cell = import_file(str(exported(one, "run.xyz"))).compute(0).cell
         assert tuple(cell.pbc[:2]) == tuple(one.periodic)
         np.testing.assert_array_equal(np.diag(cell[:2, :2]), one.edges)
@@ -113,7 +101,7 @@ def test_csv_is_read_by_numpy(run):
 
 
 def test_what_else_disks_have_is_exported_too(simulated):
-    run = simulated("rough", "stop.collisions_per_disk=2")
+    run = simulated(ROOT / "input/rough.nml", "stop.collisions_per_disk=2")
     table = np.genfromtxt(exported(run, "rough.csv", "--frames", "-1"), delimiter=",", names=True)
     head, *lines = exported(run, "rough.xyz", "--frames", "-1").read_text().splitlines()[1:]
     assert {"angular_velocity", "orientation"} == set(run.elements)

@@ -5,7 +5,6 @@ Runs that are made, whose answer is known, and small runs of the program, on whi
 
 import csv
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,35 +19,10 @@ from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
 from ricochet.driven import demon_law, noise_law
-from synthetic_run import ROOT, run_script, write_run
+from synthetic_run import ROOT, run_script, write_run, written
 from validation.estimators import force, hit_rate
-from whole_runs import FINISHED, write_input
 
 PERIODIC = (True, True)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(8)
-
-
-def written(path, position, velocity, **options):
-    """A run read back."""
-    return read_run(write_run(path, position, velocity, **options))
-
-
-@pytest.fixture
-def simulated(ricochet, tmp_path):
-    """`simulated(input, name, *settings)` runs an input or its text; the path of the output."""
-
-    def run(system, name="gas", *settings):
-        path = system if isinstance(system, Path) else write_input(tmp_path, system)
-        options = [word for one in settings for word in ("--set", one)]
-        done = ricochet(path, *options, "--quiet", "--force", "-o", f"{name}.h5")
-        assert done.returncode == FINISHED, done.stderr
-        return tmp_path / f"{name}.h5"
-
-    return run
 
 
 def rows_of(path):
@@ -202,7 +176,8 @@ def bulk(simulated):
     settings += ["output.frames_every_time=0.02", "output.observables_every_collisions=25"]
     settings += ["output.event_log=true"]
     system = ROOT / "input" / "bulk.nml"
-    return [simulated(system, f"{k}", *settings, *more) for k, more in enumerate(RUNS)]
+    each = enumerate(RUNS)
+    return [simulated(system, *settings, *more, name=f"{k}").path for k, more in each]
 
 
 def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_path):
@@ -288,20 +263,20 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
         &species name = 'large' count = 400 radius = 0.008 temperature = 1 /
         &stop collisions_per_disk = 15 /
         &output observables_every_collisions_per_disk = 0.1 /""",
-        "two",
+        name="two",
     )
-    w0_t, tau, left = cool.energy_left(read_run(two))
+    w0_t, tau, left = cool.energy_left(two)
     np.testing.assert_allclose(left, hd.haff_by_collisions(tau, 0.9), rtol=0.1)
     np.testing.assert_allclose(left, hd.haff_by_time(w0_t, 0.9), rtol=0.15)
-    drawn(tmp_path, "haff", two)
+    drawn(tmp_path, "haff", two.path)
 
 
 def test_rough_gases_are_drawn_and_others_refused(simulated, tmp_path, capsys):
     text = """&box upper = 60, 60 boundary = 'periodic', 'periodic' /
     &species count = 100 radius = 0.5 temperature = 1 / &contact restitution = 0.9 {} /
     &stop collisions_per_disk = 3 / &output observables_every_collisions = 20 /"""
-    drawn(tmp_path, "rough", simulated(text.format("tangential_restitution = 0"), "a"))
-    smooth = simulated(text.format(""), "b")
+    drawn(tmp_path, "rough", simulated(text.format("tangential_restitution = 0"), name="a").path)
+    smooth = simulated(text.format(""), name="b").path
     assert run_script("rough", smooth, "-o", tmp_path / "b.png") == 2
     assert "equal rough disks" in capsys.readouterr().err
 
@@ -316,7 +291,7 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
         **{"a": "run.seed=1", "b": "run.seed=2", "c": "side.bottom.velocity=0.2"},
         **{"d": "drive.strength=2", "e": "contact.restitution=0.8"},
     }
-    runs = [read_run(simulated(text, name, change)) for name, change in changes.items()]
+    runs = [simulated(text, change, name=name) for name, change in changes.items()]
     groups = driven.by_input(runs)
     found = [[run.path.stem for run in group] for group in groups.values()]
     assert found == [["a", "b"], ["c"], ["d"], ["e"]]
@@ -343,7 +318,7 @@ USUAL = {
 @pytest.fixture
 def gas(simulated):
     """A run of a periodic gas, with what is unusual about it."""
-    return lambda name="gas", **unusual: read_run(simulated(GAS.format(**USUAL | unusual), name))
+    return lambda name="gas", **unusual: simulated(GAS.format(**USUAL | unusual), name=name)
 
 
 def test_moments_are_those_of_the_definition(gas):
@@ -480,7 +455,7 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
 
 def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
     """Its gradients times viscosity and conductivity are what passes from wall to wall."""
-    run, eta = read_run(simulated(WALLS.format(speed=0))), 0.3
+    run, eta = simulated(WALLS.format(speed=0)), 0.3
     flux = fields.Fluxes(4 * eta / np.pi * 2 * hd.henderson(eta), 0.0, 0.0)
     law = fields.expected(run, 0, np.linspace(1, 19, 7), flux, (0.5, 2.0))
     assert law == pytest.approx(np.tile([0.5, 2, 4 * eta / np.pi], (7, 1)))
@@ -496,7 +471,7 @@ def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
 
 
 def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, capsys):
-    path = simulated(WALLS.format(speed=3))
+    path = simulated(WALLS.format(speed=3)).path
     rows = drawn(tmp_path, "fields", path, "--cells", "5")
     found = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     assert found["x"] == pytest.approx([2, 6, 10, 14, 18])
@@ -504,7 +479,7 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     assert (found["density_error"] > 0).all() and found["flow_y"][-1] > found["flow_y"][0]
     assert np.isfinite(found["flow_expected"]).all()
     assert len(drawn(tmp_path, "fields", path, "--grid", "4,2")) == 8
-    early = simulated(ROOT / "input/fourier.nml", "early", "stop.time=20")
+    early = simulated(ROOT / "input/fourier.nml", "stop.time=20", name="early").path
     assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
     assert "warning: no gas has these fluxes" in capsys.readouterr().err
 

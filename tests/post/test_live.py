@@ -13,9 +13,8 @@ import urllib.request
 import numpy as np
 import pytest
 
-from ricochet import read_run
 from ricochet.live import LOOK, Live, Server, handler
-from synthetic_run import ROOT, run_script, write_run
+from synthetic_run import ROOT, run_script, write_run, written
 from whole_runs import PATIENCE, frames_in, wait_for, write_input
 
 LONG = """&run threads = 1 /
@@ -157,7 +156,7 @@ def test_the_show_of_a_run_that_is_killed_ends_and_says_so(live, tmp_path, capsy
 def server(tmp_path):
     """The server of a film, in this process; gives its port, and what shows the film."""
     x = np.full((2, 3, 2), 0.5)
-    live = Live(read_run(write_run(tmp_path / "a.h5.part", x, x)), lambda run: {})
+    live = Live(written(tmp_path / "a.h5.part", x, x), lambda run: {})
     one = Server(("127.0.0.1", 0), handler(live, b"the page"))
     threading.Thread(target=one.serve_forever, daemon=True).start()
     yield one.server_address[1], live

@@ -7,7 +7,7 @@ import pytest
 
 from ricochet import read_run
 from ricochet.paths import Paths
-from synthetic_run import write_run
+from synthetic_run import written
 from whole_runs import FINISHED, write_input
 
 SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
@@ -114,7 +114,7 @@ def test_turns_beyond_the_room_for_them_are_guessed(ricochet, tmp_path):
 def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_path):
     velocity = np.array([[[0.1, 0.0], [0.1, 0.0]]] * 2)
     position = np.array([[[0.2, 0.2], [0.2, 0.5]], [[0.3, 0.2], [0.2, 0.6]]])
-    (turns,) = Paths(read_run(write_run(tmp_path / "a.h5", position, velocity))).along([0, 1])
+    (turns,) = Paths(written(tmp_path / "a.h5", position, velocity)).along([0, 1])
     assert turns.guessed.tolist() == [False, True]
 
 

@@ -20,12 +20,7 @@ import trajectory
 from ricochet import RunError, cooling, crater, read_run, speeds, statistics, theory, thermodynamics
 from ricochet.drawing import caption, plt, with_images
 from ricochet.script import chosen_frames, frame_list, grouped
-from synthetic_run import maxwell_velocities, run_script, write_run
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20)
+from synthetic_run import maxwell_velocities, run_script, write_run, written
 
 
 def draw(script, *arguments):
@@ -158,7 +153,7 @@ def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
     parts = {"mass": mass, "species": np.repeat([1, 2], 500), "names": ("light", "heavy")}
     parts["observables"] = {"collisions": np.arange(31) * 500}
     turned = (np.roll(v, k, axis=2) for k in (0, 1))
-    runs = [read_run(write_run(tmp_path / f"{k}.h5", 0 * v, own, **parts))
+    runs = [written(tmp_path / f"{k}.h5", 0 * v, own, **parts)
             for k, own in enumerate(turned)]  # fmt: skip
     result = mixture.table(runs, [list(range(1, 31))] * 2)
     for row, kinetic, speed in zip(result, (0.5, 2.0), (1.401248, 0.700624), strict=True):
@@ -234,7 +229,7 @@ def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
         observables = {"collisions": tau[:last], **dict(zip(names, both, strict=True))}
         x, path = np.zeros((1, 2, 2)), tmp_path / "a.h5"
         more = {"observable_time": tau[:last], "observables": observables}
-        return read_run(write_run(path, x, x, **more)), both
+        return written(path, x, x, **more), both
 
     for start in (0.0, 2.0):
         found = cooling.steady_ratio([run(start)[0]], law).mean
@@ -534,7 +529,7 @@ def test_disks_that_reach_across_a_periodic_side_are_drawn_on_both(tmp_path):
         ((True, False), along_x),
         ((True, True), [*along_x, *along_y, (3, -0.005, -0.005)]),
     ):
-        run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=periodic, **sides))
+        run = written(tmp_path / "run.h5", x, x, periodic=periodic, **sides)
         which, places = with_images(run, x[0])
         np.testing.assert_array_equal(which[:4], range(4))
         found = [(k, *place) for k, place in zip(which[4:], places[4:].round(9), strict=True)]
@@ -544,7 +539,7 @@ def test_disks_that_reach_across_a_periodic_side_are_drawn_on_both(tmp_path):
 def test_paths_break_where_a_period_is_crossed_and_pass_corners(tmp_path):
     x, image = np.array([[[0.8, 0.5]], [[0.1, 0.5]], [[0.4, 0.5]]]), np.zeros((3, 1, 2), int)
     image[1:, 0, 0] = 1
-    run = read_run(write_run(tmp_path / "run.h5", x, x, periodic=(True, False), image=image))
+    run = written(tmp_path / "run.h5", x, x, periodic=(True, False), image=image)
     (path,) = trajectory.paths_of(run, [0], [0, 1, 2])
     expected = [[0.8, 0.5], [1.1, 0.5], [np.nan] * 2, [-0.2, 0.5], [0.1, 0.5], [0.4, 0.5]]
     np.testing.assert_allclose(path, expected)
@@ -631,7 +626,7 @@ def test_captions_name_what_varies(tmp_path):
     def run(k, **species):
         groups = {"run": {"seed": k}, "contact": {"restitution": 1.0}, "species/disk": species}
         groups["stop"] = {"time": 1.0 + k}
-        return read_run(write_run(tmp_path / f"{k}.h5", x, x, parameters=groups))
+        return written(tmp_path / f"{k}.h5", x, x, parameters=groups)
 
     same = [run(k, mass=2.0) for k in (1, 2)]
     assert caption(same) == "N = 2,  ξ = 1,  2 seeds"

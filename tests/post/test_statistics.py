@@ -8,11 +8,6 @@ from ricochet import statistics, theory
 
 
 @pytest.fixture
-def rng():
-    return np.random.default_rng(20)
-
-
-@pytest.fixture
 def noise():
     return np.random.default_rng(8)
 
@@ -27,7 +22,7 @@ def remembering(rng, length: int, memory: float) -> np.ndarray:
 
 
 def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
-    u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (20000, 2)), axis=1)
+    u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (50000, 2)), axis=1)
     right = statistics.hold_against(u, theory.maxwell_cdf)
     wrong = statistics.hold_against(1.02 * u, theory.maxwell_cdf)
     assert right.ks_p > 0.01 and right.chi2_p > 0.01 and right.ks < 1.63 / np.sqrt(right.n)

@@ -3,24 +3,14 @@
 import numpy as np
 import pytest
 
-from ricochet import read_run, structure, transport
+from ricochet import structure, transport
 from ricochet import hard_disks as hd
 from ricochet.drawing import values_of
 from ricochet.structure import largest_cluster
-from synthetic_run import run_script, write_run
+from synthetic_run import run_script, written
 from test_statistics import remembering
 
 PERIODIC = (True, True)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(8)
-
-
-def written(path, position, velocity, **options):
-    """A run read back."""
-    return read_run(write_run(path, position, velocity, **options))
 
 
 # --- structure ---
