@@ -4,7 +4,8 @@ program main
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
   use run, only: perform_run
-  use run_setup, only: print_input
+  use run_setup, only: read_input
+  use settings, only: run_input_t
   use system, only: end_program, fill_standard_streams
   implicit none
   call serve()
@@ -15,6 +16,7 @@ contains
   !> are freed.
   subroutine serve()
     type(command_t) :: command
+    type(run_input_t) :: input
     type(error_t), allocatable :: error
     integer :: code
 
@@ -25,7 +27,7 @@ contains
       if (command%question /= "") then
         call answer(command, error)
       else if (command%print_input) then
-        call print_input(command%input, command%overrides, error)
+        call read_input(command%input, command%overrides, input, error, printed=.true.)
       else
         call perform_run(command, error)
       end if

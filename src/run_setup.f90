@@ -13,7 +13,6 @@ module run_setup
   use memory, only: room_for_domains
   use namelist_input, only: read_groups
   use parallel_events, only: parallel_events_t
-  use input_groups, only: group_t
   use renumbering, only: renumber
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
@@ -23,29 +22,32 @@ module run_setup
   use time_stepped, only: time_stepped_t
   implicit none
   private
-  public :: print_input, read_input, input_from_text, new_simulation, choose_evolution
+  public :: read_input, input_from_text, new_simulation, choose_evolution
 
 contains
 
-  !> Reads the file `path`, applies the overrides and checks everything.
-  subroutine read_input(path, overrides, input, error)
+  !> Reads the file `path`, applies the overrides and checks everything. If it is to be printed, it is as far as it could be
+  !> understood, right or wrong.
+  subroutine read_input(path, overrides, input, error, printed)
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)                        !! GROUP.VARIABLE=VALUE
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: printed
     character(len=:), allocatable :: text
 
     call read_text(path, text, error)
-    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error)
+    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error, printed)
   end subroutine read_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
-  subroutine input_from_text(text, path, overrides, input, error)
+  subroutine input_from_text(text, path, overrides, input, error, printed)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: printed
     type(problem_list_t) :: problems
     logical :: complete
 
@@ -53,30 +55,14 @@ contains
     input%text = text
     input%overrides = overrides
     call read_groups(text, overrides, input%groups, problems, complete)
+    if (present(printed)) call print_text(groups_text(input%groups), error)
+    if (allocated(error)) return
     if (complete) then                                    ! else what would be missing is there, in parts that were skipped
       call resolve_settings(input%groups, input%settings, problems)
       call fit_together(input%settings, input%groups, problems)
     end if
     call problems%report(path, overrides, error)
   end subroutine input_from_text
-
-  !> Prints what the file and the overrides give, as far as it could be understood; an error holds all problems.
-  subroutine print_input(path, overrides, error)
-    character(len=*), intent(in) :: path
-    type(text_t), intent(in) :: overrides(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(run_input_t) :: input
-    type(group_t), allocatable :: groups(:)
-    type(problem_list_t) :: problems
-    character(len=:), allocatable :: text
-    logical :: complete
-
-    call read_text(path, text, error)
-    if (allocated(error)) return
-    call read_groups(text, overrides, groups, problems, complete)
-    call print_text(groups_text(groups), error)
-    if (.not. allocated(error)) call input_from_text(text, path, overrides, input, error)
-  end subroutine print_input
 
   !> The state at the start of a run, the disks in an order that suits the memory.
   subroutine new_simulation(input, line, sim, error)

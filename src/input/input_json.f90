@@ -2,7 +2,7 @@
 module input_json
   use input_groups, only: group_t, json_text
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, variable_t, smallest, table, words_of
-  use texts, only: growing_text_t, written
+  use texts, only: growing_text_t, joined, written
   implicit none
   private
   public :: groups_text, variables_text
@@ -36,7 +36,7 @@ contains
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text, value
     character(len=len(row%goes_with)) :: words(size(words_of(row%goes_with)))
-    logical :: has_default, positive
+    logical :: has_default, is_example, positive
     integer :: i
 
     value = trim(row%value)
@@ -46,11 +46,12 @@ contains
     if (row%kind == "logical") value = value(2:len(value) - 1)
     if (row%size /= 1) value = "["//value//"]"
     has_default = row%status == "default" .or. row%status == "fallback"
+    is_example = .not. has_default
     words = words_of(row%goes_with)
     associate (low => row%range%lower, high => row%range%upper)
       positive = low > 0 .and. low <= smallest
       text = """type"": "//json_text(row%kind)//member("size", .true., written(row%size))// &
-        member("default", has_default, value)//member("example", .not. has_default, value)// &
+        member("default", has_default, value)//member("example", is_example, value)// &
         member("needed", .true., truth(row%status == "example"))// &
         member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
         member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
@@ -109,14 +110,9 @@ contains
   pure function list(words) result(text)
     character(len=*), intent(in) :: words(:)
     character(len=:), allocatable :: text
-    integer :: k
 
-    text = "["
-    do k = 1, size(words)
-      if (k > 1) text = text//", "
-      text = text//json_text(words(k))
-    end do
-    text = text//"]"
+    text = "[]"
+    if (size(words) > 0) text = "["""//joined(words, """, """)//"""]"
   end function list
 
   !> A logical.

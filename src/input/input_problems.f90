@@ -6,7 +6,7 @@ module input_problems
   private
   public :: problem_list_t
 
-  integer, parameter :: capacity = 100          !! problems worth reading
+  integer, parameter, public :: most_problems = 100          !! worth reading
   integer, parameter :: whole_file = 1000000000 !! sorts after every line
 
   type :: problem_t
@@ -19,10 +19,9 @@ module input_problems
     integer :: count = 0
     integer :: unreadable = 0                   !! those that are of a file that cannot be read
     logical :: cut_short = .false.              !! there were more than the list holds
-    type(problem_t) :: items(capacity)
+    type(problem_t) :: items(most_problems)
   contains
     procedure :: add
-    procedure :: is_full
     procedure :: report
   end type problem_list_t
 
@@ -41,7 +40,7 @@ contains
     do k = 1, self%count
       if (self%items(k)%line == line .and. self%items(k)%text == text) return
     end do
-    if (self%is_full()) then
+    if (self%count == most_problems) then
       self%cut_short = .true.
       return
     end if
@@ -53,14 +52,6 @@ contains
     self%items(k + 1)%text = text
     self%count = self%count + 1
   end subroutine add
-
-  !> Whether reading on is of no use.
-  pure function is_full(self)
-    class(problem_list_t), intent(in) :: self
-    logical :: is_full
-
-    is_full = self%count == capacity
-  end function is_full
 
   !> Place of a line in the report.
   pure function rank(line)
@@ -89,7 +80,7 @@ contains
         text = text//new_line("a")//legible(place//": "//problem%text)
       end associate
     end do
-    if (self%cut_short) text = text//new_line("a")//legible(path)//": more problems than these "//written(capacity)
+    if (self%cut_short) text = text//new_line("a")//legible(path)//": more problems than these "//written(most_problems)
     allocate (error)                            ! not by `fail`: there are several lines
     error%message = text(2:)
     error%code = merge(exit_files, exit_usage, self%unreadable == self%count)

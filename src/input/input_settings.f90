@@ -11,7 +11,7 @@ module input_settings
   use input_surfaces, only: take_grip, take_obstacles, take_wall_laws
   use settings, only: sampled_by, settings_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
-  use variables, only: obstacle_groups, row_of, variables_of, words_of
+  use variables, only: is_repeated, obstacle_groups, row_of, variables_of, words_of
   implicit none
   private
   public :: resolve_settings
@@ -33,10 +33,7 @@ contains
     w = range_of(groups, ["side"])
     s = range_of(groups, ["species"])
     do k = 1, size(groups)
-      select case (groups(k)%name)
-      case ("run", "box", "contact", "drive", "stop", "output")
-        call groups(k)%check_choices(problems)
-      end select
+      if (.not. is_repeated(groups(k)%name)) call groups(k)%check_choices(problems)
     end do
     call take_run(groups(place_of("run", groups%name)))
     call take_box(groups(place_of("box", groups%name)))

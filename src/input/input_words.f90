@@ -1,7 +1,7 @@
 !> From the words of the input to checked values: strict numbers, choices, counts and ranges.
 module input_words
   use kinds, only: int64, real64
-  use input_problems, only: problem_list_t
+  use input_problems, only: most_problems, problem_list_t
   use namelist_tokens, only: assignment_t, content, token_t
   use input_groups, only: value_t, text_length
   use variables, only: allowed, largest, variable_t, smallest, table, words_of
@@ -53,7 +53,7 @@ contains
         if (problem == "") cycle
         call problems%add(merge(tokens(k)%line, assignment%line, assignment%line > 0), assignment%where, problem)
         new%faulty = .true.
-        if (problems%is_full()) exit
+        if (problems%count == most_problems) exit
       end do
     end associate
     if (.not. new%faulty) slot = new

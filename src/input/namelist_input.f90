@@ -1,7 +1,7 @@
 !> Reads input text and the `--set` overrides: tokens to assignments to values. Every problem is collected.
 module namelist_input
   use input_groups, only: group_t, value_t
-  use input_problems, only: problem_list_t
+  use input_problems, only: most_problems, problem_list_t
   use input_text, only: unix_lines
   use input_words, only: store_values
   use namelist_tokens, only: assignment_t, content, cut, ending, plain, token_t, unclosed, word
@@ -127,7 +127,7 @@ contains
     !> Reads the whole text.
     subroutine read_text()
       opened = 0
-      do while (.not. problems%is_full())
+      do while (problems%count < most_problems)
         if (opened == 0) then
           if (token(at)%kind == ending) return
           call between_groups()

@@ -1,7 +1,6 @@
 !> The state at the start: the system of the input, with every disk placed and its velocity drawn.
 module initial_state
   use kinds, only: int32, real64
-  use box_geometry, only: box_t
   use drive, only: active
   use errors, only: error_t
   use input_groups, only: range_of
@@ -34,27 +33,14 @@ contains
     associate (settings => input%settings, groups => input%groups(s(1):s(2)))
       call describe_system(settings, sim)
       call sim%list_disks()
-      call check_lengths(sim%box, settings%species%radius, problems)
       if (sim%drive%kind == active) call orient(sim)
-      if (problems%count == 0) call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
+      call place_disks(settings%species, groups, settings%run%seed, line, sim, problems)
       if (problems%count == 0) call set_in_motion(settings, groups, sim, problems)
       if (problems%count == 0) call check_speeds(sim, problems)
       if (problems%count == 0) call sim%start_sums()
     end associate
     call problems%report(input%path, input%overrides, error)
   end subroutine create_simulation
-
-  !> Refuses lengths whose squares cannot be represented.
-  subroutine check_lengths(box, radius, problems)
-    type(box_t), intent(in) :: box
-    real(real64), intent(in) :: radius(:)                   !! [length]
-    type(problem_list_t), intent(inout) :: problems
-
-    associate (longest => maxval(abs([box%lower, box%upper])), shortest => minval(radius, mask=radius > 0))
-      if (longest > most .or. shortest < 1/most) call problems%add(0, "species.radius", "lengths from "//written(shortest) &
-        //" to "//written(longest)//": their squares are out of range; take another unit of length")
-    end associate
-  end subroutine check_lengths
 
   !> Refuses a simulation in which a product of lengths, speeds and masses, of those that decide when and how disks collide,
   !> cannot be represented: disks would fly through each other.

@@ -1,5 +1,5 @@
-!> Whether the system of an input fits together: obstacles and regions in the box, disks in their regions,
-!> and explicit disks beside each other. What is wrong is reported with the line of the input.
+!> Whether the system of an input fits together: obstacles and regions in the box, and disks in their regions. What is wrong
+!> is reported with the line of the input.
 module input_fit
   use kinds, only: pi, real64
   use box_geometry, only: box_t
@@ -7,9 +7,7 @@ module input_fit
   use errors, only: exit_files
   use input_groups, only: group_t, range_of
   use input_problems, only: problem_list_t
-  use known_places, only: add_known, rounding
   use memory, only: check_memory
-  use packing, only: packing_t
   use partners, only: n_sides
   use position_file, only: angle_row, radius_row, spin_row
   use regular_places, only: spans
@@ -21,6 +19,7 @@ module input_fit
   private
   public :: complain_of_file, fit_together
 
+  real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative, of disks that touch
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
   real(real64), parameter :: closest_packing = pi/sqrt(12.0_real64)     !! triangular lattice
 
@@ -32,8 +31,6 @@ contains
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
-    type(packing_t) :: packing
-    logical, allocatable :: sound(:)
     character(len=:), allocatable :: misfit                   ! variable: what
     real(real64) :: beyond(2, 2)
     integer :: o(2), s(2), k, colon
@@ -58,15 +55,8 @@ contains
       k = problems%count
       call check_memory(settings, problems)
       if (problems%count > k) return
-      allocate (sound(size(species)))
       do k = 1, size(species)
-        call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems, sound(k))
-        sound(k) = sound(k) .and. species(k)%placement == "explicit" .and. size(species(k)%position, 2) == species(k)%count
-      end do
-      if (any(sound)) packing = packing_t(box, sum(species%count), size(species))
-      do k = 1, size(species)
-        if (sound(k)) call add_known(packing, species, k, species(k)%position, spread(species(k)%radius, 1, species(k)%count), &
-          groups(s(1) + k - 1), problems)
+        call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
     end associate
   end subroutine fit_together
@@ -118,16 +108,15 @@ contains
   end subroutine complain_of_file
 
   !> A species must have room: in its region, in a period, and in every container.
-  subroutine check_species(group, s, box, alone, problems, sound)
+  subroutine check_species(group, s, box, alone, problems)
     type(group_t), intent(in) :: group
     type(species_settings_t), intent(in) :: s
     type(box_t), intent(in) :: box
     logical, intent(in) :: alone                              !! there is one disk in all
     type(problem_list_t), intent(inout) :: problems
-    logical, intent(out) :: sound
+    logical :: sound
     integer :: axis, k
 
-    sound = .false.
     if (s%radius <= 0 .or. s%count < 1 .or. group%faulty("region")) return
     do axis = 1, 2
       call check_axis()

@@ -13,10 +13,9 @@ module placement
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: angle_column, disks_before, mass_column, spin_column
   use errors, only: error_t
-  use input_fit, only: complain_of_file
+  use input_fit, only: complain_of_file, rounding
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
-  use known_places, only: add_known
   use packing, only: packing_t
   use partners, only: n_sides
   use position_file, only: angle_row, mass_row, radius_row, spin_row
@@ -25,6 +24,7 @@ module placement
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
   use simulation_state, only: simulation_t
+  use starting_disks, only: origin
   use status_line, only: status_line_t
   use texts, only: written
   implicit none
@@ -36,6 +36,7 @@ module placement
   integer(int32), parameter :: few = 5                      !! disks, the same where there are few of them
   real(real64), parameter :: nearly = 1.25_real64           !! so many times more may fit at another trial
   real(real64), parameter :: denser = 1.5_real64            !! 'dense' packs so much more than 'random'
+  integer, parameter :: most_reports = 5                    !! of a kind, for one species
 
 contains
 
@@ -58,10 +59,11 @@ contains
     dense = [(species(k)%placement == "dense" .or. species(k)%placement == "grown", k=1, size(species))]
     do s = 1, size(species)
       if (random(s) .or. dense(s)) cycle
+      k = problems%count
       call find_places(s)
-      if (problems%count == 0) call add_known(packing, species, s, x, radius, groups(s), problems)
-      if (problems%count > 0) return
+      if (problems%count == k) call add_known(packing, s, x, radius)
     end do
+    if (problems%count > 0) return
     do while (any(random))
       s = maxloc(species%radius, dim=1, mask=random)
       call place_at_random(s)
@@ -121,6 +123,66 @@ contains
       end associate
     end subroutine find_places
 
+    !> Adds a species at known places. Disks that overlap others, and those that are not wholly in their region, are problems.
+    subroutine add_known(packing, s, x, radius)
+      type(packing_t), intent(inout) :: packing
+      integer, intent(in) :: s
+      real(real64), intent(in) :: x(:, :)                   !! (2,count) [length]
+      real(real64), intent(in) :: radius(:)                 !! (count) [length]
+      real(real64) :: lower(2), upper(2), slack
+      integer(int32) :: k, blocker
+      integer :: outside, overlapping                       ! disks
+      character(len=:), allocatable :: taken
+
+      outside = 0
+      overlapping = 0
+      taken = ""
+      if (any(packing%box%surface%motion%travels())) taken = ", less what a side that moves takes of it at the start"
+      call centre_range(species(s)%region, packing%box, 0.0_real64, lower, upper)
+      call packing%open_species(int(s, int32), maxval(radius), size(radius), &
+        min(max(minval(x, dim=2), lower), upper), max(min(maxval(x, dim=2), upper), lower))
+      do k = 1, species(s)%count
+        if (min(outside, overlapping) == most_reports) return
+        slack = rounding*(radius(k) + maxval(species%radius))
+        call centre_range(species(s)%region, packing%box, radius(k), lower, upper)
+        if (any(x(:, k) < lower - slack .or. x(:, k) > upper + slack)) then
+          call report(s, k, x(:, k), outside, "is not wholly in its region"//taken)
+          cycle
+        end if
+        call packing%find_blocker(x(:, k), [0.0_real64, 0.0_real64], radius(k) - slack, blocker)
+        call packing%add(disks_before(species, s) + k, int(s, int32), x(:, k), radius(k))
+        if (blocker > 0) then
+          associate (other => packing%disk(blocker)%species)
+            call report(s, k, x(:, k), overlapping, "overlaps disk "//written(blocker - disks_before(species, other))//" of """ &
+              //species(other)%name//'"')
+          end associate
+        else if (blocker < 0) then
+          associate (obstacle => packing%box%surface(1 - blocker))
+            call report(s, k, x(:, k), overlapping, trim(merge("is not wholly inside", "overlaps            ", &
+              obstacle%shape%encloses))//" obstacle """//obstacle%name//'"')
+          end associate
+        end if
+      end do
+    end subroutine add_known
+
+    !> Reports disk k of species s at the point p.
+    subroutine report(s, k, p, count, what)
+      integer, intent(in) :: s, k
+      real(real64), intent(in) :: p(2)                      !! [length]
+      integer, intent(inout) :: count                       !! of such reports
+      character(len=*), intent(in) :: what
+      character(len=:), allocatable :: variable, from
+
+      if (count == most_reports) return
+      count = count + 1
+      variable = "placement"
+      from = ""
+      if (species(s)%placement == "explicit") variable = "position"
+      if (species(s)%file /= "") variable = "file"
+      if (species(s)%file /= "") from = origin(species(s), k, 1)//": "
+      call groups(s)%complain(variable, from//"disk "//written(k)//" at "//written(p(1))//", "//written(p(2))//" "//what, problems)
+    end subroutine report
+
     !> Places a species by random sequential insertion.
     subroutine place_at_random(s)
       integer, intent(in) :: s
@@ -164,7 +226,7 @@ contains
           radius = spread(species(s)%radius, 1, species(s)%count)
           if (grown) then
             call find_places(s)
-            if (problems%count == 0) call add_known(small, species, s, x, smallest_scale*radius, groups(s), problems)
+            if (problems%count == 0) call add_known(small, s, x, smallest_scale*radius)
             if (problems%count > 0) return
             places = reshape([places, x], [2, size(full) + size(radius)])
           end if
@@ -180,7 +242,7 @@ contains
         if (problems%count > 0) return
         associate (s => members(k), first => last + 1)
           last = last + species(s)%count
-          call add_known(packing, species, s, places(:, first:last), full(first:last), groups(s), problems)
+          call add_known(packing, s, places(:, first:last), full(first:last))
         end associate
       end do
     end subroutine place_densely
