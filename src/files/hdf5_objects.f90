@@ -105,7 +105,7 @@ contains
     call self%flush()
     if (allocated(self%failure)) return
     call write_word(self%path, header_end, int(offset + bytes, int64), done)
-    call h5dclose_f(dataset, closed)
+    if (done) call h5dclose_f(dataset, closed)     ! else it stays open, or the file would be cut all the same
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
