@@ -31,7 +31,8 @@ SMALL = """&box boundary = 'periodic', 'wall' /
 &output observables_every_collisions = 2 event_log = .true. checkpoint_every = 1e-6 /
 """
 COMMAND = ["gas.nml", "-o", "gas.h5", "--quiet"]
-OPTIONS = ("--force", "--resume")
+#: How the run begins: over an earlier result, from a stopped run, from a finished one.
+OPTIONS = ("--force", "--resume", "--resume --quiet")
 #: What the program calls, and how each call fails: once, or with + from then on.
 WAYS = {
     "openat": ["EIO", "EIO+"],
@@ -53,7 +54,7 @@ WAYS = {
 def stage(program, tmp_path_factory):
     """A folder with what must come of the run, folders to copy for each option, and their traces.
 
-    With --force an earlier result is there, with --resume a stopped run.
+    Each is named after the options of the run.
     """
     if not shutil.which("strace"):
         pytest.skip("strace is not installed")
@@ -62,6 +63,7 @@ def stage(program, tmp_path_factory):
         ("whole", [], FINISHED),
         ("--force", ["--set", "run.seed=2"], FINISHED),
         ("--resume", ["--set", "stop.wall_clock=1e-9"], STOPPED),
+        ("--resume --quiet", ["--set", "stop.events=1"], FINISHED),
     ):
         folder = stage / option
         folder.mkdir()
@@ -95,7 +97,7 @@ def traced(program, folder, option, *what):
     strace = ["strace", "-f", "-y", "-o", "trace", *what]
     if not any(":signal=" in word for word in what):  # with it strace 6.1 sends none
         strace.insert(1, "--seccomp-bpf")
-    return started(*strace, program, *COMMAND, option, folder=folder)
+    return started(*strace, program, *COMMAND, *option.split(), folder=folder)
 
 
 def positions(stage, option, call, first="gas.nml") -> range:
@@ -104,6 +106,11 @@ def positions(stage, option, call, first="gas.nml") -> range:
     begin = next(k for k, line in enumerate(lines) if first in line)
     calls = [k for k, line in enumerate(lines) if re.match(rf"\d+ +{call}\(", line)]
     return range(sum(k < begin for k in calls) + 1, len(calls) + 1)
+
+
+def chosen(numbers, step, last=6) -> list[int]:
+    """Some of them, and those of the last moments, when HDF5 cuts the file and it gets its name."""
+    return sorted({*numbers[::step], *numbers[-last:]})
 
 
 def outcome(check, program, stage, option, call, inject) -> str:
@@ -135,10 +142,10 @@ def timeless(path) -> bytes:
 
 
 def check_after_failure(program, stage, folder, option, call, inject):
-    earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
+    result = folder / "gas.h5"
+    earlier = result.read_bytes() if result.exists() else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     assert run.returncode in (FINISHED, USAGE, FILES), (run.returncode, run.stderr)
-    result = folder / "gas.h5"
     if run.returncode == FINISHED:
         assert run.stderr == ""
         assert same_results(stage, result)
@@ -159,20 +166,21 @@ def go_on(program, stage, folder, option):
         assert is_beginning(found, committed(stage / "whole" / "gas.h5")) == []
         if shutil.which("h5dump"):
             subprocess.run(["h5dump", "-H", part], check=True, stdout=subprocess.DEVNULL)
-    assert part.exists() or option == "--force", "the checkpoint is gone"
-    again = started(program, *COMMAND, "--resume" if part.exists() else "--force", folder=folder)
+    assert part.exists() or option != "--resume", "the checkpoint is gone"
+    onward = option if option != "--force" or not part.exists() else "--resume"
+    again = started(program, *COMMAND, *onward.split(), folder=folder)
     assert again.returncode == FINISHED, ("again", again.stderr)
     assert same_results(stage, folder / "gas.h5")
 
 
 @pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
 def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step):
     cases = [
-        (option, f"inject={call}:error={way[0]}:when={position}{way[1]}")
+        (option, f"inject={call}:error={error}:when={number}{again}")
         for option in OPTIONS
-        for position in positions(stage, option, call)[::step]
-        for way in (way.partition("+")[:2] for way in WAYS[call])
+        for number in chosen(positions(stage, option, call), step)
+        for error, again in (way.partition("+")[:2] for way in WAYS[call])
     ]
     assert problems(check_after_failure, program, stage, call, cases) == []
 
@@ -190,10 +198,10 @@ def problems(check, program, stage, call, cases) -> list[str]:
 
 def check_after_kill(program, stage, folder, option, call, inject):
     """What the final name names is an earlier result or the whole one; the other file goes on."""
-    earlier = (folder / "gas.h5").read_bytes() if option == "--force" else None
+    result = folder / "gas.h5"
+    earlier = result.read_bytes() if result.exists() else None
     run = traced(program, folder, option, "-e", f"trace={call}", "-e", inject)
     assert run.returncode in (FINISHED, -signal.SIGKILL, 128 + signal.SIGKILL), run.stderr
-    result = folder / "gas.h5"
     if result.exists() and result.read_bytes() != earlier:
         assert same_results(stage, result)
     else:
@@ -201,14 +209,13 @@ def check_after_kill(program, stage, folder, option, call, inject):
 
 
 @pytest.mark.parametrize("call", ["pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat"])
-@pytest.mark.parametrize("step", [40, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
 def test_a_kill_at_any_call_costs_nothing(program, stage, call, step):
-    """Above all in the last moments, when HDF5 cuts the file and it gets its name."""
-    cases = []
-    for option in OPTIONS:
-        numbers = positions(stage, option, call)
-        chosen = sorted({*numbers[::step], *numbers[-12:]})
-        cases += [(option, f"inject={call}:signal=SIGKILL:when={number}") for number in chosen]
+    cases = [
+        (option, f"inject={call}:signal=SIGKILL:when={number}")
+        for option in OPTIONS
+        for number in chosen(positions(stage, option, call), step)
+    ]
     assert problems(check_after_kill, program, stage, call, cases) == []
 
 
@@ -242,14 +249,13 @@ def contents_of(folder) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
 def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stage, call, step):
-    """Also in the last moments, when the file gets its name and the summary is printed."""
-    cases = []
-    for option in OPTIONS:
-        numbers = positions(stage, option, call)
-        chosen = sorted({*numbers[::step], *numbers[-2:]})
-        cases += [(option, f"inject={call}:signal=SIGTERM:when={number}") for number in chosen]
+    cases = [
+        (option, f"inject={call}:signal=SIGTERM:when={number}")
+        for option in OPTIONS
+        for number in chosen(positions(stage, option, call), step, last=2)
+    ]
     assert problems(check_after_signal, program, stage, call, cases) == []
 
 

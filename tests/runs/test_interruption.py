@@ -452,23 +452,6 @@ def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):
     assert resumed > 0 or text == PLANNED
 
 
-def test_a_disk_that_others_fill_costs_no_earlier_sample(ricochet, started, tmp_path, small_disk):
-    write_input(tmp_path, PLANNED.replace("time = 0.01", "time = 0.001"))
-    assert ricochet("gas.nml", "-o", "whole.h5").returncode == FINISHED
-    part = small_disk(200_000) / "gas.h5.part"
-    process = started("gas.nml", "-o", "disk/gas.h5")
-    wait_for(lambda: frames_in(part) > 1000)
-    with held(process):  # else it may be done before the disk is full
-        fill = ["dd", "if=/dev/zero", "of=disk/other", "bs=1M"]
-        subprocess.run(fill, cwd=tmp_path, stderr=subprocess.DEVNULL)
-    message = process.communicate()[1]
-    assert process.returncode == FILES and re.search(GO_ON, message)
-    assert is_beginning(committed(part), committed(tmp_path / "whole.h5")) == []
-    (tmp_path / "disk/other").unlink()
-    assert ricochet("gas.nml", "-o", "disk/gas.h5", "--resume").returncode == FINISHED
-    assert differences(tmp_path / "whole.h5", tmp_path / "disk/gas.h5") == []
-
-
 def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
     write_input(tmp_path, BUSY)
     run = subprocess.run(

@@ -17,7 +17,6 @@ from whole_runs import (
     USAGE,
     differences,
     frames_in,
-    held,
     occupy,
     one_line,
     wait_for,
@@ -330,20 +329,6 @@ def as_nobody(folder, *arguments):
     command = [folder / "ricochet", *arguments]
     options = {"capture_output": True, "text": True, "timeout": PATIENCE}
     return subprocess.run(command, cwd=folder, **user, **options)
-
-
-def test_a_run_of_another_user_is_a_twin(shared):
-    command = [shared / "ricochet", *COMMAND, "--set", "stop.time=20000"]
-    first = subprocess.Popen(command, cwd=shared)
-    try:
-        wait_for((shared / "gas.h5.part").exists)
-        with held(first):
-            run = as_nobody(shared, *COMMAND, "--force")
-        assert run.returncode == FILES and "another run" in one_line(run)
-        assert first.wait() == FINISHED
-    finally:
-        first.kill()
-        first.wait()
 
 
 def test_a_folder_that_cannot_be_written_or_listed(shared):

@@ -5,7 +5,6 @@ That the bits are the same whatever the system and the way is asserted by `test_
 
 import random
 import re
-import signal
 
 import h5py
 import numpy as np
@@ -20,9 +19,7 @@ from whole_runs import (
     USAGE,
     contents,
     differences,
-    let_work,
     one_line,
-    processor_time_of,
     write_input,
 )
 
@@ -236,37 +233,6 @@ def test_a_sample_between_collisions_of_one_moment_is_not_that_of_the_moment(
         assert ricochet(*COMMAND, "--set", f"stop.{end}", "--force").returncode == FINISHED
         assert ricochet(*COMMAND, *last, "--resume").returncode == FINISHED
         assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
-
-
-LONG = ["--set", "stop.time=30", "--set", "output.checkpoint_every=0.05"]
-
-
-@pytest.mark.parametrize("tries", [12, pytest.param(100, marks=CHECK)])
-def test_a_continued_run_that_is_stopped_and_killed_loses_nothing(
-    ricochet, started, tmp_path, tries
-):
-    """The finished file stays as it is until the longer one takes its place."""
-    write_input(tmp_path, GAS + GROWING)
-    duration = processor_time_of(started("gas.nml", "-o", "whole.h5", *LONG))
-    assert ricochet(*COMMAND, "--set", "stop.time=1.01").returncode == FINISHED
-    output, rng = tmp_path / "gas.h5", random.Random(tries)
-    short, ended = output.read_bytes(), 0
-    for k in range(tries):
-        process = started(*COMMAND, *LONG, "--resume")
-        let_work(process, rng.uniform(0, duration))
-        process.send_signal(signal.SIGTERM if k % 3 == 2 else signal.SIGKILL)
-        message = process.communicate()[1]
-        allowed = STOPPED
-        if output.read_bytes() != short:  # it has finished, even if it was killed right afterwards
-            assert differences(tmp_path / "whole.h5", output) == []
-            output.write_bytes(short)
-            ended += 1
-            allowed = FINISHED
-        assert process.returncode in (allowed, -signal.SIGKILL), message
-    assert ended < tries
-    if output.read_bytes() == short:
-        assert ricochet(*COMMAND, *LONG, "--resume").returncode == FINISHED
-    assert differences(tmp_path / "whole.h5", output) == []
 
 
 def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
