@@ -3,7 +3,6 @@
 !> overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use big_disks, only: big_disks_t, largest_small_radius, ring_cell_t
   use box_geometry, only: next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
@@ -13,8 +12,8 @@ module cell_grid
   use free_flight, only: time_to_circle
   use images, only: images_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
-  use obstacle_lists, only: obstacle_lists_t
   use partners, only: axis_of, is_wall, looks_again, n_sides, nothing, sense_of, side_crossed
+  use reach_lists, only: largest_small_radius, place_t, reach_lists_t
   use shapes, only: spare
   use simulation_state, only: simulation_t
   implicit none
@@ -33,9 +32,8 @@ module cell_grid
     logical, public :: everyone = .false.          !! predict all disks again after each event, not just those involved
     type(cell_faces_t), public :: faces                    !! of the cells, and the sides among them
     logical, public :: roomy = .false.             !! cells overlap: a disk that collides chooses its cell again
-    type(big_disks_t) :: big                       !! disks much larger than those that the cells are made for
     type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
-    type(obstacle_lists_t) :: obstacles            !! that reach into the cells
+    type(reach_lists_t) :: reach                   !! obstacles, and disks much larger than those that the cells are made for
     type(images_t) :: images                       !! of the box, in this epoch
   contains
     procedure :: build
@@ -51,7 +49,7 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, sorts the disks into them and finds the obstacles that reach into each.
+  !> Chooses the cells, sorts the disks into them and finds what reaches into each.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
@@ -72,10 +70,8 @@ contains
           call self%insert(sim%tag(i), i, cell)
         end if
       end do
-      call self%obstacles%renew(sim%box, patch, self%faces)
-      call self%big%start(sim, patch%small, patch%n, self%faces)
-      if (.not. any(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. self%big%count == 0 &
-        .and. .not. self%is_part) return
+      call self%reach%renew(sim, patch, self%faces)
+      if (.not. (any(sim%box%periodic) .or. allocated(self%reach%first) .or. self%is_part)) return
       do iy = 0, int(patch%n(2) + 1, int16)
         do ix = 0, int(patch%n(1) + 1, int16)
           call mark(self, [ix, iy])
@@ -126,26 +122,24 @@ contains
     logical :: special
 
     special = .not. self%patch%holds(cell)
-    if (.not. special) then
-      special = self%patch%at_seam(cell) .or. self%obstacles%reach_into(cell)
-      if (self%big%count > 0) special = special .or. self%big%first(cell(1), cell(2)) > 0 .or. all(cell == 1)
-    end if
+    if (.not. special) special = self%patch%at_seam(cell) .or. self%reach%has_any(cell) &
+      .or. (size(self%reach%big) > 0 .and. all(cell == 1))
     call self%cells%mark(self%cells%number(cell), special)
   end subroutine mark
 
-  !> Updates the registration of a big disk. The cells that it leaves and those that it reaches change their marks.
+  !> Notes where a big disk is now. The cells that it leaves and those that it reaches change their marks.
   subroutine follow_big(self, sim, number)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: number
-    type(ring_cell_t), allocatable :: ring(:)
+    type(place_t), allocatable :: rim(:)
     integer :: m
 
-    allocate (ring, source=self%big%ring(number)%at)
-    call self%big%register(sim, number, self%faces)
-    ring = [ring, self%big%ring(number)%at]
-    do m = 1, size(ring)
-      call mark(self, int(ring(m)%cell, int16))
+    allocate (rim, source=self%reach%big(number)%rim)
+    call self%reach%follow(sim, number, self%patch, self%faces)
+    rim = [rim, self%reach%big(number)%rim]
+    do m = 1, size(rim)
+      call mark(self, int(rim(m)%cell, int16))
     end do
   end subroutine follow_big
 
@@ -155,8 +149,8 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, code
 
-    if (sim%disk(i)%radius > self%big%small) then
-      call self%follow_big(sim, self%big%number_of(i))
+    if (sim%disk(i)%radius > self%patch%small) then
+      call self%follow_big(sim, self%reach%number_of(i))
     else if (code /= looks_again) then
       call change_cell(self, sim, i, code)
     end if
@@ -195,7 +189,7 @@ contains
     integer(int32), intent(in) :: i
     integer(int16) :: cell(2)
 
-    if (disk%radius > self%big%small) return
+    if (disk%radius > self%patch%small) return
     cell = tag%cell
     call self%faces%choose_cell(disk, disk%clock, cell)
     if (cell(1) /= tag%cell(1) .or. cell(2) /= tag%cell(2)) call move(self, tag, i, cell)
@@ -324,7 +318,7 @@ contains
     integer(int32), intent(in) :: i
     type(prospect_t) :: near
 
-    if (sim%disk(i)%radius > self%big%small) then
+    if (sim%disk(i)%radius > self%patch%small) then
       call find_event_of_big(self, sim, i, near)
     else if (.not. self%patch%holds(sim%tag(i)%cell)) then
       call self%take_out(sim%tag(i), i)
@@ -346,13 +340,12 @@ contains
     integer(int32), intent(in) :: i
     type(prospect_t), intent(out) :: near
     real(real64) :: t
-    integer(int32) :: e
 
     near%disk = i
     associate (cell => sim%tag(i)%cell)
       call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
       near%cell = self%cells%number(cell)
-      call self%obstacles%next_contact(sim%box, sim%disk(i), sim%tag(i), near%time, near%partner)
+      if (self%reach%has_any(cell)) call scan_reach(self, sim, self%reach%first(cell(1), cell(2)), near)
       if (self%patch%at_seam(cell)) then
         t = self%images%look_again(sim%now, self%patch%width(1))
         if (t < near%time) near%partner = looks_again
@@ -363,16 +356,29 @@ contains
         call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
         call scan_chains_around(self%cells, sim, near)
       end if
-      if (self%big%count == 0) return
-      e = self%big%first(cell(1), cell(2))
     end associate
+  end subroutine find_event_of_small
+
+  !> The contacts of a small disk with what reaches into its cell.
+  subroutine scan_reach(self, sim, first, near)
+    class(cell_grid_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: first            !! entry in the list of the cell
+    type(prospect_t), intent(inout) :: near
+    integer(int32) :: e
+
+    e = first
     do while (e > 0)
-      associate (listing => self%big%listing(e))
-        call scan_one(sim, self%big%disk(listing%number), self%images%image(real(listing%image, real64)), near)
-        e = listing%next
+      associate (entry => self%reach%entry(e), i => near%disk)
+        if (entry%code > 0) then
+          call scan_one(sim, entry%code, self%images%image(real(entry%image, real64)), near)
+        else
+          call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [entry%code], near%time, near%partner)
+        end if
+        e = entry%next
       end associate
     end do
-  end subroutine find_event_of_small
+  end subroutine scan_reach
 
   !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
   !> the cells along its rim.
@@ -385,21 +391,21 @@ contains
     integer(int32) :: number, m, image
 
     near%disk = i
-    number = self%big%number_of(i)
+    number = self%reach%number_of(i)
     call next_side(sim%box, sim%disk(i), near%time, near%partner)
     call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(1 - m, m=n_sides + 1, size(sim%box%surface))], &
       near%time, near%partner)
-    t_margin = sim%now + time_to_circle(sim%position(i) - self%big%centre(:, number), sim%velocity(i), &
-      sim%box%gravity, self%big%margin, inside=.true.)
+    t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
+      sim%box%gravity, self%reach%margin, inside=.true.)
     if (t_margin < near%time) near%partner = looks_again
     near%time = min(near%time, t_margin)
     do image = 1, self%images%count()
-      do m = 1, self%big%count
-        call scan_one(sim, self%big%disk(m), self%images%image(self%images%around(image)), near)
+      do m = 1, size(self%reach%big, kind=int32)
+        call scan_one(sim, self%reach%big(m)%disk, self%images%image(self%images%around(image)), near)
       end do
     end do
-    do m = 1, size(self%big%ring(number)%at, kind=int32)
-      associate (place => self%big%ring(number)%at(m))
+    do m = 1, size(self%reach%big(number)%rim, kind=int32)
+      associate (place => self%reach%big(number)%rim(m))
         call scan_cells(self%cells, sim, [place%cell(1) + self%cells%stride*place%cell(2)], near, &
           self%images%image(real(-place%image, real64)))
       end associate

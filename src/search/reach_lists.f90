@@ -1,0 +1,224 @@
+!> What may reach into which cell, besides the small disks around it: obstacles, and a few big disks among many small ones.
+!>
+!> The cells are made for the small disks. A big one is listed in every cell from which a small one could touch it while
+!> it stays within a margin of where it was then. So a small disk finds big ones in its own cell, and a big disk searches
+!> the cells along its rim: no disk pays for sizes that do not occur nearby.
+module reach_lists
+  use kinds, only: int16, int32, real64
+  use cell_faces, only: cell_faces_t, patch_t
+  use circles, only: new_circle
+  use disks, only: disk_t
+  use partners, only: n_sides
+  use shapes, only: shape_t, spare
+  use simulation_state, only: simulation_t
+  implicit none
+  private
+  public :: largest_small_radius, place_t, reach_lists_t
+
+  integer(int32), parameter :: most_big_disks = 256    !! they test each other all with all
+
+  !> A cell that something reaches into.
+  type :: place_t
+    integer(int32) :: cell(2) = 0                !! column, row
+    integer(int32) :: image(2) = 0               !! periods from there to where it is seen from the cell
+  end type place_t
+
+  !> Something in the list of a cell.
+  type :: entry_t
+    integer(int32) :: code = 0                   !! a big disk (> 0) or an obstacle (<= 0)
+    integer(int32) :: image(2) = 0
+    integer(int32) :: next = 0                   !! entry in the same list; 0: none
+  end type entry_t
+
+  type :: big_disk_t
+    integer(int32) :: disk = 0                   !! which disk it is
+    real(real64) :: centre(2) = 0.0_real64       !! where it was when it was listed [length]
+    type(place_t), allocatable :: rim(:)
+  end type big_disk_t
+
+  type :: reach_lists_t
+    type(big_disk_t), allocatable :: big(:)
+    real(real64) :: margin = 0.0_real64          !! of big disks [length]
+    integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none. Not there if nothing reaches
+    type(entry_t), allocatable :: entry(:)
+    integer(int32), private :: vacant = 0        !! first of the entries not in use
+  contains
+    procedure :: renew
+    procedure :: has_any
+    procedure :: number_of
+    procedure :: follow
+  end type reach_lists_t
+
+contains
+
+  !> The largest radius among the disks that cells should be made for: all, unless a few are much bigger.
+  pure function largest_small_radius(disk) result(radius)
+    type(disk_t), intent(in) :: disk(:)
+    real(real64) :: radius, next
+    integer :: n_bigger
+
+    radius = maxval(disk%radius)
+    do
+      next = maxval(disk%radius, mask=disk%radius <= 0.5_real64*radius)
+      n_bigger = count(disk%radius > next)
+      if (.not. next > 0 .or. n_bigger > most_big_disks .or. 20*n_bigger > size(disk)) exit
+      radius = next
+    end do
+  end function largest_small_radius
+
+  !> Lists the obstacles, and the disks bigger than those that the cells are made for.
+  subroutine renew(self, sim, patch, faces)
+    class(reach_lists_t), intent(out) :: self
+    type(simulation_t), intent(in) :: sim
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
+    integer(int32) :: i, k
+
+    associate (disks => pack([(i, i=1, sim%n_disks())], sim%disk%radius > patch%small))
+      allocate (self%big(size(disks)))
+      self%big%disk = disks
+    end associate
+    if (.not. sim%box%has_obstacles() .and. size(self%big) == 0) return
+    self%margin = 0.5_real64*minval(faces%width)
+    allocate (self%first(patch%n(1), patch%n(2)), source=0_int32)
+    allocate (self%entry(0))
+    do k = n_sides + 1, size(sim%box%surface, kind=int32)
+      call enter(self, 1 - k, in_reach(sim%box%surface(k)%shape, 0.0_real64, patch, faces))
+    end do
+    do k = 1, size(self%big, kind=int32)
+      allocate (self%big(k)%rim(0))
+      call self%follow(sim, k, patch, faces)
+    end do
+  end subroutine renew
+
+  !> Whether anything reaches into a cell.
+  pure function has_any(self, cell) result(yes)
+    class(reach_lists_t), intent(in) :: self
+    integer(int16), intent(in) :: cell(2)          !! column and row, from 1
+    logical :: yes
+
+    yes = allocated(self%first)
+    if (yes) yes = self%first(cell(1), cell(2)) > 0
+  end function has_any
+
+  !> Which of the big disks disk i is; 0 if none.
+  pure function number_of(self, i) result(k)
+    class(reach_lists_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    integer(int32) :: k
+
+    do k = size(self%big, kind=int32), 1, -1
+      if (self%big(k)%disk == i) exit
+    end do
+  end function number_of
+
+  !> Lists the k-th big disk where it is now.
+  subroutine follow(self, sim, k, patch, faces)
+    class(reach_lists_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: k
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
+
+    associate (big => self%big(k))
+      call leave(self, big%disk, big%rim)
+      big%centre = sim%position(big%disk)
+      big%rim = in_reach(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, patch, faces)
+      call enter(self, big%disk, big%rim)
+    end associate
+  end subroutine follow
+
+  !> The cells in which a small disk can be that touches an outline, wherever it has moved within a margin.
+  pure function in_reach(shape, margin, patch, faces) result(places)
+    class(shape_t), intent(in) :: shape
+    real(real64), intent(in) :: margin             !! [length]
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
+    type(place_t), allocatable :: places(:)
+    real(real64) :: middle(2), room(2), corner(2, 2), half(2)
+    integer(int32) :: low(2), high(2), cell(2), ix, iy, n
+
+    middle = shape%middle - patch%lower
+    room = (0.5_real64*(faces%width + faces%overlap) + shape%extent() + patch%small + margin)*(1 + spare)
+    low = ceiling((middle - room)/faces%width + 0.5_real64)
+    high = floor((middle + room)/faces%width + 0.5_real64)
+    if (shape%encloses) low = 1
+    if (shape%encloses) high = patch%whole
+    where (.not. faces%box%periodic)
+      low = min(max(low, 1), patch%whole)
+      high = min(max(high, 1), patch%whole)
+    end where
+    allocate (places(product(max(high - low + 1, 0))))
+    n = 0
+    do iy = low(2), high(2)
+      do ix = low(1), high(1)
+        cell = modulo([ix, iy] - patch%first, patch%whole) + 1
+        if (any(cell > patch%n)) cycle
+        call faces%rectangle([ix, iy], patch%whole, corner(:, 1), corner(:, 2))
+        half = 0.5_real64*(corner(:, 2) - corner(:, 1))*(1 + spare) + margin
+        associate (d => 0.5_real64*(corner(:, 1) + corner(:, 2)) - middle)
+          if (.not. shape%reaches(d, half, patch%small) .or. shape%covers(d, half, 0.0_real64)) cycle
+        end associate
+        n = n + 1
+        places(n) = place_t(cell, -floor(real([ix, iy] - 1, real64)/patch%whole))
+      end do
+    end do
+    places = places(:n)
+  end function in_reach
+
+  !> Enters something into the lists of some cells, behind what is there: obstacles come first, in their order.
+  pure subroutine enter(self, code, places)
+    class(reach_lists_t), intent(inout) :: self
+    integer(int32), intent(in) :: code
+    type(place_t), intent(in) :: places(:)
+    type(entry_t), allocatable :: more(:)
+    integer(int32) :: e, last, m, n
+
+    do m = 1, size(places, kind=int32)
+      if (self%vacant == 0) then
+        n = size(self%entry, kind=int32)
+        allocate (more(2*n + 64))
+        more(:n) = self%entry
+        more(n + 1:)%next = [(e, e=n + 2, size(more, kind=int32)), 0]
+        call move_alloc(more, self%entry)
+        self%vacant = n + 1
+      end if
+      e = self%vacant
+      self%vacant = self%entry(e)%next
+      self%entry(e) = entry_t(code, places(m)%image)
+      associate (first => self%first(places(m)%cell(1), places(m)%cell(2)))
+        last = first
+        if (first == 0) first = e
+      end associate
+      if (last == 0) cycle
+      do while (self%entry(last)%next > 0)
+        last = self%entry(last)%next
+      end do
+      self%entry(last)%next = e
+    end do
+  end subroutine enter
+
+  !> Takes it out of the lists of these cells.
+  pure subroutine leave(self, code, places)
+    class(reach_lists_t), intent(inout) :: self
+    integer(int32), intent(in) :: code
+    type(place_t), intent(in) :: places(:)
+    integer(int32) :: e, before, m
+
+    do m = 1, size(places, kind=int32)
+      associate (first => self%first(places(m)%cell(1), places(m)%cell(2)))
+        before = 0
+        e = first
+        do while (self%entry(e)%code /= code)
+          before = e
+          e = self%entry(e)%next
+        end do
+        if (before == 0) first = self%entry(e)%next
+        if (before > 0) self%entry(before)%next = self%entry(e)%next
+      end associate
+      self%entry(e)%next = self%vacant
+      self%vacant = e
+    end do
+  end subroutine leave
+
+end module reach_lists
