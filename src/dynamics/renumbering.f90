@@ -13,21 +13,11 @@ module renumbering
 contains
 
   !> Sorts the disks by the cells of a grid with about one disk per cell, and the cells by square tiles, so that
-  !> few pages hold a neighbourhood. The order follows from the state alone and is the same for every search
-  !> and queue; `tag%id` keeps the order of the input.
+  !> few pages hold a neighbourhood. Those of one cell keep their order. The order follows from the state alone and is the
+  !> same for every search and queue; `tag%id` keeps the order of the input.
   subroutine renumber(sim)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), allocatable :: order(:)
-
-    call sort_by_cells(sim, order)
-    call move_in_order(sim, order)
-  end subroutine renumber
-
-  !> The order of the disks by cells: by tiles first, then by cells in each tile. Those of one cell keep their order.
-  subroutine sort_by_cells(sim, order)
-    type(simulation_t), intent(in) :: sim
-    integer(int32), allocatable, intent(out) :: order(:)   !! (n) the disk that comes to each place
-    integer(int32), allocatable :: first(:), place(:), cell(:)
+    integer(int32), allocatable :: first(:), place(:), cell(:), order(:)
     integer(int32) :: n(2), c(2), i
 
     n = int(max(1.0_real64, min(sqrt(real(sim%n_disks(), real64)), 30000.0_real64)), int32)
@@ -35,32 +25,19 @@ contains
     allocate (order(sim%n_disks()), place(sim%n_disks()), cell(sim%n_disks()))
     do i = 1, sim%n_disks()
       c = int(min(max((sim%position(i) - sim%box%lower)/sim%box%edges()*tile*n, 0.0_real64), tile*n - 1.0_real64), int32)
-      cell(i) = tile**2*dot_product(c/tile, [1, n(1)]) + dot_product(modulo(c, tile), [1, tile])
+      cell(i) = 1 + tile**2*dot_product(c/tile, [1, n(1)]) + dot_product(modulo(c, tile), [1, tile])
     end do
-    call sort_by_count(cell/tile**2 + 1, product(n), first, place)
+    call sort_by_count(cell, tile**2*product(n), first, place)
     do i = 1, sim%n_disks()
       order(place(i)) = i
     end do
-    do i = 1, product(n)
-      call sort_tile(cell, order(first(i):first(i + 1) - 1))
-    end do
-  end subroutine sort_by_cells
-
-  !> Sorts the disks of one tile by their cells.
-  subroutine sort_tile(cell, order)
-    integer(int32), intent(in) :: cell(:)         !! (disks) counted from 0, tile by tile
-    integer(int32), intent(inout) :: order(:)     !! numbers of the disks in the tile
-    integer(int32), allocatable :: first(:)
-    integer(int32) :: place(size(order))
-
-    call sort_by_count(modulo(cell(order), tile**2) + 1, tile**2, first, place)
-    order(place) = order
-  end subroutine sort_tile
+    call move_in_order(sim, order)
+  end subroutine renumber
 
   !> Lets the disks take their places: no second copy of them is needed, and most are near already.
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(inout) :: order(:)     !! as in `sort_by_cells`; afterwards each is at its place
+    integer(int32), intent(inout) :: order(:)     !! the disk that comes to each place; afterwards each is there
     type(disk_t) :: disk
     type(tag_t) :: tag
     real(real64) :: extra(size(sim%extra, 1))
