@@ -29,20 +29,12 @@ module near_pairs
     real(real64), private :: skin = 0.0_real64 !! gap up to which they are listed [length]
     real(real64), allocatable, private :: from(:, :)   !! (disks,2) where they were when listed [length]
   contains
-    procedure :: forget
     procedure :: update
     procedure :: mark_overlaps
     procedure :: shift
   end type near_pairs_t
 
 contains
-
-  !> Forgets the disks of before.
-  subroutine forget(self)
-    class(near_pairs_t), intent(inout) :: self
-
-    self%known = .false.
-  end subroutine forget
 
   !> Notes that disk i has been moved by a period.
   subroutine shift(self, i, dx)
@@ -60,6 +52,7 @@ contains
     real(real64), contiguous, intent(in) :: x(:, :)   !! (disks,2) where they are [length]
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
+    real(real64) :: width                      ! of a bin: a mean disk and the skin; more in a vast box [length]
     integer(int32) :: bins(2), i, k
 
     if (self%known) then
@@ -77,8 +70,12 @@ contains
     end do
     self%n_obstacles = self%n
     bins = 1
-    if (.not. all_pairs) bins = int(min(sim%box%edges()/bin_width(sim, self%skin), cells_per_disk*sim%n_disks()), int32)
-    call list_disks(self, sim, x, max(bins, 1))
+    if (.not. all_pairs) then
+      width = max(self%skin + 2*sum(sim%disk%radius)/sim%n_disks(), &
+        sqrt(product(sim%box%edges())/(cells_per_disk*sim%n_disks())))
+      bins = int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32)
+    end if
+    call list_disks(self, sim, x, bins)
   end subroutine update
 
   !> How many disks have moved by some length or more.
@@ -130,15 +127,6 @@ contains
     reach = sqrt(2*pairs_per_disk/pi*product(sim%box%edges())/sim%n_disks())
     skin = max(min(2*steps_per_list*step*sqrt(fastest), reach - diameter), least_skin*diameter)
   end function wanted_skin
-
-  !> As wide as a mean disk and the skin; wider in a vast box.
-  pure function bin_width(sim, skin) result(width)
-    type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: skin
-    real(real64) :: width                      !! [length]
-
-    width = max(skin + 2*sum(sim%disk%radius)/sim%n_disks(), sqrt(product(sim%box%edges())/(cells_per_disk*sim%n_disks())))
-  end function bin_width
 
   !> Adds the pairs of disks. Each looks for smaller ones, or equal ones of higher numbers: so a small disk searches only
   !> bins close by, however large the largest disk is. Bins go on round the box; at walls that does no harm.

@@ -7,11 +7,6 @@ module domain_cuts
   private
   public :: domain_cuts_t
 
-  !> First cells of consecutive pieces, and the first beyond the last.
-  type :: cuts_t
-    integer(int32), allocatable :: first(:)
-  end type cuts_t
-
   type :: domain_cuts_t
     type(patch_t) :: whole
     integer(int32) :: halo = 0
@@ -34,13 +29,13 @@ contains
     logical, intent(in) :: periodic(2)
     integer(int16), intent(in) :: cell(:, :)       !! (2,disks) where they are
     integer(int32), intent(in) :: wanted, threads, halo
-    type(cuts_t) :: slabs, pieces
+    integer(int32), allocatable :: slab(:), piece(:)       ! first cells of the pieces, and the first beyond the last
     integer(int32), allocatable :: weight(:), weights(:, :)
     integer(int32) :: n(2), i, s, k, r
 
     self%whole = whole
     self%halo = halo
-    n = numbers(self, periodic, wanted, threads)
+    n = numbers()
     self%n = product(n)
     if (allocated(self%low)) deallocate (self%low, self%high, self%slab_of, self%domain_of)
     allocate (self%low(2, self%n), self%high(2, self%n), self%slab_of(whole%n(1)), self%domain_of(whole%n(2), n(1)))
@@ -48,63 +43,57 @@ contains
     do i = 1, size(cell, 2, kind=int32)
       weight(cell(1, i)) = weight(cell(1, i)) + 1
     end do
-    call divide(weight, n(1), 2*halo + 1, slabs)
+    slab = pieces(weight, n(1), 2*halo + 1)
     do s = 1, n(1)
-      self%slab_of(slabs%first(s):slabs%first(s + 1) - 1) = s
+      self%slab_of(slab(s):slab(s + 1) - 1) = s
     end do
     do i = 1, size(cell, 2, kind=int32)
       s = self%slab_of(cell(1, i))
       weights(cell(2, i), s) = weights(cell(2, i), s) + 1
     end do
     do s = 1, n(1)
-      call divide(weights(:, s), n(2), 2*halo + 1, pieces)
+      piece = pieces(weights(:, s), n(2), 2*halo + 1)
       do r = 1, n(2)
         k = r + n(2)*(s - 1)
-        self%low(:, k) = [slabs%first(s), pieces%first(r)]
-        self%high(:, k) = [slabs%first(s + 1), pieces%first(r + 1)] - 1
+        self%low(:, k) = [slab(s), piece(r)]
+        self%high(:, k) = [slab(s + 1), piece(r + 1)] - 1
         self%domain_of(self%low(2, k):self%high(2, k), s) = k
       end do
     end do
+  contains
+
+    !> How many slabs, and domains in each: not many fewer than wanted, none too narrow, and so that the work is least.
+    pure function numbers() result(n)
+      integer(int32) :: n(2), most(2), columns, rows
+
+      most = max(self%whole%n/(2*self%halo + 1), 1)
+      n = 1
+      do columns = 1, min(wanted, most(1))
+        rows = min(wanted/columns, most(2))
+        if (3*columns*rows < 2*min(wanted, product(most))) cycle
+        if (all(n == 1) .or. work([columns, rows]) < work(n)) n = [columns, rows]
+      end do
+    end function numbers
+
+    !> What one thread has to do: its number of domains times the cells in the largest patch, as if cuts were even.
+    pure function work(n)
+      integer(int32), intent(in) :: n(2)
+      real(real64) :: work
+
+      work = product(real(self%whole%n, real64)/n + merge(2*self%halo, 0, n > merge(1, 2, periodic)) &
+        + merge(self%halo, 0, n == 2 .and. .not. periodic))*((product(n) + threads - 1)/threads)
+    end function work
   end subroutine cut
 
-  !> How many slabs, and domains in each: not many fewer than wanted, none too narrow, and so that the work is least.
-  pure function numbers(self, periodic, wanted, threads) result(n)
-    class(domain_cuts_t), intent(in) :: self
-    logical, intent(in) :: periodic(2)
-    integer(int32), intent(in) :: wanted, threads
-    integer(int32) :: n(2), most(2), columns, rows
-
-    most = max(self%whole%n/(2*self%halo + 1), 1)
-    n = 1
-    do columns = 1, min(wanted, most(1))
-      rows = min(wanted/columns, most(2))
-      if (3*columns*rows < 2*min(wanted, product(most))) cycle
-      if (all(n == 1) .or. work(self, [columns, rows], periodic, threads) < work(self, n, periodic, threads)) &
-        n = [columns, rows]
-    end do
-  end function numbers
-
-  !> What one thread has to do: its number of domains times the cells in the largest patch, as if cuts were even.
-  pure function work(self, n, periodic, threads)
-    class(domain_cuts_t), intent(in) :: self
-    integer(int32), intent(in) :: n(2), threads
-    logical, intent(in) :: periodic(2)
-    real(real64) :: work
-
-    work = product(real(self%whole%n, real64)/n + merge(2*self%halo, 0, n > merge(1, 2, periodic)) &
-      + merge(self%halo, 0, n == 2 .and. .not. periodic))*((product(n) + threads - 1)/threads)
-  end function work
-
-  !> Cuts a line of cells into n pieces of about equal weight, each at least `least` cells long.
-  pure subroutine divide(weight, n, least, cuts)
+  !> First cells of the n pieces into which a line of cells is cut, and the first beyond the last: of about equal weight,
+  !> each at least `least` cells long.
+  pure function pieces(weight, n, least) result(first)
     integer(int32), intent(in) :: weight(:), n, least
-    type(cuts_t), intent(out) :: cuts
-    integer(int32) :: k, place
+    integer(int32) :: first(n + 1), k, place
     real(real64) :: sum_so_far, total
 
-    allocate (cuts%first(n + 1))
-    cuts%first(1) = 1
-    cuts%first(n + 1) = size(weight, kind=int32) + 1
+    first(1) = 1
+    first(n + 1) = size(weight, kind=int32) + 1
     total = sum(real(weight, real64))
     place = 1
     sum_so_far = 0
@@ -114,9 +103,9 @@ contains
         sum_so_far = sum_so_far + weight(place)
         place = place + 1
       end do
-      cuts%first(k) = min(max(place, cuts%first(k - 1) + least), cuts%first(n + 1) - (n + 1 - k)*least)
+      first(k) = min(max(place, first(k - 1) + least), first(n + 1) - (n + 1 - k)*least)
     end do
-  end subroutine divide
+  end function pieces
 
   !> The patch of the k-th domain.
   pure function patch_of(self, k, periodic) result(patch)
