@@ -39,22 +39,22 @@ contains
     end do
     mean = mean + sim%fastest_drive()**2
     sim%blink = 1.0e-9_real64*minval(sim%disk%radius)/sqrt(max(fastest, tiny(fastest)))
-    call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path(sim)))
+    call begin_epoch(sim, events_per_epoch(sim)/(sqrt(max(mean, tiny(mean)))*sim%n_disks()*events_per_path()))
     sim%last_advance = sim%now
     sim%events_then = sim%tally%events
+  contains
+
+    !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
+    !> walls.
+    pure function events_per_path() result(rate)
+      real(real64) :: rate                           !! [1/length]
+      real(real64) :: packing
+
+      packing = min(pi*sum(sim%disk%radius**2)/product(sim%box%edges()), densest)
+      rate = sqrt(2/pi)*packing*(1 - 7*packing/16)/(1 - packing)**2/(sum(sim%disk%radius)/sim%n_disks()) &
+        + sum(1/sim%box%edges())
+    end function events_per_path
   end subroutine begin_first_epoch
-
-  !> Events per disk and length of its path in a gas: with other disks, by the equation of state of Henderson, and with
-  !> walls.
-  pure function events_per_path(sim) result(rate)
-    type(simulation_t), intent(in) :: sim
-    real(real64) :: rate                           !! [1/length]
-    real(real64) :: packing
-
-    packing = min(pi*sum(sim%disk%radius**2)/product(sim%box%edges()), densest)
-    rate = sqrt(2/pi)*packing*(1 - 7*packing/16)/(1 - packing)**2/(sum(sim%disk%radius)/sim%n_disks()) &
-      + sum(1/sim%box%edges())
-  end function events_per_path
 
   !> Events of any kind wanted between two epochs.
   pure function events_per_epoch(sim) result(n)
@@ -89,32 +89,31 @@ contains
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
-    call move_origin(sim, shift)
+    call move_origin()
     call begin_epoch(sim, length)
+  contains
+
+    !> Moves the origin from which moments of this epoch count, and lets all events be stale.
+    subroutine move_origin()
+      integer, allocatable :: moments(:)            ! rows of `extra`
+      integer(int32) :: i
+
+      moments = pack(sim%row, sim%row > 0 .and. columns%is_moment)
+      do i = 1, sim%n_disks()
+        sim%disk(i)%clock = sim%disk(i)%clock - shift
+        sim%disk(i)%stamp = 0
+        sim%extra(moments, i) = sim%extra(moments, i) - shift
+      end do
+      sim%now = sim%now - shift
+      sim%epoch = sim%epoch + shift
+      sim%last_advance = sim%last_advance - shift
+      sim%box%epoch = sim%epoch
+      if (.not. sim%box%has_moving_sides()) return
+      do i = 1, sim%n_disks()
+        call keep_off_sides(sim%box, sim%disk(i), sim%now)
+      end do
+    end subroutine move_origin
   end subroutine move_epoch
-
-  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
-  subroutine move_origin(sim, shift)
-    type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: shift             !! [time]
-    integer, allocatable :: moments(:)            ! rows of `extra`
-    integer(int32) :: i
-
-    moments = pack(sim%row, sim%row > 0 .and. columns%is_moment)
-    do i = 1, sim%n_disks()
-      sim%disk(i)%clock = sim%disk(i)%clock - shift
-      sim%disk(i)%stamp = 0
-      sim%extra(moments, i) = sim%extra(moments, i) - shift
-    end do
-    sim%now = sim%now - shift
-    sim%epoch = sim%epoch + shift
-    sim%last_advance = sim%last_advance - shift
-    sim%box%epoch = sim%epoch
-    if (.not. sim%box%has_moving_sides()) return
-    do i = 1, sim%n_disks()
-      call keep_off_sides(sim%box, sim%disk(i), sim%now)
-    end do
-  end subroutine move_origin
 
   !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
   pure function most_events(sim) result(n)

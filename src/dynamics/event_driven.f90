@@ -94,8 +94,8 @@ contains
     do while (turns > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (stop_requested()) return
-      pause_at = next_pause(self, sim, limits, log)
-      if (sim%n_disks() >= disks_in_cache) call read_ahead(self, sim, pause_at)
+      pause_at = next_pause()
+      if (sim%n_disks() >= disks_in_cache) call read_ahead()
       events = sim%tally%events
       call self%run_events(sim, limits%time, pause_at, turns, event, log)
       self%turns_left = turns
@@ -103,7 +103,7 @@ contains
       if (turns == 0 .and. .not. sim%now < limits%time) turns = 1    ! a sample of this moment waits for all its events
       if (self%search%everyone .and. sim%tally%events > events) call self%predict_all(sim)
       if (event%time <= limits%time) cycle
-      if (is_stale(sim, event)) then               ! what is to come must not depend on who was predicted when
+      if (is_stale()) then                         ! what is to come must not depend on who was predicted when
         call predict(self, sim, event%disk)
         cycle
       end if
@@ -116,17 +116,36 @@ contains
       self%arrived = .true.
       return
     end do
+  contains
+
+    !> Whether the partner of an event has collided since it was predicted.
+    pure function is_stale() result(yes)
+      logical :: yes
+
+      yes = event%partner > 0
+      if (yes) yes = sim%disk(event%partner)%stamp /= sim%tag(event%disk)%partner_stamp
+    end function is_stale
+
+    !> The event count before which no check is due.
+    pure function next_pause() result(events)
+      integer(int64) :: events
+
+      events = min(limits%events, sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
+      if (limits%dissipated < huge(limits%dissipated) .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
+    end function next_pause
+
+    !> Prefetches what the next events will read, and pauses soon to do so again.
+    subroutine read_ahead()
+      integer(int32) :: stage, n, disks(most_coming)
+
+      do stage = 1, stages
+        call self%queue%list_coming(sim%tag, stage, n, disks)
+        call self%search%cells%read_ahead(sim%disk, sim%tag, stage, disks(:n))
+        if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
+      end do
+      pause_at = min(pause_at, sim%tally%events + events_ahead)
+    end subroutine read_ahead
   end subroutine advance
-
-  !> Whether the partner of an event has collided since it was predicted.
-  pure function is_stale(sim, event) result(yes)
-    type(simulation_t), intent(in) :: sim
-    type(event_t), intent(in) :: event
-    logical :: yes
-
-    yes = event%partner > 0
-    if (yes) yes = sim%disk(event%partner)%stamp /= sim%tag(event%disk)%partner_stamp
-  end function is_stale
 
   !> The loop: event after event, up to the number `pause_at` of collisions, to the limit of time, or as long as
   !> there are turns. Hot path only; rare work is left to the caller.
@@ -154,33 +173,6 @@ contains
     end do
     event = event_t(t, i, code)
   end subroutine run_events
-
-  !> The event count before which no check is due.
-  pure function next_pause(self, sim, limits, log) result(events)
-    class(event_driven_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    type(event_log_t), intent(in), optional :: log
-    integer(int64) :: events
-
-    events = min(limits%events, sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
-    if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
-  end function next_pause
-
-  !> Prefetches what the next events will read, and pauses soon to do so again.
-  subroutine read_ahead(self, sim, pause_at)
-    class(event_driven_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int64), intent(inout) :: pause_at
-    integer(int32) :: stage, n, disks(most_coming)
-
-    do stage = 1, stages
-      call self%queue%list_coming(sim%tag, stage, n, disks)
-      call self%search%read_ahead(sim, stage, disks(:n))
-      if (self%is_part .and. stage == 2) call self%tracks%read_ahead(sim%disk, disks(:n))
-    end do
-    pause_at = min(pause_at, sim%tally%events + events_ahead)
-  end subroutine read_ahead
 
   !> Executes the event of disk i, and predicts the disks concerned again.
   subroutine execute(self, sim, i, code, t, log)

@@ -7,25 +7,18 @@ module evolution
   use tally, only: dissipated, tally_t
   implicit none
   private
-  public :: evolution_t, grown, limits_t
-
-  !> What can end a run besides time and counts, each by its number in `grown`. It must never decrease: a run that is past
-  !> the limit has met it on the way, and goes back to find out in which collision.
-  integer, parameter, public :: energy_lost = 1
-  integer, parameter :: n_grown = 1
+  public :: evolution_t, limits_t
 
   !> Where to pause; the first that is met counts. What is not set is out of reach.
   type :: limits_t
     real(real64) :: time = never                         !! since the start of the run; for an evolution, since the epoch
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
-    real(real64) :: most(n_grown) = huge(0.0_real64)     !! of what is in `grown`
+    real(real64) :: dissipated = huge(0.0_real64)        !! energy: it never decreases, and any collision may reach the limit
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
     real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
   contains
     procedure :: reached
-    procedure :: outgrown
-    procedure :: watches
   end type limits_t
 
   type, abstract :: evolution_t
@@ -62,39 +55,14 @@ module evolution
 
 contains
 
-  !> What has grown so far.
-  pure function grown(tally) result(values)
-    type(tally_t), intent(in) :: tally
-    real(real64) :: values(n_grown)
-
-    values(energy_lost) = tally%total(dissipated)
-  end function grown
-
   !> Whether a limit other than that of time is met: all that happens at the very limit of time belongs to the part before.
   pure function reached(self, tally) result(yes)
     class(limits_t), intent(in) :: self
     type(tally_t), intent(in) :: tally
     logical :: yes
 
-    yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
+    yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. tally%total(dissipated) >= self%dissipated
   end function reached
-
-  !> Whether a limit of what grows is met.
-  pure function outgrown(self, tally) result(yes)
-    class(limits_t), intent(in) :: self
-    type(tally_t), intent(in) :: tally
-    logical :: yes
-
-    yes = any(grown(tally) >= self%most)
-  end function outgrown
-
-  !> Whether there is such a limit, which any collision may meet.
-  pure function watches(self) result(yes)
-    class(limits_t), intent(in) :: self
-    logical :: yes
-
-    yes = any(self%most < huge(self%most))
-  end function watches
 
   !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.
   pure function warning(self, sim) result(text)

@@ -32,7 +32,33 @@ contains
       kicked(n) = i
     end do
     kicked = kicked(:n)
-    if (sim%drive%keep_momentum) call restore_momentum(sim, kicked)
+    if (sim%drive%keep_momentum) call restore_momentum()
+  contains
+
+    !> Takes from the disks that were kicked by noise the common velocity that it gave them. The kicks are drawn once more,
+    !> which needs no memory, and summed exactly, so that the order of the disks leaves no trace.
+    subroutine restore_momentum()
+      type(exact_sum_t) :: momentum(2), mass
+      type(random_stream_t) :: stream
+      real(real64) :: z(2), scale, heaviest
+      integer(int32) :: k
+
+      heaviest = maxval(sim%species%mass)
+      scale = sqrt(sim%drive%strength*sim%drive%interval)
+      call momentum%choose_unit(16*heaviest*scale)
+      call mass%choose_unit(heaviest)
+      do k = 1, size(kicked, kind=int32)
+        associate (i => kicked(k))
+          call stream%seed_draw(sim%seed, draws_of_kicks, sim%tag(i)%id, sim%kicks)
+          call stream%draw_normals(z)
+          call momentum%add(sim%mass_of(i)*scale*z)
+          call mass%add(sim%mass_of(i))
+        end associate
+      end do
+      do k = 1, size(kicked, kind=int32)
+        call change_velocity(sim, kicked(k), sim%disk(kicked(k))%v - momentum%value()/mass%value())
+      end do
+    end subroutine restore_momentum
   end subroutine kick
 
   !> Gives disk i a new velocity, in a sheared box relative to the profile: what it met last, it may meet again at once.
@@ -60,29 +86,27 @@ contains
         return
       end if
       v = sim%box%stream(sim%disk(i)%x) + sqrt(drive%temperature/sim%mass_of(i))*z
-      if (drive%kind == active) call swim(sim, i, v)
+      if (drive%kind == active) call swim()
       call change_velocity(sim, i, v)
       if (.not. sim%with%rotation) return
       call stream%draw_normals(spin)
       call change_spin(sim, i, sqrt(drive%temperature/sim%inertia_of(i))*spin(1))
     end associate
+  contains
+
+    !> Lets the orientation of disk i diffuse, and adds a velocity along it.
+    subroutine swim()
+      type(random_stream_t) :: stream
+      real(real64) :: z(2)
+
+      associate (drive => sim%drive, angle => sim%extra(sim%row(angle_column), i))
+        call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
+        call stream%draw_normals(z)
+        angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
+        v = v + drive%speed*[cos(angle), sin(angle)]
+      end associate
+    end subroutine swim
   end subroutine kick_disk
-
-  !> Lets the orientation of disk i diffuse, and adds a velocity along it.
-  subroutine swim(sim, i, v)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    real(real64), intent(inout) :: v(2)          !! [length/time]
-    type(random_stream_t) :: stream
-    real(real64) :: z(2)
-
-    associate (drive => sim%drive, angle => sim%extra(sim%row(angle_column), i))
-      call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
-      call stream%draw_normals(z)
-      angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
-      v = v + drive%speed*[cos(angle), sin(angle)]
-    end associate
-  end subroutine swim
 
   !> Gives the active disks orientations at the start, uniform in all directions.
   subroutine orient(sim)
@@ -122,32 +146,5 @@ contains
       before = omega
     end associate
   end subroutine change_spin
-
-  !> Takes from the disks that were kicked by noise the common velocity that it gave them. The kicks are drawn once more,
-  !> which needs no memory, and summed exactly, so that the order of the disks leaves no trace.
-  subroutine restore_momentum(sim, kicked)
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: kicked(:)
-    type(exact_sum_t) :: momentum(2), mass
-    type(random_stream_t) :: stream
-    real(real64) :: z(2), scale, heaviest
-    integer(int32) :: k
-
-    heaviest = maxval(sim%species%mass)
-    scale = sqrt(sim%drive%strength*sim%drive%interval)
-    call momentum%choose_unit(16*heaviest*scale)
-    call mass%choose_unit(heaviest)
-    do k = 1, size(kicked, kind=int32)
-      associate (i => kicked(k))
-        call stream%seed_draw(sim%seed, draws_of_kicks, sim%tag(i)%id, sim%kicks)
-        call stream%draw_normals(z)
-        call momentum%add(sim%mass_of(i)*scale*z)
-        call mass%add(sim%mass_of(i))
-      end associate
-    end do
-    do k = 1, size(kicked, kind=int32)
-      call change_velocity(sim, kicked(k), sim%disk(kicked(k))%v - momentum%value()/mass%value())
-    end do
-  end subroutine restore_momentum
 
 end module kicks

@@ -5,8 +5,9 @@
 !> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
-  use evolution, only: energy_lost, evolution_t, grown, limits_t
+  use evolution, only: evolution_t, limits_t
   use simulation_state, only: simulation_t
+  use tally, only: dissipated
   use timeline, only: next_kick
   implicit none
   private
@@ -52,7 +53,7 @@ contains
       whole_collisions(0.5_real64*settings%collisions_per_disk*sim%n_disks()))
     rule%limits%events = settings%events
     rule%wall_clock = settings%wall_clock
-    if (settings%energy_fraction > 0) rule%limits%most(energy_lost) = (1 - settings%energy_fraction)*sim%start_energy
+    if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
     rule%cools = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. sim%law%loses_energy() &
       .and. .not. sim%is_driven()
   end function new_stop_rule
@@ -128,7 +129,7 @@ contains
     done = max(sim%time()/max(self%limits%time, least), &
       real(sim%tally%collisions, real64)/max(self%limits%collisions, 1_int64), &
       real(sim%tally%events, real64)/max(self%limits%events, 1_int64), &
-      maxval(grown(sim%tally)/max(self%limits%most, least)), elapsed/max(self%wall_clock, least))
+      sim%tally%total(dissipated)/max(self%limits%dissipated, least), elapsed/max(self%wall_clock, least))
     done = min(max(done, 0.0_real64), 1.0_real64)
   end function share
 

@@ -52,7 +52,7 @@ contains
     allocate (self%x(sim%n_disks(), 2))
     self%radius = sim%disk%radius
     allocate (self%outside(sim%n_disks()))
-    call self%near%forget()
+    self%near = near_pairs_t()
     call sim%start_sums()
     self%idle = .false.
   end subroutine start
@@ -152,7 +152,7 @@ contains
         call fail(error, exit_broken, "a position became NaN: "//encounter_text(sim, i, nothing))
         return
       end if
-      call meet_sides(self, sim, i, log)
+      call meet_sides()
       i = next_marked(self%outside, i)
     end do
     call self%near%update(sim, self%x, self%dt, self%every_pair)
@@ -161,13 +161,64 @@ contains
     do while (k > 0)
       associate (i => self%near%i(k), partner => self%near%partner(k))
         if (partner > 0) then
-          call meet_disk(self, sim, i, partner, log)
+          call meet_disk(i, partner)
         else
-          call meet_wall(self, sim, i, partner, log)
+          call meet_wall(i, partner)
         end if
       end associate
       k = next_marked(self%near%hit(:self%near%n), k)
     end do
+  contains
+
+    !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
+    subroutine meet_sides()
+      real(real64) :: beyond, inset, before(2), low(2), high(2)
+      integer(int32) :: side
+      integer :: axis
+
+      call bounds(sim%box, sim%now, low, high)
+      do side = 0, 1 - n_sides, -1
+        axis = axis_of(side)
+        inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
+        if (sense_of(side) < 0) then
+          beyond = (low(axis) + inset) - self%x(i, axis)
+        else
+          beyond = self%x(i, axis) - (high(axis) - inset)
+        end if
+        if (.not. beyond > 0) cycle
+        if (passes(sim, side)) then
+          before = self%x(i, :)
+          call pass_side(sim, i, side, sim%now)
+          self%x(i, :) = sim%position(i)
+          call self%near%shift(i, self%x(i, :) - before)
+        else
+          call meet_wall(i, side)
+        end if
+      end do
+    end subroutine meet_sides
+
+    !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out of it. It keeps its position and so
+    !> its potential energy.
+    subroutine meet_wall(i, code)
+      integer(int32), intent(in) :: i, code
+      real(real64) :: normal(2)
+
+      normal = wall_normal(sim%box, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
+      if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
+        call collide(sim, i, code, sim%now, .true., log)
+    end subroutine meet_wall
+
+    !> Collides the disks i < j, which overlap, if they approach.
+    subroutine meet_disk(i, j)
+      integer(int32), intent(in) :: i, j
+      type(images_t) :: images
+      real(real64) :: dx(2)
+
+      images = sim%box%images()
+      dx = self%x(j, :) - self%x(i, :)
+      dx = dx + images%shift(images%nearest_image(dx))
+      if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., log)
+    end subroutine meet_disk
   end subroutine take_step
 
   !> The next place with a mark; 0: there is none.
@@ -208,66 +259,6 @@ contains
     inside = iand(merge(1, 0, x >= low), merge(1, 0, x <= high))
   end function between
 
-  !> Takes disk i through the periodic sides that it is beyond, and reflects it at walls.
-  subroutine meet_sides(self, sim, i, log)
-    class(time_stepped_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i
-    type(event_log_t), intent(inout), optional :: log
-    real(real64) :: beyond, inset, before(2), low(2), high(2)
-    integer(int32) :: side
-    integer :: axis
-
-    call bounds(sim%box, sim%now, low, high)
-    do side = 0, 1 - n_sides, -1
-      axis = axis_of(side)
-      inset = merge(0.0_real64, sim%disk(i)%radius, sim%box%periodic(axis))
-      if (sense_of(side) < 0) then
-        beyond = (low(axis) + inset) - self%x(i, axis)
-      else
-        beyond = self%x(i, axis) - (high(axis) - inset)
-      end if
-      if (.not. beyond > 0) cycle
-      if (passes(sim, side)) then
-        before = self%x(i, :)
-        call pass_side(sim, i, side, sim%now)
-        self%x(i, :) = sim%position(i)
-        call self%near%shift(i, self%x(i, :) - before)
-      else
-        call meet_wall(self, sim, i, side, log)
-      end if
-    end do
-  end subroutine meet_sides
-
-  !> Reflects disk i, which is beyond a side or an obstacle, if it moves further out of it. It keeps its position and so
-  !> its potential energy.
-  subroutine meet_wall(self, sim, i, code, log)
-    class(time_stepped_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, code
-    type(event_log_t), intent(inout), optional :: log
-    real(real64) :: normal(2)
-
-    normal = wall_normal(sim%box, code, [self%x(i, 1), self%x(i, 2)], sim%velocity(i))
-    if (dot_product(sim%velocity(i) - strike_velocity(sim%box, code, normal, sim%now), normal) < 0) &
-      call collide(sim, i, code, sim%now, .true., log)
-  end subroutine meet_wall
-
-  !> Collides the disks i < j, which overlap, if they approach.
-  subroutine meet_disk(self, sim, i, j, log)
-    class(time_stepped_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    integer(int32), intent(in) :: i, j
-    type(event_log_t), intent(inout), optional :: log
-    type(images_t) :: images
-    real(real64) :: dx(2)
-
-    images = sim%box%images()
-    dx = self%x(j, :) - self%x(i, :)
-    dx = dx + images%shift(images%nearest_image(dx))
-    if (dot_product(dx, sim%velocity(j) - sim%velocity(i)) < 0) call collide(sim, i, j, sim%now, .true., log)
-  end subroutine meet_disk
-
   !> What is wrong with the step; empty if nothing is. The fastest disk may fall through the whole box and then has the
   !> speed v0 + sqrt(2 g L). A disk that loses energy in every step of a lasting contact sinks by up to g dt**2/2 per
   !> step under gravity; the TC model prevents it.
@@ -295,17 +286,19 @@ contains
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
         //"is more than run.dt"
     end if
+  contains
+
+    !> A number with three significant digits.
+    pure function about(number) result(text)
+      real(real64), intent(in) :: number
+      character(len=:), allocatable :: text
+      character(len=12) :: buffer
+      real(real64) :: rounded
+
+      write (buffer, "(es12.2e3)") number
+      read (buffer, *) rounded
+      text = written(rounded)
+    end function about
   end function warning
 
-  !> A number with three significant digits.
-  pure function about(number) result(text)
-    real(real64), intent(in) :: number
-    character(len=:), allocatable :: text
-    character(len=12) :: buffer
-    real(real64) :: rounded
-
-    write (buffer, "(es12.2e3)") number
-    read (buffer, *) rounded
-    text = written(rounded)
-  end function about
 end module time_stepped

@@ -60,18 +60,41 @@ contains
     if (sim%epoch_end > 0 .and. .not. allocated(error)) then
       epoch_is_over = sim%tally%events >= most_events(sim)
       if (arrived .and. evolution%idle) then
-        call wait(sim, due, limits%sampled)
+        call wait()
       else if (arrived .and. due - sim%epoch > sim%epoch_end) then
         epoch_is_over = .true.
         arrived = .false.                          ! at the end of the epoch, not where it was to go
       end if
-      if (epoch_is_over) call end_epoch(evolution, sim, error)
+      if (epoch_is_over) call end_epoch()
     end if
     do while (arrived .and. sim%time() >= kick_time .and. next_kick(evolution, sim) <= kick_time)
       call kick(sim, kicked)
       call evolution%renew(sim, kicked)
     end do
     sim%settled = arrived .or. (sim%settled .and. sim%tally%events == events .and. .not. sim%time() > before)
+  contains
+
+    !> Lets time pass until something is due where nothing will ever happen by itself; without an end, to the last collision.
+    subroutine wait()
+      if (due < last_time) then
+        sim%now = max(sim%now, due - sim%epoch)
+      else                                           ! a stale event, or the end of the epoch, may have moved it
+        sim%now = max(maxval(sim%disk%clock), limits%sampled - sim%epoch)
+      end if
+    end subroutine wait
+
+    !> Begins the next epoch, unless time stands still.
+    subroutine end_epoch()
+      if (stands_still(sim)) then
+        associate (i => evolution%last_event(1), code => evolution%last_event(2))
+          call fail(error, exit_broken, "inelastic collapse, time no longer advances: "//encounter_text(sim, i, code) &
+            //remedy(sim, i, code))
+        end associate
+      else
+        call move_epoch(sim)
+        call evolution%start(sim)
+      end if
+    end subroutine end_epoch
   end subroutine advance_once
 
   !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
@@ -82,36 +105,6 @@ contains
 
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick
-
-  !> Lets time pass until something is due where nothing will ever happen by itself; without an end, to the last collision.
-  pure subroutine wait(sim, due, sampled)
-    type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: due                !! since the start of the run [time]
-    real(real64), intent(in) :: sampled            !! the end is not before it [time]
-
-    if (due < last_time) then
-      sim%now = max(sim%now, due - sim%epoch)
-    else                                           ! a stale event, or the end of the epoch, may have moved it
-      sim%now = max(maxval(sim%disk%clock), sampled - sim%epoch)
-    end if
-  end subroutine wait
-
-  !> Begins the next epoch, unless time stands still.
-  subroutine end_epoch(evolution, sim, error)
-    class(evolution_t), intent(inout) :: evolution
-    type(simulation_t), intent(inout) :: sim
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (stands_still(sim)) then
-      associate (i => evolution%last_event(1), code => evolution%last_event(2))
-        call fail(error, exit_broken, "inelastic collapse, time no longer advances: "//encounter_text(sim, i, code) &
-          //remedy(sim, i, code))
-      end associate
-    else
-      call move_epoch(sim)
-      call evolution%start(sim)
-    end if
-  end subroutine end_epoch
 
   !> What helps against the collapse of disk i with its partner, as far as it has not been done.
   pure function remedy(sim, i, code) result(text)

@@ -48,89 +48,83 @@ contains
         if (s > 0) then
           found = found + 1
           associate (track => mine%track(mine%track_of(s)))
-            same = track%digest == theirs%track(r)%digest .and. same_state(self, s, other, t) &
+            same = track%digest == theirs%track(r)%digest .and. same_state() &
               .and. self%patch%holds(self%sim%tag(s)%cell)   ! one that left the patch was missing, wherever it is now
             if (same .and. all(self%sim%tag(s)%cell == cell .and. cell <= self%patch%n)) cycle
-            near = came_near(self, theirs%track(r), shift, met)
+            near = came_near(theirs%track(r), met)
             if (.not. met) met = mine%could_have_met(int(track%low, int32), int(track%high, int32))
           end associate
         else
           same = .false.
-          near = came_near(self, theirs%track(r), shift, met)
+          near = came_near(theirs%track(r), met)
           if (.not. (near .and. (met .or. all(cell <= self%patch%n)))) cycle
         end if
         if (met .and. .not. same) self%good = .false.
         if (.not. self%good) return
-        call note_news(self, other, t, cell, s)
+        call note_news()
       end do
     end associate
+  contains
+
+    !> Whether a disk that a neighbour owns came into the patch, in any image; `met`: to where it could have met an own disk.
+    function came_near(track, met) result(near)
+      type(track_t), intent(in) :: track
+      logical, intent(out) :: met
+      logical :: near
+      integer(int32) :: low(2), high(2), reach(2), ix, iy
+
+      near = .false.
+      met = .false.
+      reach = merge(1, 0, self%sim%box%periodic .and. self%patch%n < self%patch%whole)
+      do iy = -reach(2), reach(2)
+        do ix = -reach(1), reach(1)
+          low = track%low + shift + [ix, iy]*self%patch%whole
+          high = track%high + shift + [ix, iy]*self%patch%whole
+          if (any(low > self%patch%n .or. high < 1)) cycle
+          near = .true.
+          met = met .or. self%engine%tracks%could_have_met(low, high)
+        end do
+      end do
+    end function came_near
+
+    !> Whether the copy in slot s is where the neighbour's disk in slot t is, and met what it met.
+    pure function same_state() result(yes)
+      logical :: yes
+
+      associate (mine => self%sim%disk(s), theirs => other%sim%disk(t))
+        yes = .not. (mine%clock /= theirs%clock .or. mine%x(1) /= theirs%x(1) .or. mine%x(2) /= theirs%x(2) &
+          .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
+          .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
+      end associate
+      if (yes .and. size(self%sim%extra) > 0) yes = .not. any(self%sim%extra(:, s) /= other%sim%extra(:, t))
+    end function same_state
+
+    !> Notes what is to be taken over from the neighbour's slot t.
+    subroutine note_news()
+      type(news_t), allocatable :: more(:)
+
+      if (.not. allocated(self%news)) allocate (self%news(256))
+      if (self%n_news == size(self%news)) then
+        allocate (more(2*self%n_news))
+        more(:self%n_news) = self%news
+        call move_alloc(more, self%news)
+      end if
+      self%n_news = self%n_news + 1
+      associate (news => self%news(self%n_news))
+        news%disk = other%sim%disk(t)
+        news%tag = other%sim%tag(t)
+        news%home = other%home(t)
+        news%cell = cell
+        news%slot = s
+        news%extra(:size(other%sim%extra, 1)) = other%sim%extra(:, t)
+      end associate
+    end subroutine note_news
   end subroutine compare
-
-  !> Whether a disk that a neighbour owns came into the patch, in any image; `met`: to where it could have met an own disk.
-  function came_near(self, track, shift, met) result(near)
-    type(domain_t), intent(in) :: self
-    type(track_t), intent(in) :: track
-    integer(int32), intent(in) :: shift(2)         !! from the neighbour's columns and rows to the own ones
-    logical, intent(out) :: met
-    logical :: near
-    integer(int32) :: low(2), high(2), reach(2), ix, iy
-
-    near = .false.
-    met = .false.
-    reach = merge(1, 0, self%sim%box%periodic .and. self%patch%n < self%patch%whole)
-    do iy = -reach(2), reach(2)
-      do ix = -reach(1), reach(1)
-        low = track%low + shift + [ix, iy]*self%patch%whole
-        high = track%high + shift + [ix, iy]*self%patch%whole
-        if (any(low > self%patch%n .or. high < 1)) cycle
-        near = .true.
-        met = met .or. self%engine%tracks%could_have_met(low, high)
-      end do
-    end do
-  end function came_near
-
-  !> Whether the copy in slot s is where the neighbour's disk in slot t is, and met what it met.
-  pure function same_state(self, s, other, t) result(yes)
-    type(domain_t), intent(in) :: self, other
-    integer(int32), intent(in) :: s, t
-    logical :: yes
-
-    associate (mine => self%sim%disk(s), theirs => other%sim%disk(t))
-      yes = .not. (mine%clock /= theirs%clock .or. mine%x(1) /= theirs%x(1) .or. mine%x(2) /= theirs%x(2) &
-        .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
-        .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
-    end associate
-    if (yes .and. size(self%sim%extra) > 0) yes = .not. any(self%sim%extra(:, s) /= other%sim%extra(:, t))
-  end function same_state
-
-  !> Notes what is to be taken over from a neighbour's slot t.
-  subroutine note_news(self, other, t, cell, s)
-    type(domain_t), intent(inout) :: self
-    type(domain_t), intent(in) :: other
-    integer(int32), intent(in) :: t, cell(2), s
-    type(news_t), allocatable :: more(:)
-
-    if (.not. allocated(self%news)) allocate (self%news(256))
-    if (self%n_news == size(self%news)) then
-      allocate (more(2*self%n_news))
-      more(:self%n_news) = self%news
-      call move_alloc(more, self%news)
-    end if
-    self%n_news = self%n_news + 1
-    associate (news => self%news(self%n_news))
-      news%disk = other%sim%disk(t)
-      news%tag = other%sim%tag(t)
-      news%home = other%home(t)
-      news%cell = cell
-      news%slot = s
-      news%extra(:size(other%sim%extra, 1)) = other%sim%extra(:, t)
-    end associate
-  end subroutine note_news
 
   !> Puts the copies right by the news, takes over who came, gives up who left.
   subroutine refresh(self)
     type(domain_t), intent(inout) :: self
-    integer(int32), allocatable :: waiting(:)
+    integer(int32), allocatable :: waiting(:)      ! (n_waiting) slots whose events are to be predicted
     integer(int32) :: k, n_waiting, slot
 
     allocate (waiting(self%n_news))
@@ -143,7 +137,7 @@ contains
       end do
     end associate
     do k = 1, self%n_news
-      call take_over(self, self%news(k), n_waiting, waiting)
+      call take_over(self%news(k))
     end do
     do k = 1, n_waiting
       call self%engine%search%predict(self%sim, waiting(k))
@@ -151,57 +145,55 @@ contains
     end do
     call list_copies(self)
     self%n_news = 0
+  contains
+
+    !> Takes over one piece of news.
+    subroutine take_over(news)
+      type(news_t), intent(in) :: news
+      integer(int32) :: s, window
+
+      s = news%slot
+      if (any(news%cell > self%patch%n)) then
+        if (s > 0) call leave(s)
+        return
+      end if
+      if (s == 0) then
+        s = self%vacant
+        self%good = s > 0 .and. self%good            ! else no room: to be loaded anew
+        if (s == 0) return
+        self%vacant = self%home(s)
+      else if (self%patch%holds(self%sim%tag(s)%cell)) then
+        call self%engine%search%take_out(self%sim%tag(s), s)
+      end if
+      window = self%sim%tag(s)%window
+      self%sim%tag(s) = news%tag
+      self%sim%tag(s)%window = window
+      associate (disk => self%sim%disk(s), stamp => self%sim%disk(s)%stamp + 1)
+        disk = news%disk
+        disk%stamp = stamp
+        disk%event_time = forever
+      end associate
+      self%home(s) = news%home
+      self%sim%extra(:, s) = news%extra(:size(self%sim%extra, 1))
+      call self%engine%search%insert(self%sim%tag(s), s, int(news%cell, int16))
+      call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
+      n_waiting = n_waiting + 1
+      waiting(n_waiting) = s
+    end subroutine take_over
+
+    !> The copy in slot s leaves the patch.
+    subroutine leave(s)
+      integer(int32), intent(in) :: s
+
+      if (self%patch%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
+      call self%engine%tracks%drop_track(s)
+      self%sim%disk(s)%event_time = forever
+      self%sim%disk(s)%partner = nothing
+      self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1
+      self%sim%tag(s)%id = 0
+      self%home(s) = self%vacant
+      self%vacant = s
+    end subroutine leave
   end subroutine refresh
-
-  !> Takes over one piece of news.
-  subroutine take_over(self, news, n_waiting, waiting)
-    type(domain_t), intent(inout) :: self
-    type(news_t), intent(in) :: news
-    integer(int32), intent(inout) :: n_waiting, waiting(:)   !! (n_waiting) slots whose events are to be predicted
-    integer(int32) :: s, window
-
-    s = news%slot
-    if (any(news%cell > self%patch%n)) then
-      if (s > 0) call leave(self, s)
-      return
-    end if
-    if (s == 0) then
-      s = self%vacant
-      self%good = s > 0 .and. self%good            ! else no room: to be loaded anew
-      if (s == 0) return
-      self%vacant = self%home(s)
-    else if (self%patch%holds(self%sim%tag(s)%cell)) then
-      call self%engine%search%take_out(self%sim%tag(s), s)
-    end if
-    window = self%sim%tag(s)%window
-    self%sim%tag(s) = news%tag
-    self%sim%tag(s)%window = window
-    associate (disk => self%sim%disk(s), stamp => self%sim%disk(s)%stamp + 1)
-      disk = news%disk
-      disk%stamp = stamp
-      disk%event_time = forever
-    end associate
-    self%home(s) = news%home
-    self%sim%extra(:, s) = news%extra(:size(self%sim%extra, 1))
-    call self%engine%search%insert(self%sim%tag(s), s, int(news%cell, int16))
-    call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
-    n_waiting = n_waiting + 1
-    waiting(n_waiting) = s
-  end subroutine take_over
-
-  !> The copy in slot s leaves the patch.
-  subroutine leave(self, s)
-    type(domain_t), intent(inout) :: self
-    integer(int32), intent(in) :: s
-
-    if (self%patch%holds(self%sim%tag(s)%cell)) call self%engine%search%take_out(self%sim%tag(s), s)
-    call self%engine%tracks%drop_track(s)
-    self%sim%disk(s)%event_time = forever
-    self%sim%disk(s)%partner = nothing
-    self%sim%disk(s)%stamp = self%sim%disk(s)%stamp + 1
-    self%sim%tag(s)%id = 0
-    self%home(s) = self%vacant
-    self%vacant = s
-  end subroutine leave
 
 end module domain_borders

@@ -61,7 +61,7 @@ contains
     integer(int32) :: i, n, slots
 
     n = size(disks, kind=int32)
-    call make_room(self, sim, n)
+    call make_room()
     do i = 1, n
       self%sim%disk(i) = sim%disk(disks(i))
       self%sim%tag(i) = sim%tag(disks(i))
@@ -82,65 +82,61 @@ contains
     if (allocated(self%log)) self%log%n = 0
     self%sim%tally = sim%tally
     call self%sim%tally%clear()
-    call start(self, n)
+    call start()
+  contains
+
+    !> Makes slots for n disks and some more.
+    subroutine make_room()
+      integer(int32) :: slots
+
+      if (.not. allocated(self%sim%species)) then
+        self%sim%given_t = sim%given_t
+        self%sim%epoch_end = forever
+        allocate (self%engine%search, self%engine%tracks)
+        self%engine%is_part = .true.
+      end if
+      slots = n + n/spare + spare_at_least
+      if (allocated(self%home)) then
+        if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
+        deallocate (self%sim%disk, self%sim%tag, self%sim%extra, self%home)
+      end if
+      allocate (self%home(slots))
+      call self%sim%make_room(slots, like=sim)
+    end subroutine make_room
+
+    !> Builds cells and queue for the first n slots.
+    subroutine start()
+      logical :: cut_low(2), cut_high(2)
+      integer(int32) :: k
+
+      self%engine%search%is_part = .true.
+      self%engine%search%patch = self%patch
+      associate (patch => self%patch, tracks => self%engine%tracks)
+        tracks%patch = self%patch
+        tracks%own_low = modulo(self%low - patch%first, patch%whole) + 1
+        tracks%own_high = tracks%own_low + self%high - self%low
+        cut_low = tracks%own_low > 1
+        cut_high = tracks%own_high < patch%n
+        tracks%deep_low = tracks%own_low + merge(self%halo, 0, cut_low)
+        tracks%deep_high = tracks%own_high - merge(self%halo, 0, cut_high)
+        tracks%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
+        tracks%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
+          .or. patch%first + patch%n - 1 < patch%whole))
+        if (allocated(tracks%reached)) deallocate (tracks%reached)
+        allocate (tracks%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
+        if (allocated(tracks%track_of)) deallocate (tracks%track_of)
+        allocate (tracks%track_of(self%sim%n_disks()), source=0)
+        if (.not. allocated(tracks%track)) allocate (tracks%track(1024))
+        call self%engine%start(self%sim)
+        call tracks%begin_window()
+        tracks%n_tracks = 0
+        do k = 1, n
+          call tracks%begin_track(self%sim%tag(k)%cell, k)
+        end do
+      end associate
+      call list_copies(self)
+    end subroutine start
   end subroutine load
-
-  !> Makes slots for n disks and some more.
-  subroutine make_room(self, sim, n)
-    type(domain_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: n
-    integer(int32) :: slots
-
-    if (.not. allocated(self%sim%species)) then
-      self%sim%given_t = sim%given_t
-      self%sim%epoch_end = forever
-      allocate (self%engine%search, self%engine%tracks)
-      self%engine%is_part = .true.
-    end if
-    slots = n + n/spare + spare_at_least
-    if (allocated(self%home)) then
-      if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
-      deallocate (self%sim%disk, self%sim%tag, self%sim%extra, self%home)
-    end if
-    allocate (self%home(slots))
-    call self%sim%make_room(slots, like=sim)
-  end subroutine make_room
-
-  !> Builds cells and queue for the first n slots.
-  subroutine start(self, n)
-    type(domain_t), intent(inout) :: self
-    integer(int32), intent(in) :: n
-    logical :: cut_low(2), cut_high(2)
-    integer(int32) :: k
-
-    self%engine%search%is_part = .true.
-    self%engine%search%patch = self%patch
-    associate (patch => self%patch, tracks => self%engine%tracks)
-      tracks%patch = self%patch
-      tracks%own_low = modulo(self%low - patch%first, patch%whole) + 1
-      tracks%own_high = tracks%own_low + self%high - self%low
-      cut_low = tracks%own_low > 1
-      cut_high = tracks%own_high < patch%n
-      tracks%deep_low = tracks%own_low + merge(self%halo, 0, cut_low)
-      tracks%deep_high = tracks%own_high - merge(self%halo, 0, cut_high)
-      tracks%safe_low = merge(2, 1, cut_low .and. (self%sim%box%periodic .or. patch%first > 1))
-      tracks%safe_high = patch%n - merge(1, 0, cut_high .and. (self%sim%box%periodic &
-        .or. patch%first + patch%n - 1 < patch%whole))
-      if (allocated(tracks%reached)) deallocate (tracks%reached)
-      allocate (tracks%reached(0:patch%n(1) + 1, 0:patch%n(2) + 1))
-      if (allocated(tracks%track_of)) deallocate (tracks%track_of)
-      allocate (tracks%track_of(self%sim%n_disks()), source=0)
-      if (.not. allocated(tracks%track)) allocate (tracks%track(1024))
-      call self%engine%start(self%sim)
-      call tracks%begin_window()
-      tracks%n_tracks = 0
-      do k = 1, n
-        call tracks%begin_track(self%sim%tag(k)%cell, k)
-      end do
-    end associate
-    call list_copies(self)
-  end subroutine start
 
   !> Lists the copies by their ids.
   subroutine list_copies(self)

@@ -49,10 +49,6 @@ module parallel_events
     procedure :: renew
     procedure :: advance
     procedure :: most_domains
-    procedure, private :: advance_plainly
-    procedure, private :: visit
-    procedure, private :: conclude
-    procedure, private :: heed_cores
   end type parallel_events_t
 
 contains
@@ -110,146 +106,128 @@ contains
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
     outcome = left_alone
-    if (worthwhile(self, sim, limits)) call self%visit(sim, limits, outcome, log)
-    if (outcome == left_alone) call self%advance_plainly(sim, limits, error, log)
+    if (worthwhile()) call visit()
+    if (outcome == left_alone) call advance_plainly()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
       deallocate (self%parts%domain)               ! to leave room for sorting many
       self%holder = nobody
     end if
-  end subroutine advance
+  contains
 
-  !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
-  subroutine advance_plainly(self, sim, limits, error, log)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    type(limits_t), intent(in) :: limits
-    type(error_t), allocatable, intent(out) :: error
-    type(event_log_t), intent(inout), optional :: log
-    type(limits_t) :: goal
-    integer(int64) :: events
-    real(real64) :: time
+    !> Whether several domains can be faster than the plain engine.
+    pure function worthwhile() result(yes)
+      logical :: yes
+      real(real64) :: least
 
-    if (allocated(self%parts%domain)) deallocate (self%parts%domain)
-    if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
-    if (self%holder /= plain_engine) call self%engine%start(sim)
-    self%holder = plain_engine
-    goal = limits
-    if (sim%tally%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
-    events = sim%tally%events
-    time = sim%time()
-    call self%engine%advance(sim, goal, error, log)
-    self%idle = self%engine%idle
-    self%arrived = self%engine%arrived
-    self%last_event = self%engine%last_event
-    self%turns_left = self%engine%turns_left
-    if (sim%tally%events - events >= sim%n_disks()) &
-      call self%parts%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
-  end subroutine advance_plainly
+      least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
+      yes = self%parts%wanted > 1 .and. sim%tally%events >= self%plain_until .and. limits%events - sim%tally%events > least &
+        .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
+    end function worthwhile
 
-  !> Whether several domains can be faster than the plain engine.
-  pure function worthwhile(self, sim, limits) result(yes)
-    class(parallel_events_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    logical :: yes
-    real(real64) :: least
+    !> Lets the domains move on by some windows of time.
+    subroutine visit()
+      real(real64) :: t
+      integer :: windows, listed
+      logical :: good
 
-    least = merge(least_left, least_left_to_begin, self%holder == all_domains)*sim%n_disks()
-    yes = self%parts%wanted > 1 .and. sim%tally%events >= self%plain_until .and. limits%events - sim%tally%events > least &
-      .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
-  end function worthwhile
-
-  !> Lets the domains move on by some windows of time.
-  subroutine visit(self, sim, limits, outcome, log)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-    type(limits_t), intent(in) :: limits
-    integer, intent(out) :: outcome
-    type(event_log_t), intent(inout), optional :: log
-    real(real64) :: t
-    integer :: windows, listed
-    logical :: good
-
-    outcome = left_alone
-    listed = 0
-    if (self%holder /= all_domains) then
-      if (allocated(self%engine)) deallocate (self%engine)
-      self%holder = nobody
-      call self%parts%fill(sim, present(log), good)
-      if (.not. good) then
-        self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
-        return
-      end if
-      self%holder = all_domains
-    end if
-    call self%parts%run_windows(sim, limits, self%patience, t, windows, good)
-    self%windows_done = self%windows_done + windows
-    if (present(log)) then
-      listed = log%n
-      if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
-    end if
-    call self%conclude(sim, good, outcome)
-    if (good .and. (limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
-      ! the plain engine finds the very event, or a collapse
       outcome = left_alone
-      self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
-    end if
-    if (outcome == kept) then
-      call self%parts%write_back_all(sim, t)
-      self%arrived = t >= limits%time
-      if (self%parts%threads > 1) call self%heed_cores(sim)
-      if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
+      listed = 0
+      if (self%holder /= all_domains) then
+        if (allocated(self%engine)) deallocate (self%engine)
+        self%holder = nobody
+        call self%parts%fill(sim, present(log), good)
+        if (.not. good) then
+          self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
+          return
+        end if
+        self%holder = all_domains
+      end if
+      call self%parts%run_windows(sim, limits, self%patience, t, windows, good)
+      self%windows_done = self%windows_done + windows
+      if (present(log)) then
+        listed = log%n
+        if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
+      end if
+      call conclude(good)
+      if (good .and. (self%parts%dissipated_now(sim) >= limits%dissipated .or. t - sim%last_advance < sim%blink)) then
+        ! the plain engine finds the very event, or a collapse
         outcome = left_alone
-        self%plain_until = sim%tally%events + 1
+        self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
       end if
-    else
-      self%holder = nobody
-      if (present(log)) log%n = listed
-    end if
-  end subroutine visit
-
-  !> Leaves the run to the plain engine, longer each time, while other programs want the cores, too, or threads wait for
-  !> each other most of the time: several that share a core are slower than one.
-  subroutine heed_cores(self, sim)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-
-    if (sim%tally%events - self%plain_until > self%rest*sim%n_disks()) self%rest = shortest_rest
-    if (self%parts%cores > self%least_cores) return
-    self%plain_until = sim%tally%events + self%rest*sim%n_disks()
-    self%rest = min(2*self%rest, longest_rest)
-    self%parts%cores = self%parts%threads
-  end subroutine heed_cores
-
-  !> What follows from windows that were good or not. A failure makes windows shorter and visits brief, so that it throws
-  !> away at most as much as was gained before. If shorter windows do not help the plain engine takes over, twice as long
-  !> each time: a simulation that does not suit domains costs hardly more than with the plain engine alone.
-  subroutine conclude(self, sim, good, outcome)
-    class(parallel_events_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    logical, intent(in) :: good
-    integer, intent(out) :: outcome
-
-    associate (shortening => self%parts%shortening)
-      if (good) then
-        outcome = kept
-        ! Not before: windows that the next failure throws away could make up for each halving, for ever.
-        shortening = min(1.0_real64, 1.1_real64**self%patience*shortening)
-        if (self%patience == most_windows) self%spell = max(self%spell/2, shortest_spell)
-        self%patience = min(2*self%patience, most_windows)
-        return
+      if (outcome == kept) then
+        call self%parts%write_back_all(sim, t)
+        self%arrived = t >= limits%time
+        if (self%parts%threads > 1) call heed_cores()
+        if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
+          outcome = left_alone
+          self%plain_until = sim%tally%events + 1
+        end if
+      else
+        self%holder = nobody
+        if (present(log)) log%n = listed
       end if
-      outcome = repeated
-      self%windows_failed = self%windows_failed + 1
-      self%patience = 1
-      shortening = 0.5_real64*shortening
-      if (shortening > shortest) return
-      outcome = left_alone
-      shortening = shortest
-      self%plain_until = sim%tally%events + self%spell*sim%n_disks()
-      self%spell = min(2*self%spell, longest_spell)
-    end associate
-  end subroutine conclude
+    end subroutine visit
+
+    !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
+    subroutine advance_plainly()
+      type(limits_t) :: goal
+      integer(int64) :: events
+      real(real64) :: time
+
+      if (allocated(self%parts%domain)) deallocate (self%parts%domain)
+      if (.not. allocated(self%engine)) allocate (self%engine, source=self%plain)
+      if (self%holder /= plain_engine) call self%engine%start(sim)
+      self%holder = plain_engine
+      goal = limits
+      if (sim%tally%events < self%plain_until) goal%events = min(limits%events, self%plain_until)
+      events = sim%tally%events
+      time = sim%time()
+      call self%engine%advance(sim, goal, error, log)
+      self%idle = self%engine%idle
+      self%arrived = self%engine%arrived
+      self%last_event = self%engine%last_event
+      self%turns_left = self%engine%turns_left
+      if (sim%tally%events - events >= sim%n_disks()) &
+        call self%parts%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
+    end subroutine advance_plainly
+
+    !> What follows from windows that were good or not. A failure makes windows shorter and visits brief, so that it throws
+    !> away at most as much as was gained before. If shorter windows do not help the plain engine takes over, twice as long
+    !> each time: a simulation that does not suit domains costs hardly more than with the plain engine alone.
+    subroutine conclude(good)
+      logical, intent(in) :: good
+
+      associate (shortening => self%parts%shortening)
+        if (good) then
+          outcome = kept
+          ! Not before: windows that the next failure throws away could make up for each halving, for ever.
+          shortening = min(1.0_real64, 1.1_real64**self%patience*shortening)
+          if (self%patience == most_windows) self%spell = max(self%spell/2, shortest_spell)
+          self%patience = min(2*self%patience, most_windows)
+          return
+        end if
+        outcome = repeated
+        self%windows_failed = self%windows_failed + 1
+        self%patience = 1
+        shortening = 0.5_real64*shortening
+        if (shortening > shortest) return
+        outcome = left_alone
+        shortening = shortest
+        self%plain_until = sim%tally%events + self%spell*sim%n_disks()
+        self%spell = min(2*self%spell, longest_spell)
+      end associate
+    end subroutine conclude
+
+    !> Leaves the run to the plain engine, longer each time, while other programs want the cores, too, or threads wait for
+    !> each other most of the time: several that share a core are slower than one.
+    subroutine heed_cores()
+      if (sim%tally%events - self%plain_until > self%rest*sim%n_disks()) self%rest = shortest_rest
+      if (self%parts%cores > self%least_cores) return
+      self%plain_until = sim%tally%events + self%rest*sim%n_disks()
+      self%rest = min(2*self%rest, longest_rest)
+      self%parts%cores = self%parts%threads
+    end subroutine heed_cores
+  end subroutine advance
 
 end module parallel_events

@@ -12,7 +12,7 @@ module partition
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use system, only: seconds
-  use tally, only: tally_t
+  use tally, only: dissipated, tally_t
   use team, only: barrier_t, close_barrier, is_last_at, join, many, open_barrier, release
   implicit none
   private
@@ -54,12 +54,8 @@ module partition
     procedure :: fill
     procedure :: run_windows
     procedure :: learn
-    procedure :: tally_now
+    procedure :: dissipated_now
     procedure :: write_back_all
-    procedure, private :: left
-    procedure, private :: begin_window
-    procedure, private :: aim
-    procedure, private :: end_window
   end type partition_t
 
 contains
@@ -115,10 +111,12 @@ contains
     self%turns_per_event = max(turns/real(events, real64), 1.0_real64)
   end subroutine learn
 
-  !> What collisions have gathered, those in the domains since they were filled included.
-  pure function tally_now(self, sim) result(so_far)
+  !> The energy that collisions have dissipated, those in the domains since they were filled included. It must never decrease:
+  !> a run that is past its limit goes back to find out in which collision it met it.
+  pure function dissipated_now(self, sim) result(energy)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
+    real(real64) :: energy
     type(tally_t) :: so_far
     integer(int32) :: k
 
@@ -126,18 +124,8 @@ contains
     do k = 1, self%cuts%n
       call so_far%include(self%domain(k)%sim%tally)
     end do
-  end function tally_now
-
-  !> Events that may still come before a count is at its limit.
-  pure function left(self, sim, limits) result(events)
-    class(partition_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    real(real64) :: events
-
-    events = min(real(limits%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
-      real(limits%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
-  end function left
+    energy = so_far%total(dissipated)
+  end function dissipated_now
 
   !> Runs windows in all domains, one after the other, for as long as they hold, until a limit is reached or the caller has
   !> waited long enough. A window ends early at the limit of a count. `good`: all of them hold.
@@ -160,7 +148,8 @@ contains
     began = seconds()
     call cpu_time(cpu(1))
     plan%until = began + longest_visit
-    call self%begin_window(sim, limits, sim%now, plan)
+    plan%t = sim%now
+    call begin_window()
     call open_barrier(barrier)
     !$omp parallel num_threads(self%threads) private(k)
     call join(barrier)
@@ -174,9 +163,9 @@ contains
       !$omp end do nowait
       if (is_last_at(barrier)) then
         plan%begins = .false.
-        plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end .and. self%left(sim, limits) > 0) &
-          .or. stop_requested()
-        if (.not. plan%compares) call self%aim(sim, limits, plan)
+        plan%compares = stop_requested()
+        if (.not. plan%compares) plan%compares = .not. (all(self%domain%done) .and. plan%t < plan%t_end .and. left() > 0)
+        if (.not. plan%compares) call aim()
         call release(barrier)
       end if
       !$omp flush
@@ -187,7 +176,7 @@ contains
       end do
       !$omp end do nowait
       if (is_last_at(barrier)) then
-        call self%end_window(sim, limits, most, plan)
+        call end_window()
         call release(barrier)
       end if
       !$omp flush
@@ -200,76 +189,68 @@ contains
     t = plan%t
     windows = plan%windows
     good = plan%good
-  end subroutine run_windows
+  contains
 
-  !> Plans the window that begins now.
-  subroutine begin_window(self, sim, limits, now, plan)
-    class(partition_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    real(real64), intent(in) :: now                !! since the epoch [time]
-    type(plan_t), intent(inout) :: plan
-    real(real64) :: length
+    !> Plans the window that begins now.
+    subroutine begin_window()
+      real(real64) :: length
 
-    length = self%window*self%shortening*sim%n_disks()/(2*self%pace)
-    if (self%wanted > self%threads) length = 2*length      ! a cache takes in each domain once in a window
-    plan%windows = plan%windows + 1
-    plan%t_begin = now
-    plan%t = now
-    plan%t_end = now + length
-    if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
-    plan%events = sum(self%domain%sim%tally%events)
-    plan%begins = .true.
-    self%domain%turns = 0
-    call self%aim(sim, limits, plan)
-  end subroutine begin_window
+      length = self%window*self%shortening*sim%n_disks()/(2*self%pace)
+      if (self%wanted > self%threads) length = 2*length      ! a cache takes in each domain once in a window
+      plan%windows = plan%windows + 1
+      plan%t_begin = plan%t
+      plan%t_end = plan%t + length
+      if (plan%t_end + 0.5_real64*length > limits%time) plan%t_end = limits%time
+      plan%events = sum(self%domain%sim%tally%events)
+      plan%begins = .true.
+      self%domain%turns = 0
+      call aim()
+    end subroutine begin_window
 
-  !> Where all domains go next: to the end of the window unless a count would pass its limit, then most of the way there,
-  !> and at last to the next event of any of them. However wrong the guess of the pace, no engine takes more than some turns.
-  subroutine aim(self, sim, limits, plan)
-    class(partition_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    type(plan_t), intent(inout) :: plan
-    real(real64) :: expected, sure, next
-    integer(int32) :: k
+    !> Where all domains go next: to the end of the window unless a count would pass its limit, then most of the way there,
+    !> and at last to the next event of any of them. However wrong the guess of the pace, no engine takes more than some turns.
+    subroutine aim()
+      real(real64) :: expected, sure, next
+      integer(int32) :: k
 
-    expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! generously
-    plan%turns = int(min(self%overload*self%turns_per_event*expected, 1.0e15_real64), int64)
-    sure = self%left(sim, limits)
-    next = plan%t_end
-    if (sure <= expected) then
-      sure = 0.9_real64*sure - 5*sqrt(sure)
-      if (sure >= few_events) then
-        next = plan%t + sure/self%pace
-      else
-        do k = 1, self%cuts%n
-          next = min(next, next_time(self%domain(k)))
-        end do
+      expected = 1.2_real64*(plan%t_end - plan%t)*self%pace + 100      ! generously
+      plan%turns = int(min(self%overload*self%turns_per_event*expected, 1.0e15_real64), int64)
+      sure = left()
+      next = plan%t_end
+      if (sure <= expected) then
+        sure = 0.9_real64*sure - 5*sqrt(sure)
+        if (sure >= few_events) then
+          next = plan%t + sure/self%pace
+        else
+          do k = 1, self%cuts%n
+            next = min(next, next_time(self%domain(k)))
+          end do
+        end if
       end if
-    end if
-    plan%t = min(next, plan%t_end)
-  end subroutine aim
+      plan%t = min(next, plan%t_end)
+    end subroutine aim
 
-  !> Whether the window that has been compared holds, and whether another one begins.
-  subroutine end_window(self, sim, limits, most, plan)
-    class(partition_t), intent(inout) :: self
-    type(simulation_t), intent(in) :: sim
-    type(limits_t), intent(in) :: limits
-    integer, intent(in) :: most                    !! windows
-    type(plan_t), intent(inout) :: plan
+    !> Whether the window that has been compared holds, and whether another one begins.
+    subroutine end_window()
+      plan%good = all(self%domain%done) .and. all(self%domain%good) .and. left() >= 0    ! else several at the last moment
+      if (plan%good) then
+        call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
+      else
+        self%widening = min(self%widening + 2, self%halo)
+      end if
+      plan%goes_on = seconds() < plan%until
+      if (plan%goes_on) plan%goes_on = plan%good .and. plan%windows < most .and. plan%t < limits%time .and. left() > 0
+      if (plan%goes_on) call begin_window()
+    end subroutine end_window
 
-    plan%good = all(self%domain%done) .and. all(self%domain%good) &
-      .and. self%left(sim, limits) >= 0            ! else several at the last moment
-    if (plan%good) then
-      call self%learn(sum(self%domain%sim%tally%events) - plan%events, sum(self%domain%turns), plan%t - plan%t_begin)
-    else
-      self%widening = min(self%widening + 2, self%halo)
-    end if
-    plan%goes_on = plan%good .and. plan%windows < most .and. plan%t < limits%time .and. self%left(sim, limits) > 0 &
-      .and. seconds() < plan%until
-    if (plan%goes_on) call self%begin_window(sim, limits, plan%t, plan)
-  end subroutine end_window
+    !> Events that may still come before a count is at its limit.
+    pure function left() result(events)
+      real(real64) :: events
+
+      events = min(real(limits%events - sim%tally%events - sum(self%domain%sim%tally%events), real64), &
+        real(limits%collisions - sim%tally%collisions - sum(self%domain%sim%tally%collisions), real64))
+    end function left
+  end subroutine run_windows
 
   !> Brings the whole simulation to the present; the domains go on from there.
   subroutine write_back_all(self, sim, now)

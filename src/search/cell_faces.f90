@@ -172,49 +172,46 @@ contains
     self%overlap = max(self%width - patch%reach, 0.0_real64)
     self%falling = box%falling() .or. box%has_moving_sides()
     self%box = box
-    call cut(self, 1, patch, self%column)
-    call cut(self, 2, patch, self%row)
-    call find_struck(self, 1, patch%small, self%column)
-    call find_struck(self, 2, patch%small, self%row)
+    call cut(1, self%column)
+    call cut(2, self%row)
+    call find_struck(1, self%column)
+    call find_struck(2, self%row)
+  contains
+
+    !> The faces of columns (axis 1) or rows.
+    pure subroutine cut(axis, line)
+      integer(int32), intent(in) :: axis
+      type(line_t), allocatable, intent(out) :: line(:, :)
+      integer(int32) :: low, high, inset, k, place
+
+      low = 2 - 2*axis                               ! codes of the two sides
+      high = low - 1
+      inset = merge(0, 1, self%box%periodic(axis))
+      allocate (line(0:1, patch%n(axis)))
+      do k = 1, patch%n(axis)
+        place = patch%place_of(k, axis)
+        line(0, k) = line_t(self%box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
+          0.0_real64, crossing(low))
+        line(1, k) = line_t(self%box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
+          0.0_real64, crossing(high))
+        if (place == 1) line(0, k) = line_t(self%box%lower(axis), inset, low)
+        if (place == patch%whole(axis)) line(1, k) = line_t(self%box%upper(axis), -inset, high)
+      end do
+    end subroutine cut
+
+    !> Finds the columns (axis 1) or rows in which a side that moves may strike disks.
+    pure subroutine find_struck(axis, line)
+      integer, intent(in) :: axis
+      type(line_t), intent(inout) :: line(0:, :)
+      real(real64) :: reach(2, 2)
+
+      reach = self%box%reach()
+      associate (side => self%box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + patch%small)*(1 + spare))
+        line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= self%box%lower(axis) + within(1)
+        line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= self%box%upper(axis) - within(2)
+      end associate
+    end subroutine find_struck
   end subroutine set
-
-  !> The faces of columns (axis 1) or rows.
-  pure subroutine cut(self, axis, patch, line)
-    class(cell_faces_t), intent(in) :: self
-    integer(int32), intent(in) :: axis
-    type(patch_t), intent(in) :: patch
-    type(line_t), allocatable, intent(out) :: line(:, :)
-    integer(int32) :: low, high, inset, k, place
-
-    low = 2 - 2*axis                               ! codes of the two sides
-    high = low - 1
-    inset = merge(0, 1, self%box%periodic(axis))
-    allocate (line(0:1, patch%n(axis)))
-    do k = 1, patch%n(axis)
-      place = patch%place_of(k, axis)
-      line(0, k) = line_t(self%box%lower(axis) + self%width(axis)*(place - 1) - 0.5_real64*self%overlap(axis), &
-        0.0_real64, crossing(low))
-      line(1, k) = line_t(self%box%lower(axis) + self%width(axis)*place + 0.5_real64*self%overlap(axis), &
-        0.0_real64, crossing(high))
-      if (place == 1) line(0, k) = line_t(self%box%lower(axis), inset, low)
-      if (place == patch%whole(axis)) line(1, k) = line_t(self%box%upper(axis), -inset, high)
-    end do
-  end subroutine cut
-
-  !> Finds the columns (axis 1) or rows in which a side that moves may strike disks.
-  pure subroutine find_struck(self, axis, radius, line)
-    class(cell_faces_t), intent(in) :: self
-    integer, intent(in) :: axis
-    real(real64), intent(in) :: radius             !! of the largest disks in question [length]
-    type(line_t), intent(inout) :: line(0:, :)
-    real(real64) :: reach(2, 2)
-
-    reach = self%box%reach()
-    associate (side => self%box%surface(2*axis - 1:2*axis)%motion, within => (reach(axis, :) + radius)*(1 + spare))
-      line(0, :)%struck = side(1)%travels() .and. line(0, :)%place <= self%box%lower(axis) + within(1)
-      line(1, :)%struck = side(2)%travels() .and. line(1, :)%place >= self%box%upper(axis) - within(2)
-    end associate
-  end subroutine find_struck
 
   !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move.
   pure subroutine rectangle(self, cell, n, low, high)

@@ -40,7 +40,6 @@ module cell_grid
     procedure :: predict
     procedure :: predict_both
     procedure :: cross
-    procedure :: read_ahead
     procedure :: insert
     procedure :: take_out
     procedure :: predict_with_care                 ! bound, so that it is not inlined into the hot path
@@ -220,15 +219,6 @@ contains
       call predict_one(self, sim%disk, sim%tag, sim%now, no_gravity, i)
     end if
   end subroutine predict
-
-  !> Prefetches what predictions of some disks will read.
-  subroutine read_ahead(self, sim, stage, disks)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: stage, disks(:)
-
-    call self%cells%read_ahead(sim%disk, sim%tag, stage, disks)
-  end subroutine read_ahead
 
   !> Predicts the disks i and j, which have just collided.
   subroutine predict_both(self, sim, i, j)
