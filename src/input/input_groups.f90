@@ -42,7 +42,7 @@ module input_groups
     type(value_t), allocatable :: values(:)
   contains
     procedure :: integer_of, real_of, reals_of, text_of
-    procedure :: given, faulty, line_of
+    procedure :: given, faulty
     procedure :: put_text, put_reals
     procedure :: complain, demand
     procedure :: infer_choices, check_choices
@@ -155,16 +155,6 @@ contains
     faulty = self%values(row_of(self%name, name))%faulty
   end function faulty
 
-  !> Where a variable is set; if it is not, where its group begins.
-  pure function line_of(self, name) result(line)
-    class(group_t), intent(in) :: self
-    character(len=*), intent(in) :: name
-    integer :: line
-
-    line = self%values(row_of(self%name, name))%line
-    if (line == 0) line = self%line
-  end function line_of
-
   !> Gives a variable a single value that follows from others.
   pure subroutine put_text(self, name, text)
     class(group_t), intent(inout) :: self
@@ -187,14 +177,16 @@ contains
     self%values(row_of(self%name, name))%reals = numbers
   end subroutine put_reals
 
-  !> Reports what is wrong with a variable, where it is set.
+  !> Reports what is wrong with a variable where it is set, or if it is not, where its group begins.
   pure subroutine complain(self, name, what, problems)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: what       !! what is wrong, what is allowed
     type(problem_list_t), intent(inout) :: problems
 
-    call problems%add(self%line_of(name), trim(self%name)//"."//name, what)
+    associate (line => self%values(row_of(self%name, name))%line)
+      call problems%add(merge(self%line, line, line == 0), trim(self%name)//"."//name, what)
+    end associate
   end subroutine complain
 
   !> Reports a variable that has to be given and is not.

@@ -220,15 +220,14 @@ contains
     subroutine refuse(together, variable, other)
       logical, intent(in) :: together                     !! both are there
       character(len=*), intent(in) :: variable, other
-      integer :: dot, line
+      integer :: dot
 
       if (.not. together) return
       dot = index(variable//".", ".")
-      associate (group => groups(place_of(variable(:dot - 1), groups%name)))
-        line = group%line
-        if (dot < len(variable)) line = group%line_of(variable(dot + 1:))
+      associate (group => groups(place_of(variable(:dot - 1), groups%name)), what => "does not go with "//other)
+        if (dot < len(variable)) call group%complain(variable(dot + 1:), what, problems)
+        if (dot > len(variable)) call problems%add(group%line, variable, what)
       end associate
-      call problems%add(line, variable, "does not go with "//other)
     end subroutine refuse
 
     !> Reports too many intervals until stop.time.

@@ -38,7 +38,7 @@ contains
       call take_count(groups(k), species(k))
       call take_velocities(groups(k), species(k))
     end do
-    call resolve_sizes(groups, species, problems)
+    call resolve_sizes()
     total = sum(int(species%count, int64))
     if (total > most_disks) call problems%add(0, "species.count", counted(total, "disk")//"; allowed: up to "// &
       written(most_disks))
@@ -135,72 +135,48 @@ contains
           counted(int(s%count, int64), "disk"), problems)
       end associate
     end subroutine take_velocities
-  end subroutine take_species
 
-  !> A name must fit into file paths, override paths and messages, and be unique among its kind.
-  subroutine check_name(groups, k, problems)
-    type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
-    integer, intent(in) :: k
-    type(problem_list_t), intent(inout) :: problems
-    character(len=:), allocatable :: name
-    integer :: j
+    !> Masses and radii, multiplied along the chain of `relative_to`.
+    subroutine resolve_sizes()
+      real(real64), dimension(size(species)) :: mass, radius
+      character(len=:), allocatable :: wanted
+      integer :: base(size(species)), k, j, step            ! base: the species that `relative_to` names; 0: none
+      logical :: fits
 
-    name = trim(groups(k)%instance)
-    if (verify(name, letters//digits//"_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
-      call groups(k)%complain("name", shown(name)//" is not a valid name; allowed: up to "//written(longest_name)// &
-        " letters, digits, _ and -, beginning with a letter", problems)
-    else if (any(own_names() == name) .or. any(beside_species == name)) then
-      call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
-    end if
-    j = place_of(name, groups%instance)
-    if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
-      written(groups(j)%line), problems)
-  end subroutine check_name
-
-  !> Masses and radii, multiplied along the chain of `relative_to`.
-  subroutine resolve_sizes(groups, species, problems)
-    type(group_t), intent(in) :: groups(:)
-    type(species_settings_t), intent(inout) :: species(:)
-    type(problem_list_t), intent(inout) :: problems
-    real(real64), dimension(size(species)) :: mass, radius
-    character(len=:), allocatable :: wanted
-    integer :: base(size(species)), k, j, step            ! base: the species that `relative_to` names; 0: none
-    logical :: fits
-
-    do k = 1, size(species)
-      wanted = groups(k)%text_of("relative_to")
-      base(k) = 0
-      if (wanted /= "") base(k) = place_of(wanted, groups%instance)
-      mass(k) = groups(k)%real_of("mass", 1.0_real64)
-      radius(k) = own_radius(groups(k), species(k))
-      if (wanted == "") cycle
-      if (base(k) == 0) then
-        radius(k) = 0
-        call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
-          suggestion(wanted, groups%instance), problems)
-        cycle
-      end if
-      species(base(k))%is_base = .true.
-      if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the radii of """//species(base(k))%name &
-        //""" are those of its file; give mass and radius instead", problems)
-    end do
-    do k = 1, size(species)
-      species(k)%mass = 1
-      species(k)%radius = 1
-      j = k
-      do step = 1, size(species)
-        species(k)%mass = species(k)%mass*mass(j)
-        species(k)%radius = species(k)%radius*radius(j)
-        fits = max(species(k)%mass, species(k)%radius) <= largest .and. species(k)%mass >= smallest
-        j = base(j)
-        if (j == 0 .or. .not. fits) exit
+      do k = 1, size(species)
+        wanted = groups(k)%text_of("relative_to")
+        base(k) = 0
+        if (wanted /= "") base(k) = place_of(wanted, groups%instance)
+        mass(k) = groups(k)%real_of("mass", 1.0_real64)
+        radius(k) = own_radius(groups(k), species(k))
+        if (wanted == "") cycle
+        if (base(k) == 0) then
+          radius(k) = 0
+          call groups(k)%complain("relative_to", "there is no species "//shown(wanted)//"; "// &
+            suggestion(wanted, groups%instance), problems)
+          cycle
+        end if
+        species(base(k))%is_base = .true.
+        if (species(base(k))%radius_in_file) call groups(k)%complain("relative_to", "the radii of """//species(base(k))%name &
+          //""" are those of its file; give mass and radius instead", problems)
       end do
-      if (j == 0 .and. fits) cycle
-      call groups(k)%complain("relative_to", "leads back to the species itself, or to sizes out of range", problems)
-      species(k)%radius = 0
-    end do
-
-  contains
+      do k = 1, size(species)
+        species(k)%mass = 1
+        species(k)%radius = 1
+        fits = .false.
+        j = k
+        do step = 1, size(species)
+          species(k)%mass = species(k)%mass*mass(j)
+          species(k)%radius = species(k)%radius*radius(j)
+          fits = max(species(k)%mass, species(k)%radius) <= largest .and. species(k)%mass >= smallest
+          j = base(j)
+          if (j == 0 .or. .not. fits) exit
+        end do
+        if (j == 0 .and. fits) cycle
+        call groups(k)%complain("relative_to", "leads back to the species itself, or to sizes out of range", problems)
+        species(k)%radius = 0
+      end do
+    end subroutine resolve_sizes
 
     !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
     function own_radius(group, s) result(radius)
@@ -223,7 +199,27 @@ contains
         call group%complain("radius", "is missing; give radius, packing_fraction or relative_to", problems)
       end if
     end function own_radius
-  end subroutine resolve_sizes
+  end subroutine take_species
+
+  !> A name must fit into file paths, override paths and messages, and be unique among its kind.
+  subroutine check_name(groups, k, problems)
+    type(group_t), intent(in) :: groups(:)                !! all obstacles, or all species
+    integer, intent(in) :: k
+    type(problem_list_t), intent(inout) :: problems
+    character(len=:), allocatable :: name
+    integer :: j
+
+    name = trim(groups(k)%instance)
+    if (verify(name, letters//digits//"_-") > 0 .or. verify(name(1:1), letters) > 0 .or. len(name) > longest_name) then
+      call groups(k)%complain("name", shown(name)//" is not a valid name; allowed: up to "//written(longest_name)// &
+        " letters, digits, _ and -, beginning with a letter", problems)
+    else if (any(own_names() == name) .or. any(beside_species == name)) then
+      call groups(k)%complain("name", shown(name)//" is reserved for the output file", problems)
+    end if
+    j = place_of(name, groups%instance)
+    if (j < k) call groups(k)%complain("name", shown(name)//" is already the name of the one in line "// &
+      written(groups(j)%line), problems)
+  end subroutine check_name
 
   !> Area of a region; 0 if its ends are the wrong way round.
   pure function area(region)

@@ -24,6 +24,7 @@ contains
     type(assignment_t), intent(in) :: assignment
     type(problem_list_t), intent(inout) :: problems
     type(value_t) :: new
+    type(variable_t) :: row
     character(len=:), allocatable :: problem
     integer(int64) :: total
     integer :: k, n
@@ -32,9 +33,10 @@ contains
     slot%given = .true.
     slot%faulty = .true.
     if (.not. assignment%sound) return
-    associate (row => table(slot%row), tokens => assignment%tokens)
+    row = table(slot%row)
+    associate (tokens => assignment%tokens)
       total = sum(int(tokens%repeats, int64))
-      call check_number(row)
+      call check_number()
       if (problem /= "") then
         call problems%add(assignment%line, assignment%where, problem)
         return
@@ -48,7 +50,7 @@ contains
         if (slot%kind /= "real") allocate (new%texts(total))
       end if
       do k = 1, size(tokens)
-        call store_token(row, tokens(k), content(text, tokens(k)))
+        call store_token(tokens(k), content(text, tokens(k)))
         n = n + tokens(k)%repeats
         if (problem == "") cycle
         call problems%add(merge(tokens(k)%line, assignment%line, assignment%line > 0), assignment%where, problem)
@@ -61,9 +63,7 @@ contains
   contains
 
     !> The number of values must be what the variable takes.
-    subroutine check_number(row)
-      type(variable_t), intent(in) :: row
-
+    subroutine check_number()
       problem = ""
       if (assignment%element > 0) then
         if (assignment%element > row%size .or. .not. slot%is_set()) then
@@ -95,8 +95,7 @@ contains
     end function decimal_hint
 
     !> Checks one word and stores it after the first n values.
-    subroutine store_token(row, token, word)
-      type(variable_t), intent(in) :: row
+    subroutine store_token(token, word)
       type(token_t), intent(in) :: token
       character(len=*), intent(in) :: word
       character(len=:), allocatable :: normal        ! the word as it is kept
@@ -120,7 +119,7 @@ contains
         if (any(lower_case(word) == yes)) normal = ".true."
         if (all(lower_case(word) /= [yes, no])) problem = "is neither true nor false"
       case default
-        call check_text(word, row, assignment%line <= 0 .or. quoted, problem)
+        call check_text(word, assignment%line <= 0 .or. quoted)
       end select
       if (row%kind /= "text") then
         if (problem == "" .and. (number < row%range%lower .or. number > row%range%upper)) problem = "is out of range"
@@ -134,27 +133,24 @@ contains
         new%texts(n + 1:n + token%repeats) = normal
       end if
     end subroutine store_token
+
+    !> Text must be in quotes, or need none, not too long, and one of the choices if there are any.
+    subroutine check_text(word, quoted)
+      character(len=*), intent(in) :: word
+      logical, intent(in) :: quoted
+      character(len=:), allocatable :: meant
+
+      if (.not. quoted) then
+        problem = shown(word)//" is not in quotes; allowed: "//allowed(row)
+      else if (len(word) > text_length) then
+        problem = "the text has "//written(len(word))//" bytes; allowed: up to "//written(text_length)
+      else if (row%choices /= "" .and. all(words_of(row%choices) /= word)) then
+        meant = nearest_word(word, words_of(row%choices))
+        if (meant /= "") meant = "did you mean """//meant//"""? "
+        problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
+      end if
+    end subroutine check_text
   end subroutine store_values
-
-  !> Text must be in quotes, or need none, not too long, and one of the choices if there are any.
-  pure subroutine check_text(word, row, quoted, problem)
-    character(len=*), intent(in) :: word
-    type(variable_t), intent(in) :: row
-    logical, intent(in) :: quoted
-    character(len=:), allocatable, intent(out) :: problem
-    character(len=:), allocatable :: meant
-
-    problem = ""
-    if (.not. quoted) then
-      problem = shown(word)//" is not in quotes; allowed: "//allowed(row)
-    else if (len(word) > text_length) then
-      problem = "the text has "//written(len(word))//" bytes; allowed: up to "//written(text_length)
-    else if (row%choices /= "" .and. all(words_of(row%choices) /= word)) then
-      meant = nearest_word(word, words_of(row%choices))
-      if (meant /= "") meant = "did you mean """//meant//"""? "
-      problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
-    end if
-  end subroutine check_text
 
   !> Digits with an optional sign.
   pure function is_whole(word)

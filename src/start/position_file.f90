@@ -104,7 +104,7 @@ contains
         if (problem /= "") return
         associate (word => line(first(k):last(k)))
           if (column(k) == species_column) then
-            its_species = species_named(word, names)
+            its_species = species_named(word)
             if (its_species == 0) problem = "there is no species "//shown(word)//"; known: 1 to "//written(size(names)) &
               //", "//joined(names, ", ")
           else
@@ -181,22 +181,21 @@ contains
         problem = "columns vx and vy go together"
       end if
     end subroutine read_names
+
+    !> The number of the species that a word says: its number or name; 0 if there is none.
+    function species_named(word) result(s)
+      character(len=*), intent(in) :: word
+      integer :: s
+      real(real64) :: number
+      character(len=:), allocatable :: what
+
+      s = place_of(word, names)
+      if (s > 0) return
+      call read_real(word, number, what)
+      if (what == "" .and. number >= 1 .and. number <= size(names)) then
+        if (number <= aint(number)) s = int(number)
+      end if
+    end function species_named
   end subroutine read_positions
-
-  !> The number of the species that a word says: its number or name; 0 if there is none.
-  pure function species_named(word, names) result(s)
-    character(len=*), intent(in) :: word
-    character(len=*), intent(in) :: names(:)
-    integer :: s
-    real(real64) :: number
-    character(len=:), allocatable :: problem
-
-    s = place_of(word, names)
-    if (s > 0) return
-    call read_real(word, number, problem)
-    if (problem == "" .and. number >= 1 .and. number <= size(names)) then
-      if (number <= aint(number)) s = int(number)
-    end if
-  end function species_named
 
 end module position_file
