@@ -77,17 +77,23 @@ def test_the_readme_leads_to_every_page():
 @pytest.mark.parametrize(
     ("page", "heading"), [("limits", "## Promises"), ("inside", "## Invariants")]
 )
-def test_promises_are_held_by_tests_that_exist(page, heading):
-    """In the tables the second column names files and tests."""
+def test_promises_are_held_by_tests_and_modules_that_exist(page, heading):
+    """In the tables the second column names files and tests, a third one modules and scripts."""
     sources = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("tests/**/*.pf")]
     known = re.findall(
         r"^def test_(\w+)|^  subroutine (\w+)", "".join(p.read_text() for p in sources), re.M
     )
     known = {name for pair in known for name in pair}
-    rows = re.findall(r"^\| (?:[^|]|\\\|)+ \| ([^|]+) \|", section(page, heading), re.M)
-    named = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
-    assert len(named) > 20
+    rows = re.findall(r"^\|(?: [^|]+ \|){2,3}$", section(page, heading), re.M)[1:]
+    cells = [re.split(r" *\| *", row.replace("\\|", ""))[2:-1] for row in rows]
+    named = [word for cell in cells for word in re.findall(r"`(\w+)`", cell[0])]
+    assert len(named) > 10
     assert [word for word in named if word not in known] == []
+    keepers = [
+        word for _, *last in cells for cell in last for word in re.findall(r"`(\w[\w/.]*\w)`", cell)
+    ]
+    places = [ROOT / word if "." in word else ROOT / "src" / f"{word}.f90" for word in keepers]
+    assert [str(place) for place in places if not place.exists()] == []
 
 
 def procedures_of(module):
@@ -158,32 +164,17 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
     assert missing == []
 
 
-@pytest.mark.parametrize("folder", sorted(p.parent.name for p in ROOT.glob("src/*/README.md")))
-def test_every_module_is_introduced_in_its_folder(folder):
+@pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
+def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(folder):
+    """After "Protected by" its README names files, or folders, in tests/."""
     page = (ROOT / "src" / folder / "README.md").read_text()
     modules = [path.stem for path in (ROOT / "src" / folder).glob("*.f90")]
     assert [name for name in modules if not re.search(rf"`{name}\b", page)] == []
-
-
-@pytest.mark.parametrize("folder", sorted(p.name for p in ROOT.glob("src/*/")))
-def test_every_folder_says_which_tests_protect_it(folder):
-    """After "Protected by" its README names files, or folders, in tests/."""
-    page = (ROOT / "src" / folder / "README.md").read_text()
     _, protected, words = page.partition("Protected by")
     named = re.findall(r"`(?:tests/)?([\w/]+(?:\.\w+)?)`", words.partition("\n\n")[0])
-    assert protected and named
     there = {str(path.relative_to(ROOT / "tests")) for path in ROOT.glob("tests/**/*")}
     there |= {name.rpartition("/")[2] for name in there}
-    assert [name for name in named if name not in there] == []
-
-
-def test_modules_that_keep_a_promise_exist():
-    """In the table of promises the third column names modules of src/ and scripts."""
-    cells = re.findall(r"^\|(?: [^|]+ \|){2} ([^|]+) \|", section("limits", "## Promises"), re.M)
-    named = [word for cell in cells for word in re.findall(r"`(\w[\w/.]*\w)`", cell)]
-    assert len(named) > 40
-    places = [ROOT / word if "." in word else ROOT / "src" / f"{word}.f90" for word in named]
-    assert [str(place) for place in places if not place.exists()] == []
+    assert protected and named and [name for name in named if name not in there] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -108,8 +108,10 @@ def positions(stage, option, call, first="gas.nml") -> range:
     return range(sum(k < begin for k in calls) + 1, len(calls) + 1)
 
 
-def chosen(numbers, step, last=6) -> list[int]:
-    """Some of them, and those of the last moments, when HDF5 cuts the file and it gets its name."""
+def chosen(stage, option, call, step) -> list[int]:
+    """Some calls, and those of the last moments, when HDF5 cuts the file and it gets its name."""
+    numbers = positions(stage, option, call)
+    last = {"pwrite64": 6, "ftruncate": 2, "rename": 2, "unlink": 2}.get(call, 1)
     return sorted({*numbers[::step], *numbers[-last:]})
 
 
@@ -179,7 +181,7 @@ def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step
     cases = [
         (option, f"inject={call}:error={error}:when={number}{again}")
         for option in OPTIONS
-        for number in chosen(positions(stage, option, call), step)
+        for number in chosen(stage, option, call, step)
         for error, again in (way.partition("+")[:2] for way in WAYS[call])
     ]
     assert problems(check_after_failure, program, stage, call, cases) == []
@@ -214,7 +216,7 @@ def test_a_kill_at_any_call_costs_nothing(program, stage, call, step):
     cases = [
         (option, f"inject={call}:signal=SIGKILL:when={number}")
         for option in OPTIONS
-        for number in chosen(positions(stage, option, call), step)
+        for number in chosen(stage, option, call, step)
     ]
     assert problems(check_after_kill, program, stage, call, cases) == []
 
@@ -254,7 +256,7 @@ def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stag
     cases = [
         (option, f"inject={call}:signal=SIGTERM:when={number}")
         for option in OPTIONS
-        for number in chosen(positions(stage, option, call), step, last=2)
+        for number in chosen(stage, option, call, step)
     ]
     assert problems(check_after_signal, program, stage, call, cases) == []
 

@@ -12,7 +12,6 @@ import pytest
 from whole_runs import (
     FILES,
     FINISHED,
-    PATIENCE,
     STOPPED,
     USAGE,
     differences,
@@ -145,19 +144,6 @@ def test_names_with_line_breaks_break_no_line(ricochet, tmp_path, options, code)
     lines = run.stderr.splitlines()
     assert len(lines) <= 1 and all("?" in line for line in lines)
     assert all(" = " in line for line in run.stdout.splitlines())
-
-
-def test_blanks_at_the_end_belong_to_a_name(ricochet, tmp_path):
-    write_input(tmp_path, SHORT)
-    (tmp_path / "doc ").write_text("chapter one")
-    (tmp_path / "other.nml ").write_text(SHORT.replace("20", "30"))
-    write_input(tmp_path, SHORT, "other.nml")
-    for option in ("--quiet", "--force"):
-        run = ricochet("gas.nml", "-o", "doc ", option)
-        assert run.returncode == FILES and one_line(run).startswith("doc : ")
-    assert (tmp_path / "doc ").read_text() == "chapter one"
-    assert ricochet("gas.nml", "-o", "doc").returncode == FINISHED
-    assert "30 disks" in ricochet("other.nml ", "--check").stdout
 
 
 @pytest.mark.parametrize(
@@ -307,38 +293,23 @@ def test_a_lock_that_was_removed_and_taken_anew_stays(started, tmp_path):
     assert lock.exists()
 
 
-@pytest.fixture
-def shared(program):
-    """A folder for all users, with the program and an input in it."""
-    if os.geteuid() != 0:
-        pytest.skip("needs root, to be another user")
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to be another user")
+@pytest.mark.parametrize(("mode", "status"), [(0o555, FILES), (0o733, FINISHED)])
+def test_a_run_needs_the_right_to_make_files_not_to_list_them(program, mode, status):
     with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o777)
-        shutil.copy(program, name)
-        write_input(name, ENDLESS).chmod(0o644)
+        folder = Path(name)
+        shutil.copy(program, folder)
+        write_input(folder, SHORT).chmod(0o644)
+        folder.chmod(mode)
+        user = {"user": 65534, "group": 65534, "extra_groups": []}
         try:
-            as_nobody(Path(name), "--version")
+            command = [folder / "ricochet", *COMMAND]
+            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, **user)
         except PermissionError:
             pytest.skip("no other user may enter the folders above this one")
-        yield Path(name)
-
-
-def as_nobody(folder, *arguments):
-    """A run of another user."""
-    user = {"user": 65534, "group": 65534, "extra_groups": []}
-    command = [folder / "ricochet", *arguments]
-    options = {"capture_output": True, "text": True, "timeout": PATIENCE}
-    return subprocess.run(command, cwd=folder, **user, **options)
-
-
-def test_a_folder_that_cannot_be_written_or_listed(shared):
-    """A run needs the right to make files, and says so at once; not the right to list them."""
-    for mode, status in ((0o555, FILES), (0o733, FINISHED)):
-        shared.chmod(mode)
-        run = as_nobody(shared, *COMMAND, "--set", "stop.time=9")
-        assert run.returncode == status, run.stderr
-        if status == FILES:
-            assert one_line(run).startswith("gas.h5: ") and "Permission denied" in run.stderr
+    assert run.returncode == status, run.stderr
+    if status == FILES:
+        assert one_line(run).startswith("gas.h5: ") and "Permission denied" in run.stderr
 
 
 def test_a_disk_that_cannot_synchronize_has_the_result(ricochet, tmp_path):
