@@ -18,7 +18,9 @@ function begin() {
 
 // The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
 function usualPace() {
-  return near(Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1, [5, 2, 1]);
+  const most = Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
+  const power = 10 ** Math.floor(Math.log10(most));
+  return power * Math.floor(most / power);
 }
 
 // What depends on the frames that there are.
@@ -45,7 +47,11 @@ function show(time, anew = false) {
   told = performance.now();
   $('cursor').style.transform = `translateX(${cursorAt(moment.time)}px)`;
   drawHistogram(moment.frame);
-  tellEnergies();
+  kinds.forEach((_, s) => {
+    const cells = $('energies').rows[s + 1].cells;
+    cells[2].textContent = short(moment.kinetic[s] * share(s));
+    if (film.potential) cells[3].textContent = short(moment.potential[s] * share(s));
+  });
   drawPressure();
   tell();
   tellQueue();

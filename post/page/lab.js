@@ -89,7 +89,12 @@ function buildGroup({ kind, place, added }) {
   const details = make('details', { open: isOpen({ kind, place, added }) }, summary);
   if (added) {
     const remove = make('button', { type: 'button', className: 'reset', textContent: 'remove this group' });
-    remove.addEventListener('click', () => removeGroup(place));
+    remove.addEventListener('click', () => {
+      state.added = state.added.filter(pair => pair.join('.') !== place);
+      state.settings = Object.fromEntries(Object.entries(state.settings).filter(([key]) => !key.startsWith(place + '.')));
+      buildForm();
+      changed();
+    });
     details.append(make('div', { className: 'group' }, remove));
   }
   if (used.length) details.append(rows(used));
@@ -104,13 +109,6 @@ function addGroup(kind, name) {
     if (needed && own !== 'name') state.settings[`${kind}.${name}.${own}`] = value;
   buildForm();
   $('groups').querySelector(`[data-place="${kind}.${name}.${Object.keys(lab.table[kind])[1]}"]`)?.scrollIntoView({ block: 'center' });
-  changed();
-}
-
-function removeGroup(place) {
-  state.added = state.added.filter(pair => pair.join('.') !== place);
-  state.settings = Object.fromEntries(Object.entries(state.settings).filter(([name]) => !name.startsWith(place + '.')));
-  buildForm();
   changed();
 }
 
@@ -330,13 +328,6 @@ function pauseOrGoOn() {
   else films().forEach(one => one.play(true));
 }
 
-function compareOrNot() {
-  const on = !isComparing();
-  $('compare').ariaPressed = on;
-  if (!on && state.shown.length > 1) state.shown.shift().figure.remove();
-  else if (on) tell('this run stays; the next one will stand beside it');
-}
-
 // ---------- heartbeats ----------
 
 async function look() {
@@ -369,8 +360,14 @@ function bare(on) {
 }
 
 const actions = {
-  run, pause: pauseOrGoOn, compare: compareOrNot, settings: () => bare(!document.body.classList.contains('bare')),
+  run, pause: pauseOrGoOn, settings: () => bare(!document.body.classList.contains('bare')),
   theme: () => theme(!isDark()),
+  compare: () => {
+    const on = !isComparing();
+    $('compare').ariaPressed = on;
+    if (!on && state.shown.length > 1) state.shown.shift().figure.remove();
+    else if (on) tell('this run stays; the next one will stand beside it');
+  },
   choose: () => {  // pictures are asked for while one looks at them: a choice need not wait for the rest
     for (const image of $('inputs').querySelectorAll('img:not([src])')) image.src = image.dataset.src;
     $('inputs').showModal();

@@ -84,15 +84,10 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short) {
   return { x, y };
 }
 
-// The number of one digit, 1, 2 or 5, that is not smaller; or, with [5, 2, 1], not larger.
-function near(value, digits = [1, 2, 5, 10]) {
-  const power = 10 ** Math.floor(Math.log10(value) + 1e-9);
-  return power * digits.find(k => digits[0] === 5 ? k * power <= value * (1 + 1e-9) : k * power >= value * (1 - 1e-9));
-}
-
+// The multiples of a number of one digit, 1, 2 or 5.
 function round(low, high) {
-  const step = near((high - low) / 4);
-  const values = [];
+  const least = (high - low) / 4, power = 10 ** Math.floor(Math.log10(least) + 1e-9), values = [];
+  const step = power * [1, 2, 5, 10].find(k => k * power >= least * (1 - 1e-9));
   for (let k = Math.ceil(low / step); k * step <= high; k++) values.push(k * step);
   return values;
 }
@@ -250,15 +245,6 @@ function energiesBetween(x) {
   move(time);
   return rows;
 }
-
-function tellEnergies() {
-  kinds.forEach((_, s) => {
-    const cells = $('energies').rows[s + 1].cells;
-    cells[2].textContent = short(moment.kinetic[s] * share(s));
-    if (film.potential) cells[3].textContent = short(moment.potential[s] * share(s));
-  });
-}
-
 
 // ---------- pressure ----------
 
