@@ -24,7 +24,7 @@ import h5py
 import numpy as np
 import pytest
 
-from random_systems import CADENCES, System, numbers, random_system
+from random_systems import CADENCES, System, numbers, random_system, starting_file
 from run_laws import laws_broken
 from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED, contents, unlike, within
 
@@ -138,11 +138,9 @@ class Case:
         table = table_of(self.program)
         lines = [rescaled(line, self.units, table) for line in lines]
         (self.folder / "other.nml").write_text("\n".join(lines) + "\n")
-        names, *rows = self.system.start.splitlines() or [""]
-        factors = [eval(COLUMNS[column], {}, self.units) for column in names.split()]
-        rows = [[float(word) for word in row.split(", ")] for row in rows]
-        rows = [numbers(*(a * b for a, b in zip(row, factors, strict=True))) for row in rows]
-        (self.folder / "other.txt").write_text("\n".join([names, *rows]) + "\n")
+        columns, table = self.system.columns, self.system.table
+        factors = [eval(COLUMNS[column], {}, self.units) for column in columns]
+        (self.folder / "other.txt").write_text(starting_file(columns, table * factors))
         return self.whole(name, *self.way(), text="other.nml")
 
 
@@ -205,7 +203,7 @@ def accepted(program: Path, folder: Path, rng: random.Random) -> System:
 
 def is_accepted(program: Path, folder: Path, system: System) -> bool:
     """Writes its files; it may be refused for lack of room, but not for two features at a time."""
-    (folder / "start.txt").write_text(system.start + "\n")
+    (folder / "start.txt").write_text(starting_file(system.columns, system.table))
     (folder / "case.nml").write_text(system.text)
     command = [*within(5), program, "case.nml", "--check"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)

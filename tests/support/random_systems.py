@@ -20,10 +20,11 @@ KINDS = r"(dynamics|motion|rule|placement|velocities|kind|side|precision) = '(\w
 
 
 class System(NamedTuple):
-    """An input file, the text of its starting file (empty: none), and what it says of itself."""
+    """An input file, the table of its starting file (empty: none), and what it says of itself."""
 
     text: str
-    start: str
+    columns: list[str]
+    table: np.ndarray
     disks: int
     events: int
 
@@ -37,6 +38,11 @@ class System(NamedTuple):
                 kinds = re.search(r"boundary = '(\w+)', '(\w+)'", words)
                 found |= {f"{kind} {axis}" for kind, axis in zip(kinds.groups(), "xy", strict=True)}
         return found
+
+
+def starting_file(columns: list[str], table: np.ndarray) -> str:
+    """The text of a table of disks."""
+    return "\n".join([" ".join(columns), *(numbers(*row) for row in table.tolist())]) + "\n"
 
 
 def numbers(*values: float) -> str:
@@ -66,7 +72,8 @@ class Draw:
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
         self.worked = False  # by walls: the energy that is left says nothing
-        self.start: list[str] = []
+        self.columns: list[str] = []
+        self.table = np.empty((0, 8))
         self.kinds = 1
         if self.disks < 3 and (self.driven or all(self.periodic)):
             self.disks = 3  # one might meet nothing for ever
@@ -275,7 +282,7 @@ class Draw:
         cell = min(self.edges[0] / columns, self.edges[1] / rows)
         own = np.random.default_rng(rng.randint(0, 10**6))
         k = np.arange(self.disks)
-        table = np.empty((self.disks, 8))
+        self.table = table = np.empty((self.disks, 8))
         table[:, 0] = self.lower[0] + (k % columns + 0.5) * self.edges[0] / columns
         table[:, 1] = self.lower[1] + (k // columns + 0.5) * self.edges[1] / rows
         if self.chance(0.3):
@@ -287,9 +294,8 @@ class Draw:
             table[:, 5] = own.uniform(0.5, 2, self.disks)
         table[:, 6] = own.normal(0, self.speed / cell, self.disks)
         table[:, 7] = own.uniform(-9, 9, self.disks)
-        names = ["x", "y", "vx", "vy", "radius", "mass"]
-        names += ["omega", "angle"] if self.turns else []
-        self.start = [" ".join(names), *(numbers(*row) for row in table[:, : len(names)].tolist())]
+        self.columns = ["x", "y", "vx", "vy", "radius", "mass"]
+        self.columns += ["omega", "angle"] if self.turns else []
         return "&species name = 's0' file = 'start.txt' /"
 
     # --- what they do ---
@@ -377,4 +383,5 @@ def random_system(rng: random.Random) -> System:
     disks = draw.species(bool(obstacles))
     parts = [draw.run(), draw.box(), *walls, *obstacles, *disks, draw.contact(), draw.drive()]
     parts += [draw.stop(), draw.output()]
-    return System("\n".join(parts) + "\n", "\n".join(draw.start), draw.disks, draw.events)
+    table = draw.table[:, : len(draw.columns)]
+    return System("\n".join(parts) + "\n", draw.columns, table, draw.disks, draw.events)
