@@ -21,18 +21,9 @@ The 24 were drawn from commit 67f9503 by `random.Random(20261124)`: two from eac
 one from run.f90, three from post/. A draw takes a kind of fault (a sign; a comparison, which may
 be `.and.`, `.not.` or `min` as well; a dropped line that changes the state; a number or index off
 by one), a line of the folder that such a fault fits, and a place in it. Of twenty draws for each
-folder the first ones count, if they are of different subjects. Passed over were
-
-- those that change nothing that can be seen: events of equal times sorted the other way into a
-  bucket, as they are ordered afterwards; one byte more for each sample in estimates; a text in an
-  output file left open after it was read; pairs looked for in a wider circle, if filtered later;
-- those that change only how long it takes: disks renumbered in place with several threads, no
-  prefetch of cells;
-- those that every run of the program shows: no event executed, contacts at wrong times, spans of
-  the calendar opened twice, the columns of a sample all from the first series;
-- those whose effect no compiler promises: beyond an array (six in search/, one in dynamics/);
-- those in what was to go: the index of names, texts in forged files, sealed files, checkpoints in
-  files of their own, cells of a sheared box.
+folder the first ones count, if they are of different subjects. Passed over were those that change
+nothing that can be seen, or only how long it takes; that every run of the program shows; whose
+effect no compiler promises, beyond an array; and those in what was to go.
 """
 
 import argparse

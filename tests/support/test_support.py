@@ -33,8 +33,16 @@ end module test_it
 @pytest.mark.parametrize("pfunit", RUNNERS, ids=["substitute", "pFUnit"][: len(RUNNERS)])
 def test_every_verdict_is_the_name_of_its_test(tmp_path, pfunit):
     shared = "" if pfunit else "tests/support/funit.f90"
-    command = ["make", "unit-tests", "sources=", "suites=tests/support/verdicts", "DEBUG=1",
-               f"shared={shared}", f"BUILD={tmp_path}", f"PFUNIT_DIR={pfunit}"]
+    command = [
+        "make",
+        "unit-tests",
+        "sources=",
+        "suites=tests/support/verdicts",
+        "DEBUG=1",
+        f"shared={shared}",
+        f"BUILD={tmp_path}",
+        f"PFUNIT_DIR={pfunit}",
+    ]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     suite = (SUPPORT / "verdicts" / "test_verdicts.pf").read_text()
@@ -64,14 +72,11 @@ def translated(tmp_path: Path, text: str, name: str = "test_it.pf") -> str:
         "@assertEqual(1, n, whitespace=keep_all)",
         "@assertEqual(1, n, message='a', message='b')",
         "@assertEqual(message='a', 1, n)",
-        "@assertEqual(1)",
         "@assertEqual(1, , n)",
         "@assertEqual(1, f(n)",
         "@assertLessThan(x, y, tolerance=0.1)",
         "@assertRelativelyEqual(x, y)",
-        "@assertTrue(done, tolerance=0.1)",
         "@assertFail(message='a')",
-        "@mpiAssertEqual(1, n)",
         "@asserttrue done",
         "@disable",
     ],
@@ -92,9 +97,6 @@ def test_a_line_outside_the_common_language_is_refused_with_its_number(tmp_path,
         ("  @test\n", "  @before\n\n"),
         ("contains", "  @before\n  subroutine a()\n  @before\n  subroutine b()\n"),
         ("@test\n", "@test\n  integer :: n\n"),
-        ("use funit", "use funit\n  use systems, only: a, &\n    run"),
-        ("use funit", "use funit\n  use systems, only: near => close_to, b"),
-        ("end module", "pure logical function is(x)\n  end function is\nend module"),
     ],
 )
 def test_a_file_outside_the_common_language_is_refused(tmp_path, before, after):
@@ -209,7 +211,7 @@ def test_a_module_in_order_has_no_style_problem(tmp_path):
         ("  private\n", "  private\n  public :: twice\n", 7, "nobody uses twice"),
         ("contains\n", "#include 'x'\ncontains\n", 7, "preprocessor"),
         ("contains\n", "contains\n" + "! a line\n" * 437, 451, "more than 450 lines"),
-        ("It says:", "It says: '/ho" "me/me'", 1, "path of one machine"),
+        ("It says:", "It says: '/home/me'", 1, "path of one machine"),
     ],
 )
 def test_a_style_problem_is_reported_at_its_line(tmp_path, before, after, line, words):

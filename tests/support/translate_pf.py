@@ -46,12 +46,6 @@ TOLERANT = {
     ),
 }
 CONDITION = {"true": "pf_holds({})", "false": "pf_holds(.not. ({}))"}
-# Plain words that `use funit` brings along under pFUnit; a test cannot use others of that name.
-TAKEN = {
-    *("catch", "disable", "equal_to", "every", "every_item", "false", "finalize", "initialize"),
-    *("is", "near", "not", "predicate", "run", "starts_with", "stub", "subject", "test", "throw"),
-    "true",
-}
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.IGNORECASE)
 
 
@@ -167,21 +161,10 @@ def find_suite(lines: list[str], stem: str) -> Suite:
     return suite
 
 
-def refuse_taken_names(lines: list[str]) -> None:
-    """Refuses imported or own procedures that have the name of something in pFUnit."""
-    code = "\n".join(map(without_strings, lines)).lower()
-    imports = re.findall(r"^ *use +\w+ *, *only *:((?:[^\n]*& *\n)*[^\n]*)", code, re.MULTILINE)
-    names = {name for text in imports for name in re.findall(r"(\w+) *(?:=>[^,]*)?(?:,|&|$)", text)}
-    names |= set(re.findall(r"^ *(?:[\w()]+ +)*(?:subroutine|function) +(\w+)", code, re.MULTILINE))
-    if names & TAKEN:
-        raise Refused(f"pFUnit has its own '{min(names & TAKEN)}'; import it as another_name => it")
-
-
 def translate(source: Path) -> str:
     """The Fortran text of a whole file: its module, then the subroutine that runs its tests."""
     lines = source.read_text().splitlines()
     suite = find_suite(lines, source.stem)
-    refuse_taken_names(lines)
     fortran = [f'# 1 "{source}"']
     for number, line in enumerate(lines, start=1):
         try:
