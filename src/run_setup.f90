@@ -6,7 +6,7 @@ module run_setup
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
   use input_fit, only: fit_together
-  use input_json, only: groups_text
+  use variable_help, only: groups_text
   use input_problems, only: problem_list_t
   use input_settings, only: resolve_settings
   use input_text, only: read_text

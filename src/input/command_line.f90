@@ -4,12 +4,11 @@ module command_line
   use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
   use hdf5_handle, only: hdf5_version
-  use input_json, only: variables_text
   use run_files, only: output_of
   use system, only: print_text
   use texts, only: nearest_word, shown, text_t
   use version, only: program_version
-  use variable_help, only: defaults_text, explain
+  use variable_help, only: defaults_text, explain, variables_text
   implicit none
   private
   public :: command_t, read_command_line, parse_arguments, answer, help_text

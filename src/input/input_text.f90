@@ -1,17 +1,43 @@
-!> The text of an input file.
+!> The text of an input file: its bytes, lines and tokens. Fortran's own reader silently accepts nonsense, names neither line
+!> nor variable, and can be crashed; so the text is read here and in `namelist_input`, with a small strict grammar:
+!>
+!>     &group  name = value, value  name(2) = value  name = 3*value  /     ! comment
+!>
+!> Anything else in the text is a problem with a line number.
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
   use system, only: file_size, is_folder, opening_problem, read_bytes
-  use texts, only: written
+  use texts, only: digits, letters, shown, written
   implicit none
   private
   public :: read_text, unix_lines, byte_order_mark
+  public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
 
   integer(int64), parameter :: largest_file = 4194304   !! bytes
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+
+  !> Kinds of tokens, besides quotes and what is a token by itself, as & and =.
+  character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
+  character(len=*), parameter :: eol = new_line("a"), blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
+  character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
+
+  !> `first` and `last` are its place in the text, with its quotes.
+  type :: token_t
+    character(len=1) :: kind
+    integer :: first, last, line
+    integer :: repeats                           !! the 3 of 3*value
+  end type token_t
+
+  type :: assignment_t
+    integer :: line = 0                          !! > 0: of the file; else no part of it, see `value_t`
+    character(len=:), allocatable :: where       !! group.variable, for messages
+    integer :: element = 0                       !! the 2 of name(2) = value; 0: none
+    type(token_t), allocatable :: tokens(:)      !! its values
+    logical :: sound = .true.                    !! .false.: problems in it have been reported
+  end type assignment_t
 
 contains
 
@@ -51,7 +77,7 @@ contains
   pure function unix_lines(text) result(lines)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: lines
-    character(len=*), parameter :: carriage_return = achar(13), eol = new_line("a")
+    character(len=*), parameter :: carriage_return = achar(13)
     integer :: i, n, first
 
     allocate (character(len=len(text) + 1) :: lines)
@@ -68,5 +94,89 @@ contains
     end do
     lines = lines(:n)//eol
   end function unix_lines
+
+  !> All tokens of a text, and several of kind `ending` to look ahead at.
+  pure subroutine cut(text, tokens)
+    character(len=*), intent(in) :: text         !! every line ends in a line feed
+    type(token_t), allocatable, intent(out) :: tokens(:)
+    character(len=1) :: c
+    integer :: at, line, last, n
+
+    allocate (tokens(len(text) + 5))
+    n = 0
+    line = 1
+    at = 1
+    do while (at <= len(text))
+      c = text(at:at)
+      last = at
+      if (c == eol) then
+        line = line + 1
+      else if (c == "!") then
+        last = at + index(text(at:), eol) - 2
+      else if (scan(c, blanks) == 0) then
+        n = n + 1
+        tokens(n) = token_t(c, at, at, line, 1)
+        if (scan(c, quotes) > 0) then
+          call end_quote(tokens(n))
+        else if (scan(c, word_characters) > 0) then
+          tokens(n)%kind = word
+          tokens(n)%last = at + verify(text(at:), word_characters) - 2
+        else if (scan(c, marks) == 0) then
+          tokens(n)%kind = junk
+          tokens(n)%last = at + scan(text(at:), word_characters//blanks//eol//quotes//marks//"!") - 2
+        end if
+        last = tokens(n)%last
+      end if
+      at = last + 1
+    end do
+    tokens(n + 1:n + 5) = token_t(ending, at, at, line, 1)
+    tokens = tokens(:n + 5)
+
+  contains
+
+    !> Text in quotes ends in its line; a doubled quote stands for itself.
+    pure subroutine end_quote(token)
+      type(token_t), intent(inout) :: token
+
+      do
+        token%last = token%last + scan(text(token%last + 1:), token%kind//eol)
+        if (text(token%last:token%last) == eol) then
+          token%kind = unclosed
+          token%last = token%last - 1
+          return
+        end if
+        if (text(token%last + 1:token%last + 1) /= token%kind) return
+        token%last = token%last + 1
+      end do
+    end subroutine end_quote
+  end subroutine cut
+
+  !> The value that a token stands for: doubled quotes are single ones.
+  pure function content(text, token) result(value)
+    character(len=*), intent(in) :: text
+    type(token_t), intent(in) :: token
+    character(len=:), allocatable :: value
+    integer :: i, n
+
+    value = text(token%first:token%last)
+    if (scan(token%kind, quotes) == 0) return
+    n = 0
+    i = 2
+    do while (i < len(value))
+      n = n + 1
+      value(n:n) = value(i:i)
+      i = i + merge(2, 1, value(i:i) == token%kind)
+    end do
+    value = value(:n)
+  end function content
+
+  !> A name as shown in a message: cut and quoted if it is long.
+  pure function plain(name)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: plain
+
+    plain = name
+    if (len(name) > 30) plain = shown(name)
+  end function plain
 
 end module input_text

@@ -2,7 +2,7 @@
 module input_words
   use kinds, only: int64, real64
   use input_problems, only: most_problems, problem_list_t
-  use namelist_tokens, only: assignment_t, content, token_t
+  use input_text, only: assignment_t, content, token_t
   use input_groups, only: value_t, text_length
   use variables, only: allowed, largest, variable_t, smallest, table, words_of
   use texts, only: counted, digits, lower_case, nearest_word, shown, written

@@ -2,9 +2,8 @@
 module namelist_input
   use input_groups, only: group_t, value_t
   use input_problems, only: most_problems, problem_list_t
-  use input_text, only: unix_lines
   use input_words, only: store_values
-  use namelist_tokens, only: assignment_t, content, cut, ending, plain, token_t, unclosed, word
+  use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
   use texts, only: digits, joined, lower_case, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none

@@ -1,20 +1,23 @@
-!> What the program says of its variables: the reference file, and the answers to `--explain`.
+!> What the program says of its variables: the reference file, the answers to `--explain`, and JSON for other programs: the
+!> table of variables, and an input as the program has understood it.
 module variable_help
   use errors, only: error_t, exit_usage, fail
-  use variables, only: allowed, group_names, name_length, variable_t, table, wall_groups
-  use texts, only: lower_case, shown, suggestion
+  use input_groups, only: group_t, json_text
+  use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
+    wall_groups, words_of
+  use texts, only: growing_text_t, joined, lower_case, shown, suggestion, written
   implicit none
   private
-  public :: defaults_text, explain
+  public :: defaults_text, explain, groups_text, variables_text
 
   integer, parameter :: comment_column = 40                !! of the reference file
+  character(len=1), parameter :: eol = new_line("a")
 
 contains
 
   !> The reference input file: every variable with its default. It is a valid input itself.
   pure function defaults_text() result(text)
     character(len=:), allocatable :: text
-    character(len=1), parameter :: eol = new_line("a")
     integer :: g, k
 
     text = "! Every variable of Ricochet with its default; a file needs only what differs."//eol// &
@@ -52,7 +55,7 @@ contains
     line = line//trim(row%help)
     if (row%unit /= "") line = line//" ["//trim(row%unit)//"]"
     if (row%choices == "") return
-    line = line//new_line("a")//padded(margin(row%group))//" ! "//allowed(row)
+    line = line//eol//padded(margin(row%group))//" ! "//allowed(row)
   end function reference_line
 
   !> A text with blanks up to the comments, if it is not longer.
@@ -77,7 +80,7 @@ contains
     do k = 1, size(table)
       full(k) = trim(table(k)%group)//"."//table(k)%name
       if (all([character(len=len(full)) :: table(k)%name, table(k)%group, full(k)] /= wanted)) cycle
-      if (text /= "") text = text//new_line("a")
+      if (text /= "") text = text//eol
       text = text//explanation(table(k))
     end do
     if (text /= "") return
@@ -89,7 +92,7 @@ contains
   pure function explanation(row) result(text)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: text
-    character(len=*), parameter :: indent = new_line("a")//"    "
+    character(len=*), parameter :: indent = eol//"    "
 
     text = trim(row%group)//"."//trim(row%name)
     if (row%unit /= "") text = text//"  ["//trim(row%unit)//"]"
@@ -100,5 +103,117 @@ contains
       text = text//"example: "//trim(row%value)
     end if
   end function explanation
+
+  !> The table: an object for each group, and in it one for each variable.
+  pure function variables_text() result(text)
+    character(len=:), allocatable :: text, between
+    integer :: g, k
+
+    text = "{"
+    between = eol
+    do g = 1, size(group_names)
+      text = text//between//json_text(group_names(g))//": {"
+      between = eol
+      do k = 1, size(table)
+        if (table(k)%group /= group_names(g)) cycle
+        text = text//between//"  "//json_text(table(k)%name)//": {"//row_text(table(k))//"}"
+        between = ","//eol
+      end do
+      text = text//"}"
+    end do
+    text = text//eol//"}"
+  end function variables_text
+
+  !> A row of the table. Of a number `above` and `below` are excluded, `from` and `to` allowed.
+  pure function row_text(row) result(text)
+    type(variable_t), intent(in) :: row
+    character(len=:), allocatable :: text, value
+    character(len=len(row%goes_with)) :: words(size(words_of(row%goes_with)))
+    logical :: has_default, is_example, positive
+    integer :: i
+
+    value = trim(row%value)
+    do i = 1, len(value)
+      if (value(i:i) == "'") value(i:i) = """"
+    end do
+    if (row%kind == "logical") value = value(2:len(value) - 1)
+    if (row%size /= 1) value = "["//value//"]"
+    has_default = row%status == "default" .or. row%status == "fallback"
+    is_example = .not. has_default
+    words = words_of(row%goes_with)
+    associate (low => row%range%lower, high => row%range%upper)
+      positive = low > 0 .and. low <= smallest
+      text = """type"": "//json_text(row%kind)//member("size", .true., written(row%size))// &
+        member("default", has_default, value)//member("example", is_example, value)// &
+        member("needed", .true., truth(row%status == "example"))// &
+        member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
+        member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
+    end associate
+    text = text//member("choices", row%choices /= "", list(words_of(row%choices)))// &
+      member("unit", row%unit /= "", json_text(row%unit))//member("help", .true., json_text(row%help))// &
+      member("allowed", .true., json_text(allowed(row)))//", ""goes_with"": {"
+    if (size(words) > 0) text = text//json_text(words(1))//": "//list(words(2:))
+    text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
+      member("repeated", .true., truth(is_repeated(row%group)))// &
+      member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
+  end function row_text
+
+  !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
+  !> bytes of the file, counted from 0, without byte order mark and with line feeds as line ends; null: not in the file.
+  pure function groups_text(groups) result(text)
+    type(group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
+    character(len=:), allocatable :: between
+    logical :: waiting(size(groups))
+    integer :: g, k, n
+
+    between = ""
+    waiting = [(groups(g)%line > 0 .or. any(groups(g)%values%given), g=1, size(groups))]
+    do n = 1, count(waiting)
+      g = minloc(merge(groups%first, huge(g), groups%line > 0), dim=1, mask=waiting)
+      waiting(g) = .false.
+      call growing%add(trim(merge(",", " ", n > 1))//eol)
+      associate (group => groups(g), is_there => groups(g)%line > 0)
+        call growing%add("{""group"": "//json_text(group%name)//member("name", group%instance /= "", json_text(group%instance)) &
+          //member("from", is_there, written(group%first - 1))//member("to", is_there, written(group%last))//", ""values"": {")
+        between = ""
+        do k = 1, size(group%values)
+          if (.not. (group%values(k)%given .and. group%values(k)%is_set())) cycle
+          call growing%add(between//json_text(group%values(k)%name)//": "//group%values(k)%json())
+          between = ", "
+        end do
+        call growing%add("}}")
+      end associate
+    end do
+    text = "["//growing%text()//eol//"]"
+  end function groups_text
+
+  !> `, "name": value`, with null instead of a value that is not there.
+  pure function member(name, is_there, value) result(text)
+    character(len=*), intent(in) :: name, value
+    logical, intent(in) :: is_there
+    character(len=:), allocatable :: text
+
+    text = ", "//json_text(name)//": null"
+    if (is_there) text = text(:len(text) - 4)//value
+  end function member
+
+  !> A list of words.
+  pure function list(words) result(text)
+    character(len=*), intent(in) :: words(:)
+    character(len=:), allocatable :: text
+
+    text = "[]"
+    if (size(words) > 0) text = "["""//joined(words, """, """)//"""]"
+  end function list
+
+  !> A logical.
+  pure function truth(yes) result(word)
+    logical, intent(in) :: yes
+    character(len=:), allocatable :: word
+
+    word = trim(merge("true ", "false", yes))
+  end function truth
 
 end module variable_help
