@@ -1,5 +1,6 @@
 """Sections 5 and 6: how speeds are distributed, and how a gas and a mixture come to equilibrium."""
 
+from collections.abc import Callable
 from math import pi, sqrt
 
 import numpy as np
@@ -28,9 +29,21 @@ def reduced(run: Run, tau: float = 15) -> np.ndarray:
     return (v / sqrt(np.mean(v**2))).ravel()
 
 
-def distance(sample: np.ndarray, cdf) -> float:
-    """Kolmogorov-Smirnov distance times sqrt(n)."""
-    return hold_against(sample, cdf).ks * sqrt(len(sample))
+def obeyed(
+    name: str,
+    what: str,
+    members: tuple[Member, ...],
+    sample: Callable[[Run], tuple],
+    source: str = "D",
+) -> Case:
+    """Whether what a run has many of is distributed as it should be: `sample` gives both."""
+
+    def distance(run: Run) -> float:
+        values, law = sample(run)
+        return hold_against(values, law).ks * sqrt(len(values))
+
+    what = f"{what}: KS distance sqrt(n)"
+    return Case(name, what, members, middle(distance), LEAST, AT_MOST, source)
 
 
 def uniform(u: np.ndarray) -> np.ndarray:
@@ -54,38 +67,29 @@ FINITE = {  # N: frames 5 collisions per disk apart
 }
 
 
-def exact_distance(run: Run) -> float:
-    """Of the speeds from the law of N disks that share a fixed energy."""
-    return distance(reduced(run), finite_n_cdf(run.count))
+def large(run: Run) -> tuple:
+    return reduced(run), maxwell_cdf
 
 
-def component_distance(run: Run) -> float:
-    """Of m vx^2 / 2E from Beta(1/2, N - 1/2)."""
+def finite(run: Run) -> tuple:
+    """N disks share a fixed energy."""
+    return reduced(run), finite_n_cdf(run.count)
+
+
+def component(run: Run) -> tuple:
+    """The share m vx^2 / 2E has the law Beta(1/2, N - 1/2)."""
     share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.count)
-    return distance(share, stats.beta(0.5, run.count - 0.5).cdf)
+    return share, stats.beta(0.5, run.count - 0.5).cdf
 
 
 LAWS = [
-    Case(
-        "P5-01", "speeds against the Maxwell law: KS distance sqrt(n)",
-        LARGE, middle(lambda run: distance(reduced(run), maxwell_cdf)),
-        LEAST, AT_MOST, "EX, LAB",
-    ),
+    obeyed("P5-01", "speeds against the Maxwell law", LARGE, large, "EX, LAB"),
     *[
-        case
+        obeyed("P5-03", f"N = {count}: {what} against the exact law", members, sample)
         for count, members in FINITE.items()
-        for case in (
-            Case(
-                "P5-03", f"N = {count}: speeds against the exact law: KS distance sqrt(n)",
-                members, middle(exact_distance), LEAST, AT_MOST, "D",
-            ),
-            Case(
-                "P5-03", f"N = {count}: vx against the exact law: KS distance sqrt(n)",
-                members, middle(component_distance), LEAST, AT_MOST, "D",
-            ),
-        )
+        for what, sample in (("speeds", finite), ("vx", component))
     ],
-]  # fmt: skip
+]
 
 # --- collisions in equilibrium ---
 
@@ -99,11 +103,11 @@ def hits_on_record(periodic: bool) -> tuple[Member, ...]:
     )  # fmt: skip
 
 
-def wall_speeds(run: Run) -> np.ndarray:
+def wall_speeds(run: Run) -> tuple:
     """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
     log = run.events
     hit = log.j <= 0
-    return log.impulse[hit] / (2 * sqrt(2 * temperature(run)))
+    return log.impulse[hit] / (2 * sqrt(2 * temperature(run))), maxwell_cdf
 
 
 def wall_energies(run: Run) -> np.ndarray:
@@ -119,10 +123,10 @@ def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
     return estimate([part.mean() for part in np.array_split(values, 60)])
 
 
-def approach_speeds(run: Run) -> np.ndarray:
+def approach_speeds(run: Run) -> tuple:
     """g_n of pair collisions over sqrt(4 kT / m)."""
     log = run.events
-    return log.impulse[log.j > 0] / sqrt(4 * temperature(run))
+    return log.impulse[log.j > 0] / sqrt(4 * temperature(run)), maxwell_cdf
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
@@ -141,30 +145,16 @@ def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 WALLED, BULK = hits_on_record(False), hits_on_record(True)
 COLLISIONS = [
-    Case(
-        "P5-06", "speeds of hits on sides against the flux law: KS distance sqrt(n)",
-        WALLED, middle(lambda run: distance(wall_speeds(run), maxwell_cdf)),
-        LEAST, AT_MOST, "D",
-    ),
+    obeyed("P5-06", "speeds of hits on sides against the flux law", WALLED, wall_speeds),
     Case(
         "P5-06", "energy of a disk that hits a side, over kT",
         WALLED, lambda *runs: in_parts(wall_energies, runs),
         1.5 * 200 / 201, sigmas(3, 0.03), "D, for N = 100",
     ),
-    Case(
-        "P5-07", "approach speeds of pairs against their law: KS distance sqrt(n)",
-        BULK, middle(lambda run: distance(approach_speeds(run), maxwell_cdf)),
-        LEAST, AT_MOST, "D",
-    ),
-    Case(
-        "P5-07", "impact parameters are uniform: KS distance sqrt(n)",
-        BULK, middle(lambda run: distance(contacts(run)[1], uniform)),
-        LEAST, AT_MOST, "D",
-    ),
-    Case(
-        "P5-07", "directions of contact are uniform: KS distance sqrt(n)",
-        BULK, middle(lambda run: distance(contacts(run)[0], uniform)),
-        LEAST, AT_MOST, "D",
+    obeyed("P5-07", "approach speeds of pairs against their law", BULK, approach_speeds),
+    obeyed("P5-07", "impact parameters are uniform", BULK, lambda run: (contacts(run)[1], uniform)),
+    obeyed(
+        "P5-07", "directions of contact are uniform", BULK, lambda run: (contacts(run)[0], uniform)
     ),
 ]  # fmt: skip
 
