@@ -131,7 +131,7 @@ contains
       integer(int64) :: events
 
       events = min(limits%events, sim%tally%events + min(limits%collisions - sim%tally%collisions, events_to_look))
-      if (limits%dissipated < huge(limits%dissipated) .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
+      if (limits%watches() .or. present(log) .or. self%search%everyone) events = sim%tally%events + 1
     end function next_pause
 
     !> Prefetches what the next events will read, and pauses soon to do so again.

@@ -14,11 +14,13 @@ module evolution
     real(real64) :: time = never                         !! since the start of the run; for an evolution, since the epoch
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
-    real(real64) :: dissipated = huge(0.0_real64)        !! energy: it never decreases, and any collision may reach the limit
+    real(real64) :: dissipated = huge(0.0_real64)        !! energy
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
     real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
   contains
     procedure :: reached
+    procedure :: outgrown
+    procedure :: watches
   end type limits_t
 
   type, abstract :: evolution_t
@@ -61,8 +63,26 @@ contains
     type(tally_t), intent(in) :: tally
     logical :: yes
 
-    yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. tally%total(dissipated) >= self%dissipated
+    yes = tally%events >= self%events .or. tally%collisions >= self%collisions .or. self%outgrown(tally)
   end function reached
+
+  !> Whether a limit of what any collision may bring there is met. It must never decrease: a run that is past the limit has met
+  !> it on the way, and goes back to find out in which collision.
+  pure function outgrown(self, tally) result(yes)
+    class(limits_t), intent(in) :: self
+    type(tally_t), intent(in) :: tally
+    logical :: yes
+
+    yes = tally%total(dissipated) >= self%dissipated
+  end function outgrown
+
+  !> Whether there is such a limit.
+  pure function watches(self) result(yes)
+    class(limits_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%dissipated < huge(self%dissipated)
+  end function watches
 
   !> What is legal but rarely meant in a simulation with this dynamics; empty if nothing.
   pure function warning(self, sim) result(text)

@@ -127,7 +127,7 @@ contains
     limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n)]
     n = 0
     if (.not. any(given)) n = 2
-    if (count(given) /= 1 .or. any(given .neqv. limited) .or. limits%dissipated < huge(limits%dissipated)) return
+    if (count(given) /= 1 .or. any(given .neqv. limited) .or. limits%watches()) return
     if (given(by_time)) n = multiples_within(limits%time, self%every(by_time))
     if (given(by_collisions)) n = numbers_within(limits%collisions, self%every(by_collisions))
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))

@@ -150,7 +150,7 @@ contains
         if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
       end if
       call conclude(good)
-      if (good .and. (self%parts%dissipated_now(sim) >= limits%dissipated .or. t - sim%last_advance < sim%blink)) then
+      if (good .and. (limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
         ! the plain engine finds the very event, or a collapse
         outcome = left_alone
         self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()

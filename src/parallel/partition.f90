@@ -12,7 +12,7 @@ module partition
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use system, only: seconds
-  use tally, only: dissipated, tally_t
+  use tally, only: tally_t
   use team, only: barrier_t, close_barrier, is_last_at, join, many, open_barrier, release
   implicit none
   private
@@ -54,7 +54,7 @@ module partition
     procedure :: fill
     procedure :: run_windows
     procedure :: learn
-    procedure :: dissipated_now
+    procedure :: tally_now
     procedure :: write_back_all
   end type partition_t
 
@@ -111,12 +111,10 @@ contains
     self%turns_per_event = max(turns/real(events, real64), 1.0_real64)
   end subroutine learn
 
-  !> The energy that collisions have dissipated, those in the domains since they were filled included. It must never decrease:
-  !> a run that is past its limit goes back to find out in which collision it met it.
-  pure function dissipated_now(self, sim) result(energy)
+  !> What collisions have gathered, those in the domains since they were filled included.
+  pure function tally_now(self, sim) result(so_far)
     class(partition_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
-    real(real64) :: energy
     type(tally_t) :: so_far
     integer(int32) :: k
 
@@ -124,8 +122,7 @@ contains
     do k = 1, self%cuts%n
       call so_far%include(self%domain(k)%sim%tally)
     end do
-    energy = so_far%total(dissipated)
-  end function dissipated_now
+  end function tally_now
 
   !> Runs windows in all domains, one after the other, for as long as they hold, until a limit is reached or the caller has
   !> waited long enough. A window ends early at the limit of a count. `good`: all of them hold.
