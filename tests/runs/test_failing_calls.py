@@ -176,7 +176,7 @@ def go_on(program, stage, folder, option):
 
 
 @pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [300, pytest.param(1, marks=pytest.mark.check)])
 def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step):
     cases = [
         (option, f"inject={call}:error={error}:when={number}{again}")
@@ -211,7 +211,7 @@ def check_after_kill(program, stage, folder, option, call, inject):
 
 
 @pytest.mark.parametrize("call", ["pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat"])
-@pytest.mark.parametrize("step", [100, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
 def test_a_kill_at_any_call_costs_nothing(program, stage, call, step):
     cases = [
         (option, f"inject={call}:signal=SIGKILL:when={number}")
@@ -251,7 +251,7 @@ def contents_of(folder) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("step", [300, pytest.param(1, marks=pytest.mark.check)])
 def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stage, call, step):
     cases = [
         (option, f"inject={call}:signal=SIGTERM:when={number}")
