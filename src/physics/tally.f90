@@ -5,7 +5,7 @@ module tally
   use kinds, only: int64, real64
   implicit none
   private
-  public :: sums, tally_t
+  public :: tally_t
 
   !> What one term of a sum may amount to, and so how fine it must be: see `simulation_state: choose_units`.
   integer, parameter, public :: energies = 1, impulses = 2, moments = 3
