@@ -1,6 +1,5 @@
 """A real browser for tests of pages: headless Chromium, by the protocol of its driver."""
 
-import base64
 import contextlib
 import json
 import re
@@ -130,10 +129,6 @@ class Browser:
         actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
         body = {"actions": [{"type": "key", "id": "keys", "actions": actions}]}
         self.call("POST", "/actions", body)
-
-    def picture(self) -> bytes:
-        """The page as PNG."""
-        return base64.b64decode(self.call("GET", "/screenshot"))
 
     def close(self) -> None:
         self.call("DELETE", "")

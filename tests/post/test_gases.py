@@ -393,17 +393,6 @@ def test_squares_allow_for_the_mean_growth_that_is_taken_away():
     assert tp.squares(moment, 20).mean() == pytest.approx(20, rel=0.05)
 
 
-def test_a_dilute_gas_has_the_coefficients_of_enskog(gas):
-    dilute = {"packing": 0.02, "length": 2000, "cadence": "frames_every_time = 1"}
-    found = tp.coefficients([gas(f"gas{seed}", seed=seed, **dilute) for seed in (1, 2, 3)], None)
-    assert set(found) == set(tp.enskog(0.02))
-    for name, one in found.items():
-        ratio = statistics.combined(one.members)
-        assert ratio.error < 0.2, name
-        assert ratio.mean == pytest.approx(1, abs=4 * ratio.error), name
-    assert found["bulk_viscosity"].curve.y[0] == pytest.approx(1, abs=0.05)
-
-
 def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, capsys):
     runs = [gas(f"gas{k}", packing=packing).path for k, packing in enumerate((0.1, 0.3))]
     rows = drawn(tmp_path, "transport", *runs)
@@ -482,18 +471,3 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     early = simulated(ROOT / "input/fourier.nml", "stop.time=20", name="early").path
     assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
     assert "warning: no gas has these fluxes" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (["--cells", "1"], "there are 2 to 100000 cells"),
-        (["--grid", "2000000,2000000"], "there are 2 to 100000 cells"),
-        (["--cells", "4", "--grid", "3,3"], "not allowed with"),
-        (["--skip", "nan"], "is not a number from 0 on"),
-        (["--skip", "-1"], "is not a number from 0 on"),
-    ],
-)
-def test_options_without_a_meaning_are_refused(words, reason, capsys):
-    assert run_script("fields", *words, "a.h5") == 2
-    assert reason in capsys.readouterr().err

@@ -39,18 +39,6 @@ def filmed(run, frames, traced=()):
     return player.film(run, frames, "speed", list(traced))
 
 
-def test_positions_keep_sixteen_bits_and_colours_span_their_scale(tmp_path, rng):
-    run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, lower=(-1.0, 0.0), edges=(3.0, 2.0)))
-    facts, blocks = filmed(run, [0, 7])
-    assert not facts["exact"]
-    codes = np.frombuffer(blocks["positions"], "<u2").reshape(2, run.count, 2)
-    back = np.array(facts["lower"]) + codes[1] / 65535 * np.array(facts["edges"])
-    np.testing.assert_allclose(back, run.position[7], atol=3.0 / 65535)
-    top = facts["scales"]["speed"][1]
-    colours = np.frombuffer(blocks["speed"], "u1").reshape(2, run.count)[1]
-    np.testing.assert_allclose(colours, 255 * np.minimum(1, run.speed(7) / top), atol=0.6)
-
-
 def test_speeds_energies_and_pressure_are_those_of_the_run(tmp_path, rng):
     pressure = np.linspace(1, 2, 1000)
     for count in (1000, 2):
@@ -95,14 +83,6 @@ def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
     assert len(frames) < run.frames
     page = player.page(run, player.texts(*filmed(run, frames)))
     assert len(page) - len(player.page(run, None)) < 1.05 * room
-
-
-def test_open_shows_the_film_in_the_browser(tmp_path, rng, monkeypatch):
-    visited = []
-    monkeypatch.setattr(player.webbrowser, "open", visited.append)
-    path = bouncing_gas(tmp_path / "gas.h5", rng)
-    assert run_script("player", path, "--open", "-o", tmp_path / "a film.html") == 0
-    assert visited == [(tmp_path / "a film.html").as_uri()]
 
 
 # --- texts of others ---

@@ -407,6 +407,9 @@ def test_results_are_written_into_files_of_ones_own(
         ("animate run.h5 --count -3", "'-3' is not a whole number above 0"),
         ("trajectory run.h5 --disks one", "'one' is not a list"),
         ("trajectory run.h5 --disks 0", "no disk 0"),
+        ("fields run.h5 --cells 1", "there are 2 to 100000 cells"),
+        ("fields run.h5 --cells 4 --grid 3,3", "not allowed with"),
+        ("fields run.h5 --skip nan", "is not a number from 0 on"),
         ("export run.h5 --count 0.5", "'0.5' is not a whole number above 0"),
     ],
 )

@@ -651,7 +651,3 @@ def test_other_formats_are_written_too(tmp_path, rng):
     for ending, begin in {"pdf": b"%PDF", "svg": b"<?xml"}.items():
         draw("snapshot", path, "-o", tmp_path / f"a.{ending}")
         assert (tmp_path / f"a.{ending}").read_bytes().startswith(begin)
-    draw("animate", path, "-o", tmp_path / "film.gif", "--fps", 10)
-    assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF")
-    draw("export", path, "-o", tmp_path / "gas.xyz", "--frames", "::2")
-    assert (tmp_path / "gas.xyz").read_text().count("Lattice") == 2

@@ -8,7 +8,6 @@ from ricochet import hard_disks as hd
 from ricochet.drawing import values_of
 from ricochet.structure import largest_cluster
 from synthetic_run import run_script, written
-from test_statistics import remembering
 
 PERIODIC = (True, True)
 
@@ -105,24 +104,6 @@ def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
     run = written(tmp_path / "run.h5", flight - image, v, image=image, time=time, periodic=PERIODIC)
     at = np.array([1, 5, 20])
     np.testing.assert_allclose(transport.displacement(run, slice(51), at), (0.1 * at) ** 2)
-
-
-def test_the_diffusion_coefficient_is_that_of_a_langevin_walk(tmp_path, rng):
-    """Velocities that forget in the time 1: between t/2 and t the mean of D(t) = 1 - exp(-t)."""
-    step, size, frames = 0.1, 100, 4000
-    v = np.array([remembering(rng, frames, 1 / step) for _ in range(2 * size)])
-    v = (v - v.reshape(size, 2, -1).mean(axis=0).repeat(size, 0).reshape(v.shape)).T
-    v = v.reshape(frames, size, 2)
-    x = step * (np.cumsum(v, axis=0) - v / 2)
-    image = np.floor(x).astype(int)
-    sides = {"image": image, "time": step * np.arange(frames), "periodic": PERIODIC}
-    run = written(tmp_path / "run.h5", x - image, v, **sides)
-    spread, memory = transport.diffusion(run, slice(frames), 60)
-    expected = 1 - (np.exp(-3) - np.exp(-6)) / 3
-    for found in (spread, memory):
-        assert found.mean == pytest.approx(expected, abs=4 * found.error)
-        assert 0.003 < found.error < 0.05
-    assert spread.mean == pytest.approx(memory.mean, abs=2 * spread.error)
 
 
 def flights(rng, count, time):
