@@ -61,6 +61,8 @@ contains
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     integer :: k, side, line_of(n_sides)
+    integer :: axis
+    real(real64) :: width                                 ! of the box [length]
 
     box%surface%law = otherwise
     if (otherwise%rule /= normal_rule) box%surface%law%grip = grip_t()
@@ -79,7 +81,11 @@ contains
         line_of(side) = sides(k)%line
         call take_law(sides(k), box%surface(side)%law)
         call take_motion(sides(k), box%surface(side)%motion)
-        if (box%surface(side)%motion%travels()) call check_room(sides(k), (side + 1)/2)
+        if (.not. box%surface(side)%motion%travels()) cycle
+        axis = (side + 1)/2                               ! sides must not meet, whenever each is how far inwards
+        width = box%upper(axis) - box%lower(axis)
+        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call sides(k)%complain( &
+          "amplitude", "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
@@ -125,17 +131,6 @@ contains
       if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
         written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
     end subroutine take_motion
-
-    !> Sides must not meet, whenever each is how far inwards.
-    subroutine check_room(group, axis)
-      type(group_t), intent(in) :: group
-      integer, intent(in) :: axis
-      real(real64) :: width
-
-      width = box%upper(axis) - box%lower(axis)
-      if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call group%complain("amplitude", &
-        "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
-    end subroutine check_room
   end subroutine take_wall_laws
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.

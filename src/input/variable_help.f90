@@ -145,7 +145,7 @@ contains
       positive = low > 0 .and. low <= smallest
       text = """type"": "//json_text(row%kind)//member("size", .true., written(row%size))// &
         member("default", has_default, value)//member("example", is_example, value)// &
-        member("needed", .true., truth(row%status == "example"))// &
+        member("needed", .true., trim(merge("true ", "false", row%status == "example")))// &
         member("above", positive, "0")//member("from", low > -largest .and. .not. positive, written(low))// &
         member("below", high < 1, "1")//member("to", high >= 1 .and. high < largest, written(high))
     end associate
@@ -154,8 +154,8 @@ contains
       member("allowed", .true., json_text(allowed(row)))//", ""goes_with"": {"
     if (size(words) > 0) text = text//json_text(words(1))//": "//list(words(2:))
     text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
-      member("repeated", .true., truth(is_repeated(row%group)))// &
-      member("resumable", .true., truth(free_to_change(trim(row%group)//"."//row%name)))
+      member("repeated", .true., trim(merge("true ", "false", is_repeated(row%group))))// &
+      member("resumable", .true., trim(merge("true ", "false", free_to_change(trim(row%group)//"."//row%name))))
   end function row_text
 
   !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the
@@ -207,13 +207,5 @@ contains
     text = "[]"
     if (size(words) > 0) text = "["""//joined(words, """, """)//"""]"
   end function list
-
-  !> A logical.
-  pure function truth(yes) result(word)
-    logical, intent(in) :: yes
-    character(len=:), allocatable :: word
-
-    word = trim(merge("true ", "false", yes))
-  end function truth
 
 end module variable_help

@@ -74,14 +74,10 @@ contains
   subroutine describe_system(settings, sim)
     type(settings_t), intent(in) :: settings
     type(simulation_t), intent(inout) :: sim
-    integer :: s
 
     sim%system_t = settings%system_t
     sim%seed = settings%run%seed
-    allocate (sim%species(size(settings%species)))
-    do s = 1, size(sim%species)
-      sim%species(s) = settings%species(s)%species_t
-    end do
+    sim%species = settings%species%species_t
   end subroutine describe_system
 
 end module initial_state
