@@ -15,8 +15,6 @@ module circles
     procedure :: normal
     procedure :: reaches
     procedure :: covers
-    procedure :: extent
-    procedure :: area
     procedure :: misfit
     procedure, private :: distance_at_contact
   end type circle_t
@@ -33,6 +31,8 @@ contains
     circle%middle = centre
     circle%radius = radius
     circle%encloses = encloses
+    circle%extent = radius
+    circle%area = pi*radius**2
   end function new_circle
 
   !> Between the two centres.
@@ -101,22 +101,6 @@ contains
       yes = corner(1)**2 + corner(2)**2 < rho**2
     end if
   end function covers
-
-  !> Half the sides of the square around the circle.
-  pure function extent(self) result(half)
-    class(circle_t), intent(in) :: self
-    real(real64) :: half(2)
-
-    half = self%radius
-  end function extent
-
-  !> Area of the circle.
-  pure function area(self)
-    class(circle_t), intent(in) :: self
-    real(real64) :: area
-
-    area = pi*self%radius**2
-  end function area
 
   !> A circle must meet the box and fit between periodic sides.
   pure function misfit(self, lower, upper, periodic) result(problem)

@@ -24,8 +24,6 @@ module segments
     procedure :: normal
     procedure :: reaches
     procedure :: covers
-    procedure :: extent
-    procedure :: area
     procedure :: misfit
     procedure, private :: from_outline
   end type segment_t
@@ -39,6 +37,7 @@ contains
 
     segment%middle = 0.5_real64*(from + to)
     segment%half = 0.5_real64*(to - from)
+    segment%extent = abs(segment%half)
     segment%length = sqrt(dot_product(segment%half, segment%half))
     if (segment%length > 0) segment%along = segment%half/segment%length
   end function new_segment
@@ -172,22 +171,6 @@ contains
 
     yes = all([((self%gap(d + [i, j]*half, radius) < 0, i=-1, 1, 2), j=-1, 1, 2)])
   end function covers
-
-  !> Half the sides of the rectangle around the wall.
-  pure function extent(self) result(half)
-    class(segment_t), intent(in) :: self
-    real(real64) :: half(2)
-
-    half = abs(self%half)
-  end function extent
-
-  !> A wall has no thickness.
-  pure function area(self)
-    class(segment_t), intent(in) :: self
-    real(real64) :: area
-
-    area = 0
-  end function area
 
   !> A wall has some length, and both ends lie in the box.
   pure function misfit(self, lower, upper, periodic) result(problem)

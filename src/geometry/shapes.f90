@@ -14,6 +14,8 @@ module shapes
   type, abstract :: shape_t
     real(real64) :: middle(2) = 0.0_real64      !! [length]
     logical :: encloses = .false.               !! keeps the disks inside, not outside
+    real(real64) :: extent(2) = 0.0_real64      !! half the sides of the smallest rectangle around it [length]
+    real(real64) :: area = 0.0_real64           !! that it takes from the box or, if it encloses the disks, leaves [length**2]
   contains
     procedure :: from_nearest
     procedure :: direction
@@ -22,8 +24,6 @@ module shapes
     procedure(normal), deferred :: normal
     procedure(reaches), deferred :: reaches
     procedure(covers), deferred :: covers
-    procedure(extent), deferred :: extent
-    procedure(area), deferred :: area
     procedure(misfit), deferred :: misfit
   end type shape_t
 
@@ -72,20 +72,6 @@ module shapes
       real(real64), intent(in) :: d(2), half(2), radius
       logical :: yes
     end function covers
-
-    !> Half the sides of the smallest rectangle around the outline.
-    pure function extent(self) result(half)
-      import :: real64, shape_t
-      class(shape_t), intent(in) :: self
-      real(real64) :: half(2)                   !! [length]
-    end function extent
-
-    !> Area that it takes away from the box or, if it encloses the disks, that it leaves.
-    pure function area(self)
-      import :: real64, shape_t
-      class(shape_t), intent(in) :: self
-      real(real64) :: area                      !! [length**2]
-    end function area
 
     !> What is wrong with it in a box, as `variable: what`; empty if nothing is.
     pure function misfit(self, lower, upper, periodic) result(problem)

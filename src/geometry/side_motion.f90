@@ -32,12 +32,7 @@ module side_motion
     procedure :: place
     procedure :: velocity
     procedure :: contact_time
-    procedure, private :: acceleration
-    procedure, private :: displacement
-    procedure, private :: is_soon
-    procedure, private :: lead
-    procedure, private :: velocity_change
-    procedure, private :: piece
+    procedure, private :: acceleration, displacement, is_soon, lead, velocity_change, piece
   end type side_motion_t
 
 contains

@@ -322,10 +322,10 @@ contains
 
     area = product(box%edges())
     do k = n_sides + 1, size(box%surface)
-      if (box%surface(k)%shape%encloses) area = min(area, box%surface(k)%shape%area())
+      if (box%surface(k)%shape%encloses) area = min(area, box%surface(k)%shape%area)
     end do
     do k = n_sides + 1, size(box%surface)
-      if (.not. box%surface(k)%shape%encloses) area = area - box%surface(k)%shape%area()
+      if (.not. box%surface(k)%shape%encloses) area = area - box%surface(k)%shape%area
     end do
   end function free_area
 

@@ -139,7 +139,7 @@ contains
     integer(int32) :: low(2), high(2), cell(2), ix, iy, n
 
     middle = shape%middle - patch%lower
-    room = (0.5_real64*(faces%width + faces%overlap) + shape%extent() + patch%small + margin)*(1 + spare)
+    room = (0.5_real64*(faces%width + faces%overlap) + shape%extent + patch%small + margin)*(1 + spare)
     low = ceiling((middle - room)/faces%width + 0.5_real64)
     high = floor((middle + room)/faces%width + 0.5_real64)
     if (shape%encloses) low = 1

@@ -125,7 +125,7 @@ contains
     if (.not. s%radius_in_file) call check_fraction()
     do k = n_sides + 1, size(box%surface)
       associate (shape => box%surface(k)%shape)
-        if (shape%encloses .and. any(shape%extent() <= s%radius)) call group%complain("radius", "a disk of radius "// &
+        if (shape%encloses .and. any(shape%extent <= s%radius)) call group%complain("radius", "a disk of radius "// &
           written(s%radius)//" does not fit in obstacle """//box%surface(k)%name//'"', problems)
       end associate
     end do
