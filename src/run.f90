@@ -1,6 +1,7 @@
 !> One run, from the input file to the finished output.
 module run
   use, intrinsic :: iso_fortran_env, only: error_unit
+  use cadence, only: progress_t
   use checkpoint, only: read_checkpoint, recall_overrides
   use command_line, only: command_t
   use errors, only: error_t, exit_broken, exit_files, exit_finished, exit_stopped, fail
@@ -11,7 +12,6 @@ module run
   use observables, only: total_energy
   use output, only: output_t, planned_bytes
   use partners, only: n_sides
-  use progress, only: progress_t
   use progress_line, only: progress_line_t
   use run_files, only: is_file, source_of, unfinished
   use run_setup, only: choose_evolution, new_simulation, read_input

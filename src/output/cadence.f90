@@ -1,13 +1,14 @@
 !> When samples are due: at multiples of a time, of a number of collisions or of a number of events, and at the start and
-!> the end of a run.
+!> the end of a run. And how far the output has come.
 module cadence
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
+  use settings, only: settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: whole_collisions
   implicit none
   private
-  public :: cadence_t, by_time, by_collisions, by_events
+  public :: cadence_t, by_time, by_collisions, by_events, progress_t, frames, values
 
   !> What is counted.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
@@ -27,10 +28,39 @@ module cadence
     procedure :: planned
   end type cadence_t
 
+  !> With the state, all that is needed to go on.
+  type :: progress_t
+    type(cadence_t) :: cadence(2)                 !! of frames and of values of the observables
+    integer(int64) :: events = 0                  !! collisions written to the event log
+  end type progress_t
+  integer, parameter :: frames = 1, values = 2
+
+  interface progress_t
+    module procedure new_progress
+  end interface progress_t
+
 contains
 
+  !> The progress of a run that has written nothing yet.
+  pure function new_progress(settings) result(progress)
+    type(settings_t), intent(in) :: settings
+    type(progress_t) :: progress
+
+    progress%cadence(frames)%every = intervals(settings%output%frames_every)
+    progress%cadence(values)%every = intervals(settings%output%observables_every)
+  contains
+
+    !> Of time, of collisions in all or per disk, and of events.
+    pure function intervals(every)
+      real(real64), intent(in) :: every(:)        !! see `settings: sampled_by`
+      real(real64) :: intervals(3)
+
+      intervals = [every(1), min(every(2), 0.5_real64*settings%n_disks()*every(4)), every(3)]
+    end function intervals
+  end function new_progress
+
   !> Whether a sample is due now.
-  pure function is_due(self, sim) result(yes)
+  elemental function is_due(self, sim) result(yes)
     class(cadence_t), intent(in) :: self
     type(simulation_t), intent(in) :: sim
     logical :: yes
@@ -61,7 +91,7 @@ contains
 
   !> Finds when the next samples are due: at the first multiples ahead. This follows from the state alone, whenever
   !> the last sample was taken; but for one that is due now, when something may still happen.
-  pure subroutine look_ahead(self, sim)
+  elemental subroutine look_ahead(self, sim)
     class(cadence_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
     logical :: over                               ! the present moment, for samples
@@ -117,7 +147,7 @@ contains
 
   !> Number of samples of a run if it can be known in advance: there is at most one interval, and one rule of the same
   !> kind ends the run. Otherwise 0.
-  pure function planned(self, limits) result(n)
+  elemental function planned(self, limits) result(n)
     class(cadence_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
     integer(int64) :: n

@@ -8,7 +8,7 @@ module checkpoint
   use, intrinsic :: iso_fortran_env, only: int8
   use kinds, only: int32, int64, real64
   use build_info, only: build_flags
-  use cadence, only: cadence_t
+  use cadence, only: progress_t
   use checksums, only: checksum
   use disks, only: mass_column, n_columns
   use errors, only: error_t, exit_files, exit_usage, fail
@@ -17,7 +17,6 @@ module checkpoint
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
   use input_groups, only: group_t, most_written
-  use progress, only: progress_t
   use record, only: counting, reading, record_t, writing
   use run_files, only: is_file, source_of, unfinished
   use settings, only: run_input_t
@@ -34,7 +33,7 @@ module checkpoint
   integer, parameter :: layout = 6                !! of the checkpoints; another one is not understood
   character(len=*), parameter :: eol = new_line("a"), slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
-  integer, parameter :: none = 0, only_first = 3
+  integer, parameter :: none = 0
 
   !> A second name of the first. HDF5 writes over the name that was made last when it is taken away, one call before it
   !> strikes it off the list: a kill between would leave a file that h5dump cannot list.
@@ -178,7 +177,6 @@ contains
 
     call put_checkpoint(file, sim, progress)
     if (checkpoint_number(file) /= 1) call put_checkpoint(file, sim, progress)
-    call file%put(current, scalar, [int(only_first, int64)])
     call file%remove_last(slots(2), before=slots(1))
   end subroutine put_last_checkpoint
 
@@ -200,12 +198,12 @@ contains
     number = int(there(1))
   end function checkpoint_number
 
-  !> Whether a file has room for a checkpoint beside that which counts.
+  !> Whether a file has room for a second checkpoint.
   function has_both_checkpoints(file) result(yes)
     type(hdf5_file_t), intent(inout) :: file
     logical :: yes
 
-    yes = any(checkpoint_number(file) == [1, 2])
+    yes = file%length(slots(2)) > 0
   end function has_both_checkpoints
 
   !> Whether the run of an unfinished output broke off.
@@ -280,8 +278,7 @@ contains
     if (allocated(error)) return
     if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
     call sim%choose_units()
-    call progress%frames%look_ahead(sim)
-    call progress%observables%look_ahead(sim)
+    call progress%cadence%look_ahead(sim)
   end subroutine read_checkpoint
 
   !> Reads the checkpoint that counts; if it is damaged the other one.
@@ -298,7 +295,7 @@ contains
     number = checkpoint_number(record%file)
     call sim%make_room(sum(sim%species%count))
     blank = sim
-    do trial = 1, merge(1, 2, number == only_first)
+    do trial = 1, 2
       sim = blank
       record%name = slots(merge(2, 1, number == 2 .eqv. trial == 1))
       call record%begin(counting)
@@ -348,19 +345,8 @@ contains
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(inout) :: progress
-
-    call exchange_state(record, sim)
-    call exchange_cadence(record, progress%frames)
-    call exchange_cadence(record, progress%observables)
-    call record%exchange(progress%events)
-    call record%seal()
-  end subroutine exchange_all
-
-  !> Writes or reads what changes in a simulation.
-  subroutine exchange_state(record, sim)
-    type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout) :: sim
     integer(int64) :: settled
+    integer :: k
 
     call record%exchange(sim%epoch)
     call record%exchange(sim%now)
@@ -375,94 +361,84 @@ contains
     call record%exchange(sim%events_then)
     call record%exchange(sim%start_energy)
     call record%exchange(sim%kicks)
-    call exchange_tally(record, sim)
-    call exchange_disks(record, sim)
-  end subroutine exchange_state
-
-  !> Writes or reads the disks.
-  subroutine exchange_disks(record, sim)
-    type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout) :: sim
-    real(real64), allocatable :: mass(:)
-    integer :: k
-
-    associate (disk => sim%disk, tag => sim%tag)
-      call record%exchange(disk%x(1))
-      call record%exchange(disk%x(2))
-      call record%exchange(disk%v(1))
-      call record%exchange(disk%v(2))
-      call record%exchange(disk%clock)
-      call exchange_short(record, tag%species)
-      call exchange_short(record, tag%id)
-      call record%exchange(tag%collisions)
-      call exchange_short(record, tag%met)
-      if (sim%with%own_sizes) call record%exchange(disk%radius)      ! else sizes follow from the input
-    end associate
-    do k = 1, n_columns
-      if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(sim%extra(sim%row(k), :))
+    call exchange_tally()
+    call exchange_disks()
+    do k = 1, size(progress%cadence)
+      associate (cadence => progress%cadence(k))      ! its steps are part of the input; when it is due follows from them
+        call record%exchange(cadence%count)
+        call record%exchange(cadence%last_events)
+        call record%exchange(cadence%last_time)
+      end associate
     end do
-    if (.not. sim%with%own_sizes) return
-    mass = sim%masses()                         ! there is no column of them if they turn out to be equal
-    call record%exchange(mass)
-    if (record%way /= reading) return
-    sim%extra(sim%row(mass_column), :) = mass
-    call sim%settle_masses()
-  end subroutine exchange_disks
+    call record%exchange(progress%events)
+    call record%seal()
+  contains
 
-  !> Writes or reads integers of half a word.
-  subroutine exchange_short(record, values)
-    type(record_t), intent(inout) :: record
-    integer(int32), intent(inout) :: values(:)
-    integer(int64) :: words(size(values))
+    !> What collisions have gathered.
+    subroutine exchange_tally()
+      call sim%tally%make_room(size(sim%box%surface))
+      associate (tally => sim%tally)
+        call record%exchange(tally%events)
+        call record%exchange(tally%collisions)
+        call exchange_sums(tally%sum)
+        call record%exchange(tally%hits)
+        do k = 1, size(tally%at_surface, 1)
+          call exchange_sums(tally%at_surface(k, :))
+        end do
+      end associate
+    end subroutine exchange_tally
 
-    words = values
-    call record%exchange(words)
-    values = int(words, int32)
-  end subroutine exchange_short
+    !> Whole numbers of units, which may grow to twice as many bits as an integer has.
+    subroutine exchange_sums(sums)
+      type(exact_sum_t), intent(inout) :: sums(:)
+      integer(int64) :: halves(2*size(sums))
+      integer :: i
 
-  !> Writes or reads what collisions have gathered.
-  subroutine exchange_tally(record, sim)
-    type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout) :: sim
-    integer :: k
-
-    call sim%tally%make_room(size(sim%box%surface))
-    associate (tally => sim%tally)
-      call record%exchange(tally%events)
-      call record%exchange(tally%collisions)
-      call exchange_sums(record, tally%sum)
-      call record%exchange(tally%hits)
-      do k = 1, size(tally%at_surface, 1)
-        call exchange_sums(record, tally%at_surface(k, :))
+      do i = 1, size(sums)
+        halves(2*i - 1:2*i) = transfer(sums(i)%units, halves)
       end do
-    end associate
-  end subroutine exchange_tally
+      call record%exchange(halves)
+      do i = 1, size(sums)
+        sums(i)%units = transfer(halves(2*i - 1:2*i), sums(i)%units)
+      end do
+    end subroutine exchange_sums
 
-  !> Writes or reads sums: whole numbers of units, which may grow to twice as many bits as an integer has.
-  subroutine exchange_sums(record, sums)
-    type(record_t), intent(inout) :: record
-    type(exact_sum_t), intent(inout) :: sums(:)
-    integer(int64) :: halves(2*size(sums))
-    integer :: k
+    !> The disks.
+    subroutine exchange_disks()
+      real(real64), allocatable :: mass(:)
 
-    do k = 1, size(sums)
-      halves(2*k - 1:2*k) = transfer(sums(k)%units, halves)
-    end do
-    call record%exchange(halves)
-    do k = 1, size(sums)
-      sums(k)%units = transfer(halves(2*k - 1:2*k), sums(k)%units)
-    end do
-  end subroutine exchange_sums
+      associate (disk => sim%disk, tag => sim%tag)
+        call record%exchange(disk%x(1))
+        call record%exchange(disk%x(2))
+        call record%exchange(disk%v(1))
+        call record%exchange(disk%v(2))
+        call record%exchange(disk%clock)
+        call exchange_short(tag%species)
+        call exchange_short(tag%id)
+        call record%exchange(tag%collisions)
+        call exchange_short(tag%met)
+        if (sim%with%own_sizes) call record%exchange(disk%radius)      ! else sizes follow from the input
+      end associate
+      do k = 1, n_columns
+        if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(sim%extra(sim%row(k), :))
+      end do
+      if (.not. sim%with%own_sizes) return
+      mass = sim%masses()                       ! there is no column of them if they turn out to be equal
+      call record%exchange(mass)
+      if (record%way /= reading) return
+      sim%extra(sim%row(mass_column), :) = mass
+      call sim%settle_masses()
+    end subroutine exchange_disks
 
-  !> Writes or reads how far a cadence has come; its steps are part of the input, and when the next sample is due
-  !> follows from them.
-  subroutine exchange_cadence(record, cadence)
-    type(record_t), intent(inout) :: record
-    type(cadence_t), intent(inout) :: cadence
+    !> Integers of half a word.
+    subroutine exchange_short(values)
+      integer(int32), intent(inout) :: values(:)
+      integer(int64) :: words(size(values))
 
-    call record%exchange(cadence%count)
-    call record%exchange(cadence%last_events)
-    call record%exchange(cadence%last_time)
-  end subroutine exchange_cadence
+      words = values
+      call record%exchange(words)
+      values = int(words, int32)
+    end subroutine exchange_short
+  end subroutine exchange_all
 
 end module checkpoint

@@ -5,6 +5,7 @@
 !> when the room is used up, and at the end, a new file replaces it in one instant.
 module output
   use kinds, only: int64, real64
+  use cadence, only: frames, progress_t, values
   use checkpoint, only: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, &
     mark_as_broken, put_checkpoint, put_last_checkpoint
   use errors, only: error_t, exit_files, fail
@@ -13,7 +14,6 @@ module output
   use h5md_layout, only: event_counter, frame_counter, replaced_file, sample_counter, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
   use observables, only: observed
-  use progress, only: progress_t
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, is_file, lock, source_of, take_final_name, unfinished, unfinished_new
   use sample_track, only: track_t
@@ -29,7 +29,7 @@ module output
   public :: output_t, planned_bytes
 
   real(real64), parameter :: longest_wait = 0.05_real64  !! of a sample before it is written [s]
-  integer, parameter :: frames = 1, values = 2, events = 3      !! the tracks
+  integer, parameter :: events = 3              !! the track of the event log, behind those of `frames` and `values`
   integer, parameter :: kept = 1, anew = 2, dropped = 3         !! what becomes of checkpoints in a new file
 
   type :: output_t
@@ -53,7 +53,7 @@ module output
     procedure :: break_off
     procedure :: save
     procedure :: release
-    procedure, private :: check_start, plan, create_file, append, rebuild, write_buffers, write_end, write_frame, write_observables
+    procedure, private :: check_start, plan, create_file, append, rebuild, write_buffers, write_end, write_sample
   end type output_t
 
 contains
@@ -106,8 +106,8 @@ contains
     do k = 1, size(self%track)
       call self%track(k)%make(self%file, self%track(k)%first_capacity())
     end do
-    call self%write_frame(sim)
-    call self%write_observables(sim)
+    call self%write_sample(frames, sim)
+    call self%write_sample(values, sim)
     call self%write_buffers()
     call make_checkpoints(self%file, input%groups, sim, self%progress)
     call self%file%flush()
@@ -154,7 +154,7 @@ contains
     if (.not. finished) call self%file%fetch(replaced_file, 3, self%replaced)
     call check_replaced(self%path, self%replaced, error)
     if (allocated(error)) return
-    counts = progress%counts()
+    counts = [progress%cadence%count, progress%events]
     do k = 1, size(self%track)
       call self%track(k)%resume(self%file, counts(k))
     end do
@@ -185,10 +185,9 @@ contains
       allocate (self%track(merge(events, values, settings%event_log)))
       self%track(frames)%counter = frame_counter
       self%track(frames)%series = frame_series(sim, settings%single_precision)
-      self%track(frames)%planned = self%progress%frames%planned(rule%limits)
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))
-      self%track(values)%planned = self%progress%observables%planned(rule%limits)
+      self%track(:values)%planned = self%progress%cadence%planned(rule%limits)
       if (.not. settings%event_log) return
       self%track(events)%counter = event_counter
       self%track(events)%series = event_series()
@@ -226,8 +225,8 @@ contains
     class(output_t), intent(in) :: self
     type(limits_t), intent(inout) :: limits
 
-    call self%progress%frames%tighten(limits)
-    call self%progress%observables%tighten(limits)
+    call self%progress%cadence(frames)%tighten(limits)
+    call self%progress%cadence(values)%tighten(limits)
   end subroutine tighten
 
   !> Writes the samples that are due; to be called whenever the simulation pauses.
@@ -237,32 +236,27 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: due(2)
 
-    due = [self%progress%frames%is_due(sim), self%progress%observables%is_due(sim)]
+    due = self%progress%cadence%is_due(sim)
     if (any(due)) call check_counts(sim, error)
     if (allocated(error)) return
-    if (due(1)) call self%write_frame(sim)
-    if (due(2)) call self%write_observables(sim)
+    if (due(frames)) call self%write_sample(frames, sim)
+    if (due(values)) call self%write_sample(values, sim)
     call self%write_buffers(longest_wait)
     call self%file%report(error)
   end subroutine write_what_is_due
 
-  !> Writes one frame.
-  subroutine write_frame(self, sim)
+  !> Writes a frame, or a sample of the observables.
+  subroutine write_sample(self, track, sim)
     class(output_t), intent(inout) :: self
+    integer, intent(in) :: track                  !! frames or values
     type(simulation_t), intent(inout) :: sim
 
-    call self%append(frames, frame_sample(sim, self%progress%frames%count), sim)
-    call self%progress%frames%take(sim)
-  end subroutine write_frame
-
-  !> Writes one sample of the observables.
-  subroutine write_observables(self, sim)
-    class(output_t), intent(inout) :: self
-    type(simulation_t), intent(inout) :: sim
-
-    call self%append(values, observable_sample(sim, self%progress%observables%count), sim)
-    call self%progress%observables%take(sim)
-  end subroutine write_observables
+    associate (cadence => self%progress%cadence(track))
+      if (track == frames) call self%append(track, frame_sample(sim, cadence%count), sim)
+      if (track == values) call self%append(track, observable_sample(sim, cadence%count), sim)
+      call cadence%take(sim)
+    end associate
+  end subroutine write_sample
 
   !> Takes over the collisions that the log holds, and empties it; `write_what_is_due` tells of a failure.
   subroutine write_events(self, sim, log)
@@ -389,10 +383,12 @@ contains
     character(len=*), intent(in) :: note          !! why the run ended if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before
+    integer :: track
 
     before = self%progress
-    if (self%progress%frames%is_new(sim)) call self%write_frame(sim)
-    if (self%progress%observables%is_new(sim)) call self%write_observables(sim)
+    do track = frames, values
+      if (self%progress%cadence(track)%is_new(sim)) call self%write_sample(track, sim)
+    end do
     call self%write_buffers()
     if (broken .or. any(self%track%appended() /= self%track%capacity)) &
       call self%rebuild(self%track%appended(), sim, merge(dropped, kept, broken))
