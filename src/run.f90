@@ -14,7 +14,7 @@ module run
   use partners, only: n_sides
   use progress_line, only: progress_line_t
   use run_files, only: is_file, source_of, unfinished
-  use run_setup, only: choose_evolution, new_simulation, read_input
+  use run_setup, only: choose_evolution, new_simulation, read_input, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
@@ -22,7 +22,6 @@ module run
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, legible, size_text, written
-  use threads, only: start_threads
   use timeline, only: advance_once
   implicit none
   private

@@ -1,5 +1,5 @@
-!> From the command line's file to a run: reads and checks the input, builds the state, and turns words of the
-!> input into types. The only place that knows every search and every dynamics.
+!> From the command line's file to a run: reads and checks the input, builds the state, turns words of the
+!> input into types, and starts the threads. The only place that knows every search and every dynamics.
 module run_setup
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -14,15 +14,18 @@ module run_setup
   use namelist_input, only: read_groups
   use parallel_events, only: parallel_events_t
   use renumbering, only: renumber
+  use kinds, only: int64
   use settings, only: run_input_t, settings_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
-  use system, only: print_text
-  use texts, only: text_t
+  use system, only: cores_of_process, print_text
+  use team, only: make_team
+  use texts, only: counted, text_t, written
   use time_stepped, only: time_stepped_t
+  use variables, only: most_threads
   implicit none
   private
-  public :: read_input, input_from_text, new_simulation, choose_evolution
+  public :: read_input, input_from_text, new_simulation, choose_evolution, start_threads
 
 contains
 
@@ -107,5 +110,48 @@ contains
       end if
     end if
   end subroutine choose_evolution
+
+  !> Starts the threads of a run, which then has them until it ends. A run that one core does alone takes none.
+  subroutine start_threads(settings, warning)
+    type(settings_t), intent(inout) :: settings
+    character(len=:), allocatable, intent(out) :: warning  !! of what the user may not have meant; empty if there is nothing
+    character(len=:), allocatable :: name
+    integer :: cores
+    type(parallel_events_t) :: usual
+
+    call ask(settings%run%threads, name)
+    warning = ""
+    cores = cores_of_process()
+    associate (threads => settings%run%threads)
+      if (threads > cores) warning = name//": "//written(threads)//" threads are more than the " &
+        //counted(int(cores, int64), "core")//" that the run may use, and slower"
+      threads = min(threads, usual%most_domains(int(settings%n_disks()), settings%box%periodic))
+      if (.not. settings%wants_domains()) threads = 1
+      if (threads > 1) then
+        if (.not. room_for_domains(settings)) then
+          warning = name//": there is not enough memory for "//written(threads)//" threads; the run goes on with one"
+          threads = 1
+        end if
+      end if
+      threads = max(threads, 1)
+    end associate
+    call make_team(settings%run%threads)
+  end subroutine start_threads
+
+  !> How many threads are asked for, and where: in the input, or in the environment. Else it is one.
+  subroutine ask(threads, name)
+    integer, intent(inout) :: threads                      !! in: as in the input; 0: it does not say
+    character(len=:), allocatable, intent(out) :: name
+    character(len=16) :: value
+    integer :: status
+
+    name = "run.threads"
+    if (threads > 0) return
+    name = "OMP_NUM_THREADS"
+    call get_environment_variable(name, value)
+    read (value, *, iostat=status) threads
+    if (status /= 0 .or. threads < 1) threads = 1
+    threads = min(threads, most_threads)
+  end subroutine ask
 
 end module run_setup

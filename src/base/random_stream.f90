@@ -3,7 +3,7 @@
 !> unrelated streams. A stream is a value: a copy continues with the same numbers as the original.
 !>
 !> Both generators work modulo 2**64. Fortran has no unsigned integers, and overflow of signed ones is
-!> not allowed, so sums are formed in two halves, and products in a longer integer.
+!> not allowed, so sums and products are formed in a longer integer.
 module random_stream
   use kinds, only: int32, int64, int128, real64
   implicit none
@@ -13,7 +13,6 @@ module random_stream
   !> What random numbers are drawn for during a run. Those at its start have streams of their own.
   integer, parameter, public :: thermal_walls = 3, kicks = 4, orientations = 5
 
-  integer(int64), parameter :: lower_half = int(z"FFFFFFFF", int64)
   real(real64), parameter :: unit_53 = 2.0_real64**(-53)
 
   !> The state of a generator.
@@ -68,8 +67,8 @@ contains
     integer(int64) :: shifted
 
     associate (s => self%word)
-      word = ishftc(wrapped_sum(s(2), ishft(s(2), 2)), 7)
-      word = wrapped_sum(word, ishft(word, 3))
+      word = ishftc(wrapped(5*int(s(2), int128)), 7)
+      word = wrapped(9*int(word, int128))
       shifted = ishft(s(2), 17)
       s(3) = ieor(s(3), s(1))
       s(4) = ieor(s(4), s(2))
@@ -146,33 +145,22 @@ contains
     integer(int64), parameter :: factor_1 = ior(ishft(int(z"BF58476D", int64), 32), int(z"1CE4E5B9", int64))
     integer(int64), parameter :: factor_2 = ior(ishft(int(z"94D049BB", int64), 32), int(z"133111EB", int64))
 
-    state = wrapped_sum(state, step)
-    word = wrapped_product(ieor(state, ishft(state, -30)), factor_1)
-    word = wrapped_product(ieor(word, ishft(word, -27)), factor_2)
+    state = wrapped(int(state, int128) + step)
+    word = wrapped(int(ieor(state, ishft(state, -30)), int128)*factor_1)
+    word = wrapped(int(ieor(word, ishft(word, -27)), int128)*factor_2)
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> a + b modulo 2**64.
-  pure function wrapped_sum(a, b) result(c)
-    integer(int64), intent(in) :: a, b
-    integer(int64) :: c, low, high
-
-    low = iand(a, lower_half) + iand(b, lower_half)
-    high = ishft(a, -32) + ishft(b, -32) + ishft(low, -32)
-    c = ior(ishft(high, 32), iand(low, lower_half))
-  end function wrapped_sum
-
-  !> a*b modulo 2**64. In 128 bits the product does not overflow.
-  pure function wrapped_product(a, b) result(c)
-    integer(int64), intent(in) :: a, b
-    integer(int64) :: c
+  !> A number modulo 2**64, as a signed word. A product of two words is in size at most 2**126.
+  pure function wrapped(number) result(word)
+    integer(int128), intent(in) :: number
+    integer(int64) :: word
     integer(int128), parameter :: upper_bit = 2_int128**63
-    integer(int128) :: product
+    integer(int128) :: lower
 
-    product = int(a, int128)*int(b, int128)                ! in size at most 2**126
-    product = iand(product, 2*upper_bit - 1)
-    if (product >= upper_bit) product = product - 2*upper_bit
-    c = int(product, int64)
-  end function wrapped_product
+    lower = iand(number, 2*upper_bit - 1)
+    if (lower >= upper_bit) lower = lower - 2*upper_bit
+    word = int(lower, int64)
+  end function wrapped
 
 end module random_stream

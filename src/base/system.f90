@@ -51,6 +51,13 @@ module system
       character(kind=c_char), intent(in) :: from(*), to(*)
       integer(c_int) :: status
     end function naming_call
+
+    !> A question whose answer is a text of at most `size` characters.
+    subroutine text_call(text, size) bind(C)
+      import :: c_char, c_size_t
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_size_t), value :: size
+    end subroutine text_call
   end interface
 
   interface
@@ -77,23 +84,11 @@ module system
       integer(c_int) :: n
     end function cores_of_process
 
-    subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
-      import :: c_char, c_size_t
-      character(kind=c_char), intent(out) :: text(*)
-      integer(c_size_t), value :: size
-    end subroutine c_describe_problem
-
-    subroutine c_name_host(text, size) bind(C, name="system_name_host")
-      import :: c_char, c_size_t
-      character(kind=c_char), intent(out) :: text(*)
-      integer(c_size_t), value :: size
-    end subroutine c_name_host
-
-    function c_read_bytes(path, position, bytes, count) bind(C, name="system_read_bytes") result(n)
+    function c_read_bytes(path, bytes, count) bind(C, name="system_read_bytes") result(n)
       import :: c_char, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
       character(kind=c_char), intent(out) :: bytes(*)
-      integer(c_int64_t), value :: position, count
+      integer(c_int64_t), value :: count
       integer(c_int64_t) :: n
     end function c_read_bytes
 
@@ -137,6 +132,8 @@ module system
   procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or a number above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
+  procedure(text_call), bind(C, name="system_describe_problem") :: c_describe_problem
+  procedure(text_call), bind(C, name="system_name_host") :: c_name_host
   procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! on the disk of a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
@@ -247,14 +244,13 @@ contains
     bytes = c_file_size(path//c_null_char)
   end function file_size
 
-  !> Reads bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
-  subroutine read_bytes(path, first, bytes, n)
+  !> Reads the first bytes of a regular file. (Fortran's own `open` cuts blanks at the end of a name.)
+  subroutine read_bytes(path, bytes, n)
     character(len=*), intent(in) :: path
-    integer(int64), intent(in) :: first                !! position of the first one, from 1
     character(len=*), intent(out) :: bytes
     integer(int64), intent(out) :: n                   !! how many there are, at most len(bytes); -1: it cannot be read
 
-    n = c_read_bytes(path//c_null_char, first - 1, bytes, len(bytes, int64))
+    n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
   !> Writes a number over eight bytes of a file.

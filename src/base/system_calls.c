@@ -198,15 +198,15 @@ void system_opening_problem(const char *path, bool writable, char *text, size_t 
     text[size - 1] = '\0';
 }
 
-/* Reads bytes of a file, from a position that counts from 0; returns how many there are, at most `count`. */
-int64_t system_read_bytes(const char *path, int64_t position, char *bytes, int64_t count)
+/* Reads the first bytes of a file; returns how many there are, at most `count`. */
+int64_t system_read_bytes(const char *path, char *bytes, int64_t count)
 {
     const char *problem;
     const int descriptor = open_regular(path, O_RDONLY, &problem);
     int64_t total = 0, more = 1;
     if (descriptor < 0) return -1;
     while (more > 0 && total < count) {
-        do more = pread(descriptor, bytes + total, (size_t)(count - total), (off_t)(position + total));
+        do more = pread(descriptor, bytes + total, (size_t)(count - total), (off_t)total);
         while (more < 0 && errno == EINTR);
         total += more;
     }

@@ -1,4 +1,4 @@
-!> An HDF5 file that is open: created, opened, renamed, flushed and closed.
+!> An HDF5 file that is open: created, opened, renamed, flushed and closed; groups in it, and further names.
 !>
 !> The first call that fails is remembered, and nothing is done after it. So a writer need not test every
 !> call: `report` says at the end whether all went well.
@@ -9,7 +9,8 @@ module hdf5_handle
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
-    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f
+    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5gcreate_f, h5gclose_f, h5ocopy_f, &
+    h5lcreate_hard_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
   use system, only: free_bytes, last_problem, move_file, opening_problem
@@ -34,6 +35,9 @@ module hdf5_handle
     procedure :: rename => rename_file
     procedure :: flush => flush_file
     procedure :: close => close_file
+    procedure :: make_group
+    procedure :: copy
+    procedure :: link
     procedure :: check
     procedure :: report
   end type hdf5_handle_t
@@ -192,5 +196,41 @@ contains
     call self%check(status, "be closed")
     self%id = -1
   end subroutine close_file
+
+  !> Makes a group and those that lead to it.
+  subroutine make_group(self, name)
+    class(hdf5_handle_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(hid_t) :: group
+    integer :: status, closed
+
+    if (allocated(self%failure)) return
+    call h5gcreate_f(self%id, name, group, status, lcpl_id=self%links)
+    call self%check(status, "make group "//name)
+    if (status >= 0) call h5gclose_f(group, closed)
+  end subroutine make_group
+
+  !> Copies a dataset, or a group with all that is in it, from another file.
+  subroutine copy(self, name, source)
+    class(hdf5_handle_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    class(hdf5_handle_t), intent(in) :: source
+    integer :: status
+
+    if (allocated(self%failure)) return
+    call h5ocopy_f(source%id, name, self%id, name, status)
+    call self%check(status, "copy "//name)
+  end subroutine copy
+
+  !> Gives an object a second name.
+  subroutine link(self, name, second_name)
+    class(hdf5_handle_t), intent(inout) :: self
+    character(len=*), intent(in) :: name, second_name
+    integer :: status
+
+    if (allocated(self%failure)) return
+    call h5lcreate_hard_f(self%id, name, self%id, second_name, status, lcpl_id=self%links)
+    call self%check(status, "link "//second_name)
+  end subroutine link
 
 end module hdf5_handle

@@ -3,8 +3,8 @@
 !> A name is a path, `group/dataset`, or with @ an attribute, `group@name`.
 module hdf5_objects
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
-  use hdf5, only: haddr_t, hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5gcreate_f, h5gclose_f, h5ocopy_f, &
-    h5lcreate_hard_f, h5ldelete_f, h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
+  use hdf5, only: haddr_t, hid_t, hsize_t, size_t, h5_integer_kind, h5kind_to_type, h5ldelete_f, &
+    h5oopen_f, h5oclose_f, h5acreate_f, h5aopen_f, h5aread_f, h5awrite_f, &
     h5aget_space_f, h5aclose_f, h5dcreate_f, h5dopen_f, h5dwrite_f, h5dread_f, h5dclose_f, h5dget_space_f, h5dget_type_f, &
     h5dget_create_plist_f, h5dget_offset_f, h5dget_storage_size_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, &
     h5d_chunked_f, h5d_virtual_f, h5screate_simple_f, h5sclose_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
@@ -26,9 +26,6 @@ module hdf5_objects
 
   type, extends(hdf5_handle_t) :: hdf5_file_t
   contains
-    procedure :: make_group
-    procedure :: copy
-    procedure :: link
     procedure :: remove_last
     procedure :: make_dataset
     procedure :: extents
@@ -43,42 +40,6 @@ module hdf5_objects
   end type hdf5_file_t
 
 contains
-
-  !> Makes a group and those that lead to it.
-  subroutine make_group(self, name)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    integer(hid_t) :: group
-    integer :: status, closed
-
-    if (allocated(self%failure)) return
-    call h5gcreate_f(self%id, name, group, status, lcpl_id=self%links)
-    call self%check(status, "make group "//name)
-    if (status >= 0) call h5gclose_f(group, closed)
-  end subroutine make_group
-
-  !> Copies a dataset, or a group with all that is in it, from another file.
-  subroutine copy(self, name, source)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    class(hdf5_file_t), intent(in) :: source
-    integer :: status
-
-    if (allocated(self%failure)) return
-    call h5ocopy_f(source%id, name, self%id, name, status)
-    call self%check(status, "copy "//name)
-  end subroutine copy
-
-  !> Gives an object a second name.
-  subroutine link(self, name, second_name)
-    class(hdf5_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name, second_name
-    integer :: status
-
-    if (allocated(self%failure)) return
-    call h5lcreate_hard_f(self%id, name, self%id, second_name, status, lcpl_id=self%links)
-    call self%check(status, "link "//second_name)
-  end subroutine link
 
   !> Takes the dataset out of the file that was made last; the file then ends where the values of the one before end. At
   !> every moment it can be opened: first the dataset loses its name, while it is open and so still there; then the header
@@ -109,21 +70,20 @@ contains
     call self%check(merge(0, -1, done), "remove "//name)
   end subroutine remove_last
 
-  !> Makes a dataset and leaves it open.
-  subroutine make_dataset(self, name, type, extents, dataset)
+  !> Makes a dataset.
+  subroutine make_dataset(self, name, type, extents)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(in) :: type            !! HDF5 type in the file
     integer(hsize_t), intent(in) :: extents(:)    !! shape; empty: a single value
-    integer(hid_t), intent(out) :: dataset
-    integer(hid_t) :: space
+    integer(hid_t) :: dataset, space
     integer :: status, closed
 
-    dataset = -1
     if (allocated(self%failure)) return
     call h5screate_simple_f(size(extents), extents, space, status)
     if (status >= 0) call h5dcreate_f(self%id, name, type, space, dataset, status, self%storage, self%links)
     call self%check(status, "write "//name)
+    if (status >= 0) call h5dclose_f(dataset, closed)
     call h5sclose_f(space, closed)
   end subroutine make_dataset
 
@@ -328,10 +288,10 @@ contains
     end if
     call self%open_dataset(name, dataset, there, status, like=stored_as)
     if (status < 0) then
-      call self%make_dataset(name, stored_as, int(extents, hsize_t), dataset)
-    else if (product_of(there) /= product(int(extents, int64))) then
-      call self%check(-1, "write "//name)
+      call self%make_dataset(name, stored_as, int(extents, hsize_t))
+      call self%open_dataset(name, dataset, there, status)
     end if
+    if (product_of(there) /= product(int(extents, int64))) call self%check(-1, "write "//name)
     if (.not. allocated(self%failure)) call h5dwrite_f(dataset, in_memory, address, status)
     call self%check(status, "write "//name)
     call h5dclose_f(dataset, status)              ! writes what has been buffered

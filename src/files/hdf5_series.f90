@@ -4,7 +4,7 @@
 module hdf5_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8, real32
-  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5dclose_f, h5t_ieee_f32le, h5t_ieee_f64le, &
+  use hdf5, only: hid_t, hsize_t, h5_integer_kind, h5_real_kind, h5kind_to_type, h5t_ieee_f32le, h5t_ieee_f64le, &
     h5t_std_i32le, h5t_std_i64le
   use hdf5_objects, only: hdf5_file_t
   use kinds, only: int32, int64, real64
@@ -68,13 +68,10 @@ contains
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: capacity
-    integer(hid_t) :: dataset
-    integer :: closed
 
     self%capacity = capacity
     call file%make_dataset(trim(self%name), self%storage_type(), &
-      int([int(self%shape(:self%rank), int64), capacity], hsize_t), dataset)
-    call h5dclose_f(dataset, closed)
+      int([int(self%shape(:self%rank), int64), capacity], hsize_t))
   end subroutine make
 
   !> Finds the series in a file that has it; its samples must have the shape that is expected.

@@ -1,16 +1,15 @@
 !> A record: numbers one after the other in one dataset. They are counted, written or read, each by one line for all
 !> three; a checksum behind the last one tells whether they are right.
 module record
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
   use hdf5, only: h5_integer_kind, h5kind_to_type
-  use checksums, only: crc_of
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: long_integer, series_t
   use kinds, only: int64, real64
   implicit none
   private
-  public :: record_t, counting, reading, writing
+  public :: checksum, record_t, counting, reading, writing
 
   integer, parameter :: counting = 0, writing = 1, reading = 2
   integer(int64), parameter :: bytes_of_word = 8
@@ -30,7 +29,26 @@ module record
     procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, pass
   end type record_t
 
+  interface
+    !> CRC-32, by zlib, which HDF5 brings along.
+    pure function crc32(crc, bytes, length) bind(C) result(continued)
+      import :: c_int, c_int8_t, c_long
+      integer(c_long), value :: crc                   !! of the bytes before; 0 if there are none
+      integer(c_int8_t), intent(in) :: bytes(*)
+      integer(c_int), value :: length
+      integer(c_long) :: continued
+    end function crc32
+  end interface
+
 contains
+
+  !> Checksum of some bytes, in eight hexadecimal digits.
+  pure function checksum(bytes) result(text)
+    integer(int8), intent(in) :: bytes(:)
+    character(len=8) :: text
+
+    write (text, "(z8.8)") crc32(0_c_long, bytes, size(bytes, kind=c_int))
+  end function checksum
 
   !> Makes the dataset of a record that has been counted.
   subroutine make(self)
@@ -107,7 +125,7 @@ contains
       call self%file%exchange_part(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
         address, self%way == writing)
       call c_f_pointer(address, bytes, [bytes_of_word*n])
-      self%crc = crc_of(bytes, self%crc)
+      self%crc = crc32(int(self%crc, c_long), bytes, size(bytes, kind=c_int))
     end if
     self%words = self%words + n
   end subroutine pass

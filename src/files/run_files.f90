@@ -76,7 +76,7 @@ contains
     character(len=8) :: first
     integer(int64) :: n
 
-    call read_bytes(path, 1_int64, first, n)
+    call read_bytes(path, first, n)
     yes = n == 0 .or. (n == 8 .and. any(first == [char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10), &
       repeat(achar(0), 8)]))
   end function begins_like_a_run

@@ -120,7 +120,7 @@ contains
     s = never
     do k = 1, n
       if (apart(edge(k)) > 0 .or. apart(edge(k)) >= apart(edge(k - 1))) cycle
-      s = last_apart(d, v, g, rho, inside, edge(k - 1), edge(k))
+      s = last_apart(edge(k - 1), edge(k))
       return
     end do
 
@@ -135,6 +135,26 @@ contains
       f = x(1)*x(1) + x(2)*x(2) - rho*rho
       if (inside) f = -f
     end function apart
+
+    !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
+    !> to the last bit of the distance itself, which is sharper than the polynomial.
+    pure function last_apart(lo, hi) result(left)
+      real(real64), intent(in) :: lo, hi
+      real(real64) :: left, middle, right, x(2)
+
+      left = lo
+      right = hi
+      do
+        middle = 0.5_real64*(left + right)
+        if (middle <= left .or. middle >= right) exit
+        x = flight(d, v, g, middle)
+        if (x(1)*x(1) + x(2)*x(2) > rho*rho .neqv. inside) then
+          left = middle
+        else
+          right = middle
+        end if
+      end do
+    end function last_apart
   end function time_to_circle_falling
 
   !> A power of two beyond all roots of a cubic (Fujiwara's bound), and beyond a time squared that is given in case it
@@ -150,28 +170,6 @@ contains
     end do
     bound = scale(2.0_real64, power)
   end function root_bound
-
-  !> The last moment before contact, given that the centre meets the circle once between lo and hi: bisection
-  !> to the last bit of the distance itself, which is sharper than the polynomial.
-  pure function last_apart(d, v, g, rho, inside, lo, hi) result(s)
-    real(real64), intent(in) :: d(2), v(2), g(2), rho, lo, hi
-    logical, intent(in) :: inside
-    real(real64) :: s, left, right, x(2)
-
-    left = lo
-    right = hi
-    do
-      s = 0.5_real64*(left + right)
-      if (s <= left .or. s >= right) exit
-      x = flight(d, v, g, s)
-      if (x(1)*x(1) + x(2)*x(2) > rho*rho .neqv. inside) then
-        left = s
-      else
-        right = s
-      end if
-    end do
-    s = left
-  end function last_apart
 
   !> The root of `poly` between lo and hi, where it changes sign once; bisection to the last bit.
   pure function root_between(poly, lo, hi) result(s)

@@ -87,31 +87,31 @@ contains
     s = min(time_to_circle(d - self%half, v, g, radius, .false.), time_to_circle(d + self%half, v, g, radius, .false.))
     do side = -1, 1, 2
       across = side*[-self%along(2), self%along(1)]
-      s = min(s, time_to_side(self, across, d, v, g, radius))
+      s = min(s, time_to_side())
     end do
+
+  contains
+
+    !> Time until a disk touches one straight side, on which `across` points away from the wall; `never` if it
+    !> passes beyond an end. The side is entered once at most: its distance is a parabola in time.
+    pure function time_to_side() result(t)
+      real(real64) :: t, away, speed, fall, disc
+
+      away = dot_product(d, across) - radius
+      speed = -dot_product(v, across)             ! towards the wall, as `fall` is
+      fall = -dot_product(g, across)
+      if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
+      t = never
+      if (away >= 0) then
+        t = time_to_line(away, speed, fall)
+      else if (fall > 0 .and. speed < 0) then     ! rises beyond an end, and may fall onto the wall
+        disc = speed**2 + 2*fall*away
+        if (disc >= 0) t = (sqrt(disc) - speed)/fall
+      end if
+      if (.not. t < never) return
+      if (abs(dot_product(flight(d, v, g, t), self%along)) > self%length) t = never
+    end function time_to_side
   end function contact_time
-
-  !> Time until a disk touches one straight side, on which `across` points away from the wall; `never` if it
-  !> passes beyond an end. The side is entered once at most: its distance is a parabola in time.
-  pure function time_to_side(self, across, d, v, g, radius) result(s)
-    class(segment_t), intent(in) :: self
-    real(real64), intent(in) :: across(2), d(2), v(2), g(2), radius
-    real(real64) :: s, away, speed, fall, disc
-
-    away = dot_product(d, across) - radius
-    speed = -dot_product(v, across)             ! towards the wall, as `fall` is
-    fall = -dot_product(g, across)
-    if (away > -radius .and. abs(dot_product(d, self%along)) <= self%length) away = max(away, 0.0_real64)
-    s = never
-    if (away >= 0) then
-      s = time_to_line(away, speed, fall)
-    else if (fall > 0 .and. speed < 0) then     ! rises beyond an end, and may fall onto the wall
-      disc = speed**2 + 2*fall*away
-      if (disc >= 0) s = (sqrt(disc) - speed)/fall
-    end if
-    if (.not. s < never) return
-    if (abs(dot_product(flight(d, v, g, s), self%along)) > self%length) s = never
-  end function time_to_side
 
   !> From the nearest point of the wall to a point.
   pure function from_outline(self, d) result(offset)

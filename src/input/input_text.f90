@@ -62,7 +62,7 @@ contains
     end if
     if (allocated(error)) return
     allocate (character(len=bytes) :: text)
-    call read_bytes(path, 1_int64, text, n)
+    call read_bytes(path, text, n)
     if (n < 0) then
       call fail(error, exit_files, path//": cannot be read: "//opening_problem(path, writable=.false.))
       return

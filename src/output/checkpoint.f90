@@ -9,7 +9,6 @@ module checkpoint
   use kinds, only: int32, int64, real64
   use build_info, only: build_flags
   use cadence, only: progress_t
-  use checksums, only: checksum
   use disks, only: mass_column, n_columns
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
@@ -17,7 +16,7 @@ module checkpoint
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
   use input_groups, only: group_t, most_written
-  use record, only: counting, reading, record_t, writing
+  use record, only: checksum, counting, reading, record_t, writing
   use run_files, only: is_file, source_of, unfinished
   use settings, only: run_input_t
   use simulation_state, only: simulation_t

@@ -3,7 +3,6 @@ module run_description
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use kinds, only: int32, int64, real64
-  use box_geometry, only: box_t
   use build_info, only: build_flags, git_commit
   use disks, only: names_of
   use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
@@ -33,35 +32,111 @@ contains
     type(simulation_t), intent(in) :: sim
     integer :: k, range(2)
 
-    call describe_format(file)
-    call describe_box(file, sim%box)
-    call describe_disks(file, sim)
-    call describe_origin(file)
-    call describe_input(file, input)
+    call describe_format()
+    call describe_box()
+    call describe_disks()
+    call describe_origin()
+    call describe_input()
     call file%put(species_names, names_of(sim%species))
     call file%put(species_counts, [size(sim%species)], int(sim%species%count, int32))
-    call describe_populations(file, sim)
+    call describe_populations()
     do k = 1, size(obstacle_groups)
       range = range_of(input%groups, obstacle_groups(k:k))
       call describe_table(file, input%groups(range(1):range(2)))
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
     call describe_end(file, input%settings%run%threads, 0.0_real64, 0.0_real64, "")
+  contains
+
+    !> Format, author and creator, as H5MD requires.
+    subroutine describe_format()
+      call file%make_group("h5md/author")
+      call file%make_group("h5md/creator")
+      call file%make_group("h5md/modules/thermodynamics")
+      call file%put("h5md@version", [2], [1_int32, 1_int32])
+      call file%put("h5md/author@name", author())
+      call file%put("h5md/creator@name", "ricochet")
+      call file%put("h5md/creator@version", program_version)
+      call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
+    end subroutine describe_format
+
+    !> Sides and boundaries of the box.
+    subroutine describe_box()
+      character(len=8) :: boundary(2)
+
+      boundary = merge("periodic", "none    ", sim%box%periodic)
+      call file%make_group(box_group)
+      call file%put(box_group//"@dimension", scalar, [2_int32])
+      call file%put(box_group//"@boundary", boundary)
+      call file%put(box_group//"/edges", [2], sim%box%edges())
+      call file%put(box_group//"/lower", [2], sim%box%lower)
+    end subroutine describe_box
+
+    !> What never changes of the disks, in the order of the input.
+    subroutine describe_disks()
+      integer(int32), allocatable :: numbers(:)
+      real(real64), allocatable :: sizes(:)
+      integer(int32) :: i
+
+      allocate (numbers(sim%n_disks()), sizes(sim%n_disks()))
+      numbers = [(i, i=1, sim%n_disks())]
+      call file%put(disk_id, [size(numbers)], numbers)
+      numbers(sim%tag%id) = sim%tag%species
+      call file%put(disk_species, [size(numbers)], numbers)
+      sizes(sim%tag%id) = sim%masses()
+      call file%put(disk_mass, [size(sizes)], sizes)
+      sizes(sim%tag%id) = sim%disk%radius
+      call file%put(disk_radius, [size(sizes)], sizes)
+    end subroutine describe_disks
+
+    !> The input as it was given, and every variable as it was used.
+    subroutine describe_input()
+      character(len=:), allocatable :: group
+      integer :: g, k
+
+      do g = 1, size(input%groups)
+        associate (own => input%groups(g))
+          if (any(obstacle_groups == own%name)) cycle     ! one table for each name
+          group = parameters_group//trim(own%name)
+          if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
+          call file%make_group(group)
+          do k = 1, size(own%values)
+            if (.not. changes_nothing(trim(own%name)//"."//own%values(k)%name)) call describe_value(file, group, own%values(k))
+          end do
+        end associate
+      end do
+      call file%put(parameters_group//"input", input%text)
+      call file%put(parameters_group//"overrides", overrides_text(input))
+    end subroutine describe_input
+
+    !> What the thermodynamics module of H5MD requires beside the observables of a group.
+    subroutine describe_populations()
+      character(len=:), allocatable :: group
+      integer(int32) :: n
+      integer :: s
+
+      do s = 0, size(sim%species)
+        group = observables_group//all_disks
+        n = sim%n_disks()
+        if (s > 0) group = observables_group//sim%species(s)%name
+        if (s > 0) n = sim%species(s)%count
+        call file%make_group(group)
+        call file%put(group//"@dimension", scalar, [2_int32])
+        call file%put(group//"/particle_number", scalar, [n])
+      end do
+    end subroutine describe_populations
+
+    !> The build and the machine that a file comes from.
+    subroutine describe_origin()
+      call file%make_group(provenance)
+      call file%put(provenance//"@program_version", program_version)
+      call file%put(provenance//"@git_commit", git_commit)
+      call file%put(provenance//"@compiler", compiler_version())
+      call file%put(provenance//"@flags", build_flags)
+      call file%put(provenance//"@hdf5_version", hdf5_version())
+      call file%put(provenance//"@host", host_name())
+    end subroutine describe_origin
   end subroutine describe_run
-
-  !> Format, author and creator, as H5MD requires.
-  subroutine describe_format(file)
-    type(hdf5_file_t), intent(inout) :: file
-
-    call file%make_group("h5md/author")
-    call file%make_group("h5md/creator")
-    call file%make_group("h5md/modules/thermodynamics")
-    call file%put("h5md@version", [2], [1_int32, 1_int32])
-    call file%put("h5md/author@name", author())
-    call file%put("h5md/creator@name", "ricochet")
-    call file%put("h5md/creator@version", program_version)
-    call file%put("h5md/modules/thermodynamics@version", [2], [1_int32, 0_int32])
-  end subroutine describe_format
 
   !> Who runs the program, according to the environment.
   function author() result(name)
@@ -73,61 +148,6 @@ contains
     call get_environment_variable("USER", name)
     if (name == "") name = "unknown"
   end function author
-
-  !> Sides and boundaries of the box.
-  subroutine describe_box(file, box)
-    type(hdf5_file_t), intent(inout) :: file
-    type(box_t), intent(in) :: box
-    character(len=8) :: boundary(2)
-
-    boundary = merge("periodic", "none    ", box%periodic)
-    call file%make_group(box_group)
-    call file%put(box_group//"@dimension", scalar, [2_int32])
-    call file%put(box_group//"@boundary", boundary)
-    call file%put(box_group//"/edges", [2], box%edges())
-    call file%put(box_group//"/lower", [2], box%lower)
-  end subroutine describe_box
-
-  !> What never changes of the disks, in the order of the input.
-  subroutine describe_disks(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
-    integer(int32), allocatable :: numbers(:)
-    real(real64), allocatable :: sizes(:)
-    integer(int32) :: i
-
-    allocate (numbers(sim%n_disks()), sizes(sim%n_disks()))
-    numbers = [(i, i=1, sim%n_disks())]
-    call file%put(disk_id, [size(numbers)], numbers)
-    numbers(sim%tag%id) = sim%tag%species
-    call file%put(disk_species, [size(numbers)], numbers)
-    sizes(sim%tag%id) = sim%masses()
-    call file%put(disk_mass, [size(sizes)], sizes)
-    sizes(sim%tag%id) = sim%disk%radius
-    call file%put(disk_radius, [size(sizes)], sizes)
-  end subroutine describe_disks
-
-  !> The input as it was given, and every variable as it was used.
-  subroutine describe_input(file, input)
-    type(hdf5_file_t), intent(inout) :: file
-    type(run_input_t), intent(in) :: input
-    character(len=:), allocatable :: group
-    integer :: g, k
-
-    do g = 1, size(input%groups)
-      associate (own => input%groups(g))
-        if (any(obstacle_groups == own%name)) cycle     ! one table for each name
-        group = parameters_group//trim(own%name)
-        if (is_repeated(own%name)) group = group//"/"//trim(own%instance)
-        call file%make_group(group)
-        do k = 1, size(own%values)
-          if (.not. changes_nothing(trim(own%name)//"."//own%values(k)%name)) call describe_value(file, group, own%values(k))
-        end do
-      end associate
-    end do
-    call file%put(parameters_group//"input", input%text)
-    call file%put(parameters_group//"overrides", overrides_text(input))
-  end subroutine describe_input
 
   !> Whether a run gives the same bits with any value of a variable (`run.threads`): then it is not among those that
   !> describe the run.
@@ -193,25 +213,6 @@ contains
     end select
   end subroutine describe_value
 
-  !> What the thermodynamics module of H5MD requires beside the observables of a group.
-  subroutine describe_populations(file, sim)
-    type(hdf5_file_t), intent(inout) :: file
-    type(simulation_t), intent(in) :: sim
-    character(len=:), allocatable :: group
-    integer(int32) :: n
-    integer :: s
-
-    do s = 0, size(sim%species)
-      group = observables_group//all_disks
-      n = sim%n_disks()
-      if (s > 0) group = observables_group//sim%species(s)%name
-      if (s > 0) n = sim%species(s)%count
-      call file%make_group(group)
-      call file%put(group//"@dimension", scalar, [2_int32])
-      call file%put(group//"/particle_number", scalar, [n])
-    end do
-  end subroutine describe_populations
-
   !> All groups of one name as a table, with a dataset for each variable. A choice of two words is stored as a
   !> flag with the name of the second.
   subroutine describe_table(file, groups)
@@ -246,19 +247,6 @@ contains
       end associate
     end do
   end subroutine describe_table
-
-  !> The build and the machine that a file comes from.
-  subroutine describe_origin(file)
-    type(hdf5_file_t), intent(inout) :: file
-
-    call file%make_group(provenance)
-    call file%put(provenance//"@program_version", program_version)
-    call file%put(provenance//"@git_commit", git_commit)
-    call file%put(provenance//"@compiler", compiler_version())
-    call file%put(provenance//"@flags", build_flags)
-    call file%put(provenance//"@hdf5_version", hdf5_version())
-    call file%put(provenance//"@host", host_name())
-  end subroutine describe_origin
 
   !> Writes, or overwrites, what is known only at the end.
   subroutine describe_end(file, threads, wall_seconds, rate, note)
