@@ -10,8 +10,7 @@ module namelist_input
   private
   public :: read_groups
 
-  integer, parameter :: most_instances = 5000           !! of each of the repeated groups
-  integer, parameter :: most_repeats = 10000000
+  integer, parameter :: most_instances = 5000, most_repeats = 10000000   !! of a repeated group; of the value in 3*value
   character(len=*), parameter :: eol = new_line("a")
 
 contains
@@ -306,7 +305,9 @@ contains
       integer :: instances
 
       own = plain(name)
-      group = findloc(found(:n)%name, name, dim=1, back=.true.)
+      do group = n, 1, -1                                 ! the latest of this name, 0 if there is none
+        if (found(group)%name == name) exit
+      end do
       instances = 0
       if (group > 0) instances = found(group)%number
       if (all(group_names /= name)) then
