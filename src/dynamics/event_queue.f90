@@ -65,7 +65,7 @@ contains
     self%near(0)%time = huge(now)
     call self%heap%initialise(self%n_disks)
     tag%window = window_none
-    self%width = max(window_width(self, disk, now), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
+    self%width = max(window_width(), 1.0e-9_real64*now, 1/never)   ! numbers fit int32
     self%windowed = windowed .and. self%width < never
     self%near_is_open = self%windowed
     self%n_taken = 0
@@ -81,35 +81,33 @@ contains
     do i = 1, self%n_disks
       call schedule(self, disk, tag, i)
     end do
-  end subroutine fill
+  contains
 
-  !> The width of a window that holds a few events: by the rate since the last filling or, at first, by the
-  !> median wait of a sample of disks. `never` if nothing is expected at all.
-  pure function window_width(self, disk, now) result(width)
-    class(event_queue_t), intent(in) :: self
-    type(disk_t), intent(in) :: disk(:)
-    real(real64), intent(in) :: now
-    real(real64) :: width, waits(sample_size), swap
-    integer :: i, k, n_waits
+    !> The width of a window that holds a few events: by the rate since the last filling or, at first, by the
+    !> median wait of a sample of disks. `never` if nothing is expected at all.
+    pure function window_width() result(width)
+      real(real64) :: width, waits(sample_size), swap
+      integer :: i, k, n_waits
 
-    width = never
-    if (self%n_taken > sample_size .and. self%windowed) then
-      width = events_per_window*(self%width*self%next_window - self%filled_at)/self%n_taken
-      return
-    end if
-    n_waits = 0
-    do i = 1, size(disk), (size(disk) - 1)/sample_size + 1
-      if (.not. disk(i)%event_time < never) cycle
-      n_waits = n_waits + 1
-      waits(n_waits) = disk(i)%event_time - now
-      do k = n_waits, 2, -1
-        if (waits(k) >= waits(k - 1)) exit
-        swap = waits(k); waits(k) = waits(k - 1); waits(k - 1) = swap
+      width = never
+      if (self%n_taken > sample_size .and. self%windowed) then
+        width = events_per_window*(self%width*self%next_window - self%filled_at)/self%n_taken
+        return
+      end if
+      n_waits = 0
+      do i = 1, size(disk), (size(disk) - 1)/sample_size + 1
+        if (.not. disk(i)%event_time < never) cycle
+        n_waits = n_waits + 1
+        waits(n_waits) = disk(i)%event_time - now
+        do k = n_waits, 2, -1
+          if (waits(k) >= waits(k - 1)) exit
+          swap = waits(k); waits(k) = waits(k - 1); waits(k - 1) = swap
+        end do
       end do
-    end do
-    if (n_waits > 0) width = events_per_window*waits((n_waits + 1)/2) &
-      /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
-  end function window_width
+      if (n_waits > 0) width = events_per_window*waits((n_waits + 1)/2) &
+        /(log(2.0_real64)*n_waits*max(1.0_real64, size(disk)/real(sample_size, real64)))
+    end function window_width
+  end subroutine fill
 
   !> Files the event of disk i. An earlier entry, if any, becomes invalid by itself.
   subroutine schedule(self, disk, tag, i)
@@ -302,7 +300,7 @@ contains
     call take_bucket(self%calendar%bucket(iand(self%window, self%calendar%last_bucket)), disk, tag, self%per_time, &
       self%next_window, self%near, self%n_near)
     if (self%heap%n > 0) call self%take_from_heap(disk, tag)
-    if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
+    if (iand(self%window, shiftl(1_int32, self%calendar%log_span) - 1) == 0) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
   !> Empties a bucket into a sorted list: the events that its disks expect before the next window; other entries are
@@ -371,7 +369,7 @@ contains
     integer(int32), allocatable :: surplus(:)
     integer(int32) :: k, n
 
-    if (ill_fitting(self)) then
+    if (ill_fitting()) then
       call fill(self, disk(1:self%n_disks), tag(1:self%n_disks), self%width*self%window, windowed=.true.)
       return
     end if
@@ -381,18 +379,18 @@ contains
       tag(surplus(k))%window = window_none
       call self%insert_into_heap(disk, tag, surplus(k))
     end do
+  contains
+
+    !> Whether windows turned out far too narrow or too wide since the last filling, which must be so long ago that
+    !> filing all disks again pays.
+    pure function ill_fitting() result(yes)
+      logical :: yes
+      real(real64) :: per_window
+
+      per_window = max(self%n_taken, 1_int64)*self%width/(self%width*self%next_window - self%filled_at)
+      yes = (abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0) &
+        .and. 4*(self%window - self%filled_at*self%per_time) > self%n_disks
+    end function ill_fitting
   end subroutine open_next_span
-
-  !> Whether windows turned out far too narrow or too wide since the last filling, which must be so long ago that
-  !> filing all disks again pays.
-  pure function ill_fitting(self) result(yes)
-    class(event_queue_t), intent(in) :: self
-    logical :: yes
-    real(real64) :: per_window
-
-    per_window = max(self%n_taken, 1_int64)*self%width/(self%width*self%next_window - self%filled_at)
-    yes = (abs(log(per_window/events_per_window)) > log(1.5_real64) .or. self%n_taken == 0) &
-      .and. 4*(self%window - self%filled_at*self%per_time) > self%n_disks
-  end function ill_fitting
 
 end module event_queue

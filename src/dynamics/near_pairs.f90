@@ -60,7 +60,7 @@ contains
     end if
     self%known = .not. all_pairs
     self%from = x
-    self%skin = merge(0.0_real64, wanted_skin(sim, step), all_pairs)
+    self%skin = merge(0.0_real64, wanted_skin(), all_pairs)
     self%n = 0
     if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100), self%hit(100))
     do k = n_sides + 1, size(sim%box%surface)
@@ -76,6 +76,21 @@ contains
       bins = int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32)
     end if
     call list_disks(self, sim, x, bins)
+  contains
+
+    !> Wide enough to serve many steps, not so wide that most pairs are far apart. Affects the cost only.
+    pure function wanted_skin() result(skin)
+      real(real64) :: skin, diameter, reach, fastest
+      integer(int32) :: i
+
+      fastest = 0
+      do i = 1, sim%n_disks()
+        fastest = max(fastest, sum(sim%velocity(i)**2))
+      end do
+      diameter = 2*sum(sim%disk%radius)/sim%n_disks()
+      reach = sqrt(2*pairs_per_disk/pi*product(sim%box%edges())/sim%n_disks())
+      skin = max(min(2*steps_per_list*step*sqrt(fastest), reach - diameter), least_skin*diameter)
+    end function wanted_skin
   end subroutine update
 
   !> How many disks have moved by some length or more.
@@ -111,22 +126,6 @@ contains
       end do
     end associate
   end subroutine mark_overlaps
-
-  !> Wide enough to serve many steps, not so wide that most pairs are far apart. Affects the cost only.
-  pure function wanted_skin(sim, step) result(skin)
-    type(simulation_t), intent(in) :: sim
-    real(real64), intent(in) :: step
-    real(real64) :: skin, diameter, reach, fastest
-    integer(int32) :: i
-
-    fastest = 0
-    do i = 1, sim%n_disks()
-      fastest = max(fastest, sum(sim%velocity(i)**2))
-    end do
-    diameter = 2*sum(sim%disk%radius)/sim%n_disks()
-    reach = sqrt(2*pairs_per_disk/pi*product(sim%box%edges())/sim%n_disks())
-    skin = max(min(2*steps_per_list*step*sqrt(fastest), reach - diameter), least_skin*diameter)
-  end function wanted_skin
 
   !> Adds the pairs of disks. Each looks for smaller ones, or equal ones of higher numbers: so a small disk searches only
   !> bins close by, however large the largest disk is. Bins go on round the box; at walls that does no harm.

@@ -308,98 +308,87 @@ contains
     integer(int32), intent(in) :: i
     type(prospect_t) :: near
 
+    near%disk = i
     if (sim%disk(i)%radius > self%patch%small) then
-      call find_event_of_big(self, sim, i, near)
+      call find_event_of_big()
     else if (.not. self%patch%holds(sim%tag(i)%cell)) then
       call self%take_out(sim%tag(i), i)
       sim%disk(i)%stamp = sim%disk(i)%stamp + 1
       near%time = 2*never
       near%partner = nothing
     else
-      call find_event_of_small(self, sim, i, near)
+      call find_event_of_small()
     end if
     sim%disk(i)%event_time = near%time
     sim%disk(i)%partner = near%partner
     sim%tag(i)%partner_stamp = sim%disk(max(near%partner, 1))%stamp
-  end subroutine predict_with_care
+  contains
 
-  !> The earliest event of a small disk.
-  subroutine find_event_of_small(self, sim, i, near)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    type(prospect_t), intent(out) :: near
-    real(real64) :: t
+    !> The earliest event of a small disk.
+    subroutine find_event_of_small()
+      real(real64) :: t
 
-    near%disk = i
-    associate (cell => sim%tag(i)%cell)
-      call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
-      near%cell = self%cells%number(cell)
-      if (self%reach%has_any(cell)) call scan_reach(self, sim, self%reach%first(cell(1), cell(2)), near)
-      if (self%patch%at_seam(cell)) then
-        t = self%images%look_again(sim%now, self%patch%width(1))
-        if (t < near%time) near%partner = looks_again
-        near%time = min(t, near%time)
-        call scan_around_seam(self%cells, self%patch, sim, self%images, near)
-      else
-        call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
-        call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-        call scan_chains_around(self%cells, sim, near)
-      end if
-    end associate
-  end subroutine find_event_of_small
-
-  !> The contacts of a small disk with what reaches into its cell.
-  subroutine scan_reach(self, sim, first, near)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: first            !! entry in the list of the cell
-    type(prospect_t), intent(inout) :: near
-    integer(int32) :: e
-
-    e = first
-    do while (e > 0)
-      associate (entry => self%reach%entry(e), i => near%disk)
-        if (entry%code > 0) then
-          call scan_one(sim, entry%code, self%images%image(real(entry%image, real64)), near)
+      associate (cell => sim%tag(i)%cell)
+        call self%faces%next(sim%disk(i), cell, sim%now, self%faces%falling, near%time, near%partner)
+        near%cell = self%cells%number(cell)
+        if (self%reach%has_any(cell)) call scan_reach(self%reach%first(cell(1), cell(2)))
+        if (self%patch%at_seam(cell)) then
+          t = self%images%look_again(sim%now, self%patch%width(1))
+          if (t < near%time) near%partner = looks_again
+          near%time = min(t, near%time)
+          call scan_around_seam(self%cells, self%patch, sim, self%images, near)
         else
-          call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [entry%code], near%time, near%partner)
+          call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
+          call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
+          call scan_chains_around(self%cells, sim, near)
         end if
-        e = entry%next
       end associate
-    end do
-  end subroutine scan_reach
+    end subroutine find_event_of_small
 
-  !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
-  !> the cells along its rim.
-  subroutine find_event_of_big(self, sim, i, near)
-    class(cell_grid_t), intent(in) :: self
-    type(simulation_t), intent(in) :: sim
-    integer(int32), intent(in) :: i
-    type(prospect_t), intent(out) :: near
-    real(real64) :: t_margin
-    integer(int32) :: number, m, image
+    !> The contacts of a small disk with what reaches into its cell.
+    subroutine scan_reach(first)
+      integer(int32), intent(in) :: first            !! entry in the list of the cell
+      integer(int32) :: e
 
-    near%disk = i
-    number = self%reach%number_of(i)
-    call next_side(sim%box, sim%disk(i), near%time, near%partner)
-    call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(1 - m, m=n_sides + 1, size(sim%box%surface))], &
-      near%time, near%partner)
-    t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
-      sim%box%gravity, self%reach%margin, inside=.true.)
-    if (t_margin < near%time) near%partner = looks_again
-    near%time = min(near%time, t_margin)
-    do image = 1, self%images%count()
-      do m = 1, size(self%reach%big, kind=int32)
-        call scan_one(sim, self%reach%big(m)%disk, self%images%image(self%images%around(image)), near)
+      e = first
+      do while (e > 0)
+        associate (entry => self%reach%entry(e))
+          if (entry%code > 0) then
+            call scan_one(sim, entry%code, self%images%image(real(entry%image, real64)), near)
+          else
+            call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [entry%code], near%time, near%partner)
+          end if
+          e = entry%next
+        end associate
       end do
-    end do
-    do m = 1, size(self%reach%big(number)%rim, kind=int32)
-      associate (place => self%reach%big(number)%rim(m))
-        call scan_cells(self%cells, sim, [place%cell(1) + self%cells%stride*place%cell(2)], near, &
-          self%images%image(real(-place%image, real64)))
-      end associate
-    end do
-  end subroutine find_event_of_big
+    end subroutine scan_reach
+
+    !> The earliest event of a big disk: side, obstacle, end of its margin, another big disk, or a small one in
+    !> the cells along its rim.
+    subroutine find_event_of_big()
+      real(real64) :: t_margin
+      integer(int32) :: number, m, image
+
+      number = self%reach%number_of(i)
+      call next_side(sim%box, sim%disk(i), near%time, near%partner)
+      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(1 - m, m=n_sides + 1, size(sim%box%surface))], &
+        near%time, near%partner)
+      t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
+        sim%box%gravity, self%reach%margin, inside=.true.)
+      if (t_margin < near%time) near%partner = looks_again
+      near%time = min(near%time, t_margin)
+      do image = 1, self%images%count()
+        do m = 1, size(self%reach%big, kind=int32)
+          call scan_one(sim, self%reach%big(m)%disk, self%images%image(self%images%around(image)), near)
+        end do
+      end do
+      do m = 1, size(self%reach%big(number)%rim, kind=int32)
+        associate (place => self%reach%big(number)%rim(m))
+          call scan_cells(self%cells, sim, [place%cell(1) + self%cells%stride*place%cell(2)], near, &
+            self%images%image(real(-place%image, real64)))
+        end associate
+      end do
+    end subroutine find_event_of_big
+  end subroutine predict_with_care
 
 end module cell_grid
