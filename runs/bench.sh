@@ -209,7 +209,7 @@ instructions() {
   shift 2
   gas 1000 "$packing"
   run_by=(valgrind --tool=callgrind --callgrind-out-file=/dev/null)
-  run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,renumbering_MOD_renumber,epochs_MOD_move_origin}'*')
+  run_by+=(--toggle-collect=__{event_driven_MOD_advance,event_driven_MOD_start,epochs_MOD_move_epoch}'*')
   run "gas_1000_$packing" "$collisions" "$@" >/dev/null 2>"$work/count" || { cat "$work/count" >&2; return 1; }
   awk '/Collected/ { print $4 }' "$work/count"
 }

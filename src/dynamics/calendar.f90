@@ -50,6 +50,7 @@ module calendar
     procedure :: begin
     procedure :: put_near
     procedure :: put_far
+    procedure :: span_begins
     procedure :: open_span
     procedure :: list_coming
     procedure, private :: add_chunk                ! bound, so that it is not inlined into the hot path
@@ -149,6 +150,15 @@ contains
     self%filed(chunk*c)%disk = shiftr(place, log_chunk) - 1
     place = chunk*c + 1
   end subroutine add_chunk
+
+  !> Whether a window is the first of a span.
+  pure function span_begins(self, window) result(yes)
+    class(calendar_t), intent(in) :: self
+    integer(int32), intent(in) :: window
+    logical :: yes
+
+    yes = iand(window, shiftl(1_int32, self%log_span) - 1) == 0
+  end function span_begins
 
   !> Moves the events of the next span into their buckets. Those of a later turn stay, if they are still what their
   !> disks expect; those whose bucket is full are given back.

@@ -300,7 +300,7 @@ contains
     call take_bucket(self%calendar%bucket(iand(self%window, self%calendar%last_bucket)), disk, tag, self%per_time, &
       self%next_window, self%near, self%n_near)
     if (self%heap%n > 0) call self%take_from_heap(disk, tag)
-    if (iand(self%window, shiftl(1_int32, self%calendar%log_span) - 1) == 0) call self%open_next_span(disk, tag)
+    if (self%calendar%span_begins(self%window)) call self%open_next_span(disk, tag)
   end subroutine open_next_window
 
   !> Empties a bucket into a sorted list: the events that its disks expect before the next window; other entries are

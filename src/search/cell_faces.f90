@@ -48,6 +48,7 @@ module cell_faces
   type :: cell_faces_t
     real(real64) :: width(2) = 0.0_real64          !! from cell to cell [length]
     real(real64) :: overlap(2) = 0.0_real64        !! of neighbouring cells [length]
+    logical :: moving = .false.                    !! sides move
     logical :: falling = .false.                   !! disks fly on parabolas, or sides move: more than one face is in question
     type(box_t) :: box
     type(line_t), allocatable :: column(:, :)      !! (0:1,columns) their left and right faces
@@ -170,7 +171,8 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%falling = box%falling() .or. box%has_moving_sides()
+    self%moving = box%has_moving_sides()
+    self%falling = box%falling() .or. self%moving
     self%box = box
     call cut(1, self%column)
     call cut(2, self%row)
@@ -323,17 +325,17 @@ contains
     real(real64) :: t_x, t_y
     integer(int32) :: code_x, code_y
 
-    call next_along(self%column(:, cell(1)), 1, self%box, disk, now, t_x, code_x)
-    call next_along(self%row(:, cell(2)), 2, self%box, disk, now, t_y, code_y)
+    call next_along(self, self%column(:, cell(1)), 1, disk, now, t_x, code_x)
+    call next_along(self, self%row(:, cell(2)), 2, disk, now, t_y, code_y)
     code = chosen(code_x, code_y, t_y < t_x)
     t = merge(t_y, t_x, t_y < t_x)
   end subroutine next_falling
 
   !> The same along one axis.
-  pure subroutine next_along(line, axis, box, disk, now, t, code)
+  pure subroutine next_along(self, line, axis, disk, now, t, code)
+    class(cell_faces_t), intent(in) :: self
     type(line_t), intent(in) :: line(0:1)          !! of the disk's cell
     integer(int32), intent(in) :: axis
-    type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     real(real64), intent(in) :: now
     real(real64), intent(out) :: t
@@ -341,16 +343,19 @@ contains
     real(real64) :: g, x, v, sense, gap, disc, t_other
     integer(int32) :: up
 
-    g = box%gravity(axis)
+    g = self%box%gravity(axis)
     up = merge(1, 0, disk%v(axis) > 0)
-    if (any(line%struck)) then
-      call next_moving(line, axis, box, disk, now, t, code)
-      return
-    else if (.not. abs(g) > 0) then
+    if (self%moving) then                          ! asked first, as it is seldom so
+      if (any(line%struck)) then
+        call next_moving(line, axis, self%box, disk, now, t, code)
+        return
+      end if
+    end if
+    if (.not. abs(g) > 0) then
       t = line_time(line(up), disk, axis)
     else if (any(is_wall(line%code))) then
-      t = falling_time(line(up), axis, box, disk, now)
-      t_other = falling_time(line(1 - up), axis, box, disk, now)
+      t = falling_time(line(up), axis, self%box, disk, now)
+      t_other = falling_time(line(1 - up), axis, self%box, disk, now)
       up = chosen(up, 1 - up, t_other < t)
       t = min(t, t_other)
     else                                           ! forward, or, if gravity turns the disk before, back
