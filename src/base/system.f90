@@ -51,13 +51,6 @@ module system
       character(kind=c_char), intent(in) :: from(*), to(*)
       integer(c_int) :: status
     end function naming_call
-
-    !> A question whose answer is a text of at most `size` characters.
-    subroutine text_call(text, size) bind(C)
-      import :: c_char, c_size_t
-      character(kind=c_char), intent(out) :: text(*)
-      integer(c_size_t), value :: size
-    end subroutine text_call
   end interface
 
   interface
@@ -83,6 +76,18 @@ module system
       import :: c_int
       integer(c_int) :: n
     end function cores_of_process
+
+    subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
+      import :: c_char, c_size_t
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_size_t), value :: size
+    end subroutine c_describe_problem
+
+    subroutine c_name_host(text, size) bind(C, name="system_name_host")
+      import :: c_char, c_size_t
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_size_t), value :: size
+    end subroutine c_name_host
 
     function c_read_bytes(path, bytes, count) bind(C, name="system_read_bytes") result(n)
       import :: c_char, c_int64_t
@@ -132,8 +137,6 @@ module system
   procedure(path_call), bind(C, name="system_lock") :: c_lock         !! returns a descriptor or a number above
   procedure(path_call), bind(C, name="system_print") :: c_print
   procedure(path_call), bind(C, name="unlink") :: c_unlink
-  procedure(text_call), bind(C, name="system_describe_problem") :: c_describe_problem
-  procedure(text_call), bind(C, name="system_name_host") :: c_name_host
   procedure(size_call), bind(C, name="system_free_bytes") :: c_free_bytes     !! on the disk of a folder
   procedure(size_call), bind(C, name="system_file_size") :: c_file_size
   procedure(naming_call), bind(C, name="rename") :: c_rename
