@@ -1,21 +1,18 @@
 """Seeds faults, one at a time, and says which test catches each: before and after tests are cut.
 
-    python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD] [--table tests/mutants.toml]
+    python tests/mutants.py [NAME...] [--jobs 2] [--commit HEAD]
     python tests/mutants.py --check
 
 It works in build/mutants, on a copy of the last commit, and goes on where it was stopped:
 `results` there has a line for each mutant of each commit. The copy is tested without a fault first.
-Then for each mutant of the table: the unit tests, the file of the test that caught it before, and
-all others, up to the first that fails. Some minutes each on two quiet cores, as long as `make test`
-for one that survives. Run it with `nice` beside other work; what waits too long on a busy machine
-is no catch, and `NAME.log` there shows it. `--check` only looks whether each text is found once.
+Then for each mutant: the unit tests and all others, up to the first that fails. Some minutes each
+on two quiet cores, as long as `make test` for one that survives. Run it with `nice` beside other
+work; what waits too long on a busy machine is no catch, and `NAME.log` there shows it. `--check`
+only looks whether each text is found once.
 
-In the table `before` says what caught a fault when it was drawn. A fault is a sentence; `file`,
-`old` and `new` express it in the sources as they are now. Whoever rebuilds the code expresses the
-same sentence anew; git has the former texts, and this tests them as they were:
-
-    git show COMMIT:tests/mutants.toml > old.toml
-    python tests/mutants.py --commit 67f9503 --table old.toml
+In mutants.diff a fault is a sentence, and a change that expresses it in the sources as they are
+now. Whoever rebuilds the code expresses the same sentence anew; the former ones are in git, and are
+tried by a clone that is set to the commit that has them.
 
 The 24 were drawn from commit 67f9503 by `random.Random(20261124)`: two from each folder of src/,
 one from run.f90, three from post/. A draw takes a kind of fault (a sign; a comparison, which may
@@ -31,8 +28,8 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRATCH = ROOT / "build" / "mutants"
@@ -40,7 +37,7 @@ UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
 PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all"
 PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly "
-TEST = re.compile(r"tests/[\w/]+\.py")
+MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", re.MULTILINE)
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)
 
 
@@ -61,22 +58,38 @@ def check_out(commit: str) -> Path:
     return tree
 
 
-def applies(mutant: dict[str, str], tree: Path) -> bool:
+class Mutant(NamedTuple):
+    """What replaces which text of a file."""
+
+    file: str
+    old: str
+    new: str
+
+
+def mutants() -> dict[str, Mutant]:
+    """Those of mutants.diff by name."""
+    found = {}
+    for name, file, change in MUTANT.findall((ROOT / "tests" / "mutants.diff").read_text()):
+        lines = change.splitlines()
+        sides = ("".join(f"{line[1:]}\n" for line in lines if line[:1] != mark) for mark in "+-")
+        found[name] = Mutant(file, *sides)
+    return found
+
+
+def applies(mutant: Mutant, tree: Path) -> bool:
     """Whether the text that a mutant replaces is there, once."""
-    path = tree / mutant["file"]
-    return path.exists() and path.read_text().count(mutant["old"]) == 1
+    path = tree / mutant.file
+    return path.exists() and path.read_text().count(mutant.old) == 1
 
 
-def outcome(tree: Path, mutant: dict[str, str] | None, jobs: int, log: Path) -> str:
+def outcome(tree: Path, mutant: Mutant | None, jobs: int, log: Path) -> str:
     """What the tests say of a tree with a fault, or without any."""
     steps = [*UNIT_TESTS, PROGRAM, PYTEST + "tests"]
     if mutant:
         if not applies(mutant, tree):
             return "does not apply"
-        path = tree / mutant["file"]
-        path.write_text(path.read_text().replace(mutant["old"], mutant["new"]))
-        likely = {file for file in TEST.findall(mutant.get("before", "")) if (tree / file).exists()}
-        steps[3:3] = [PYTEST + " ".join(likely)] if likely else []
+        path = tree / mutant.file
+        path.write_text(path.read_text().replace(mutant.old, mutant.new))
         if path.is_relative_to(tree / "post"):
             steps = steps[2:]
     for step in steps:
@@ -92,15 +105,14 @@ def outcome(tree: Path, mutant: dict[str, str] | None, jobs: int, log: Path) -> 
 
 
 def main() -> int:
-    """Prints what becomes of each mutant; 1 if one survives that was caught before."""
+    """Prints what becomes of each mutant; 1 if one survives."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="of the mutants [all]")
     parser.add_argument("--jobs", type=int, default=2, help="at a time [%(default)s]")
     parser.add_argument("--commit", default="HEAD", help="what is tested [%(default)s]")
-    parser.add_argument("--table", type=Path, default=ROOT / "tests" / "mutants.toml")
     parser.add_argument("--check", action="store_true", help="only whether all texts are found")
     args = parser.parse_args()
-    table = tomllib.loads(args.table.read_text())
+    table = mutants()
     if unknown := set(args.names) - set(table):
         parser.error(f"not in the table: {', '.join(unknown)}")
     if args.check:
@@ -112,7 +124,7 @@ def main() -> int:
     results = SCRATCH / "results"
     results.touch()
     known = dict(line.split("\t") for line in results.read_text().splitlines())
-    worse = 0
+    survived = 0
     for name in ["nothing", *(args.names or table)]:
         key, mutant = f"{commit} {name}", table.get(name)
         if key not in known:
@@ -123,8 +135,8 @@ def main() -> int:
         if not mutant and known[key] != "survived":
             print("The tests fail without a fault: first make them pass.", file=sys.stderr)
             return 1
-        worse += known[key] == "survived" and "caught" in (mutant or {}).get("before", "")
-    return 1 if worse else 0
+        survived += bool(mutant) and known[key] == "survived"
+    return 1 if survived else 0
 
 
 if __name__ == "__main__":
