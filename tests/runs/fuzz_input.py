@@ -1,8 +1,8 @@
 """Feeds the program thousands of damaged input files and judges what it makes of them.
 
 Whatever the file, --check must end within seconds with status 0 or 2, without a backtrace. Refused,
-the lines name the file; accepted, --print-input says what an independent reading of the file
-(below, by another method) gives.
+the lines name the file; accepted, what --print-input says of it is the same when it is written anew
+and read again.
 
     python tests/runs/fuzz_input.py --count 10000 --program build/ricochet
 """
@@ -21,7 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests"))
+sys.path += [str(ROOT / "tests"), str(ROOT / "post")]
+from ricochet.program import namelist  # noqa: E402
 from whole_runs import PATIENCE, within  # noqa: E402
 
 MOST_SECONDS = 5  # of processor time
@@ -151,151 +152,36 @@ INJURIES = [flip_byte, drop_bytes, insert_token, insert_token, change_number, ch
 INJURIES += [shuffle_lines, truncate, change_layout, insert_space, insert_space, change_digit]
 
 
-class Malformed(Exception):
-    """The independent reading finds no valid namelist."""
-
-
-WORD = re.compile(
-    r"""(?P<space>(?:[ \t\n]|![^\n]*)+)|(?P<text>'(?:[^'\n]|'')*'|"(?:[^"\n]|"")*")"""
-    r"""|(?P<word>[\w.+\-*]+)|(?P<mark>[&/,=()])""",
-    re.ASCII,
-)
-
-
-def tokens_of(data: bytes) -> list[tuple[str, str]]:
-    """(kind, text) of each word, text, mark; blanks only where they stand after `&`."""
-    text = data.decode("utf-8", "surrogateescape").removeprefix("\ufeff")
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    tokens, place = [], 0
-    while place < len(text):
-        found = WORD.match(text, place)
-        if not found:
-            raise Malformed(f"unexpected {text[place:][:10]!r}")
-        if found.lastgroup != "space":
-            tokens.append((found.lastgroup, found[0]))
-        place = found.end()
-    return [*tokens, ("end", "")]
-
-
-def read_namelist(data: bytes) -> list[tuple[str, dict]]:
-    """(group, {variable or (variable, element): [value, ...]}) in the order of the file."""
-    tokens = tokens_of(data)
-    groups: list[tuple[str, dict]] = []
-    at = 0
-
-    def take(kind: str, text: str | None = None) -> str:
-        nonlocal at
-        if tokens[at][0] != kind or text not in (None, tokens[at][1]):
-            raise Malformed(f"{tokens[at]} instead of {text or kind}")
-        at += 1
-        return tokens[at - 1][1]
-
-    while tokens[at][0] != "end":
-        take("mark", "&")
-        group: dict = {}
-        groups.append((take("word").lower(), group))
-        while tokens[at] != ("mark", "/"):
-            name: str | tuple = take("word").lower()
-            if tokens[at] == ("mark", "("):
-                at += 1
-                name = (name, int(take("word")))
-                take("mark", ")")
-            take("mark", "=")
-            if name in group:
-                raise Malformed(f"{name} twice")
-            group[name] = values = []
-            while True:
-                kind, text = tokens[at]
-                is_name = kind == "word" and tokens[at + 1] in (("mark", "="), ("mark", "("))
-                if kind in ("text", "word") and not is_name:
-                    values.append(text)
-                elif text != ",":
-                    break
-                at += 1
-        at += 1
-    return groups
-
-
-def plain(values: list[str]) -> list:
-    """Values as Python has them: repeats spelt out, texts, truths, numbers."""
-    spelt: list = []
-    repeats = 1
-    for value in values:
-        count, single = re.fullmatch(r"(?:(\d+)\*)?(.*)", value).groups()
-        repeats *= int(count or 1)
-        if single:
-            spelt += [plain_value(single)] * repeats
-            repeats = 1
-    return spelt
-
-
-def plain_value(value: str) -> object:
-    if value[0] in "'\"":
-        quote = value[0]
-        return value[1:-1].replace(quote * 2, quote).rstrip(" ")
-    if value.lower() in (".true.", "true", "t", ".t."):
-        return True
-    if value.lower() in (".false.", "false", "f", ".f."):
-        return False
-    if re.fullmatch(r"[+-]?\d+", value):
-        return int(value)
-    return float(value.lower().replace("d", "e"))
-
-
-def alike(found: object, wanted: object) -> bool:
-    """Whether two values are the same; a real may be written as an integer."""
-    return found == (float(wanted) if isinstance(found, float) else wanted)
-
-
-def contradiction(data: bytes, groups: list[dict]) -> str | None:
-    """What the independent reading has against the groups of --print-input; None if nothing."""
-    try:
-        expected = read_namelist(data)
-    except (Malformed, ValueError) as reason:
-        return f"accepted, but malformed: {reason}"
-    if [name for name, _ in expected] != [group["group"] for group in groups]:
-        return f"other groups than {[name for name, _ in expected]}"
-    for (name, variables), group in zip(expected, groups, strict=True):
-        for key, written in variables.items():
-            variable, element = key if isinstance(key, tuple) else (key, None)
-            found = group["values"].get(variable)
-            found = found[element - 1] if element and isinstance(found, list) else found
-            found = found if isinstance(found, list) else [found]
-            wanted = plain(written)
-            if len(found) != len(wanted) or not all(map(alike, found, wanted)):
-                return f"{name}.{key} is {wanted}, taken as {found}"
-        surplus = group["values"].keys() - {
-            key[0] if isinstance(key, tuple) else key for key in variables
-        }
-        if surplus:
-            return f"{name} has {surplus}"
-    return None
-
-
 def judge(program: str, data: bytes, path: Path) -> tuple[str, str]:
     """('accepted' or 'refused' or the fault, details)."""
     path.write_bytes(data)
-    runs = [
-        subprocess.run(
-            [*within(MOST_SECONDS), program, path, option],
-            check=False,
-            capture_output=True,
-            timeout=PATIENCE,
-        )
-        for option in ("--check", "--print-input")
-    ]
-    if any(run.returncode == -signal.SIGKILL for run in runs):
+    run = asked(program, path, "--check")
+    errors = run.stderr.decode("utf-8", "replace").rstrip("\n")
+    if run.returncode == -signal.SIGKILL:
         return "hang", ""
-    errors = runs[0].stderr.decode("utf-8", "replace").rstrip("\n")
-    if runs[0].returncode not in (0, 2) or re.search(r"backtrace|SIG[A-Z]+|libgfortran", errors):
-        return "crash", f"status {runs[0].returncode}\n{errors}"
-    if runs[0].returncode == 0:
-        against = contradiction(data, json.loads(runs[1].stdout.decode("utf-8", "surrogateescape")))
-        return ("misread", against) if against else ("accepted", "")
+    if run.returncode not in (0, 2) or re.search(r"backtrace|SIG[A-Z]+|libgfortran", errors):
+        return "crash", f"status {run.returncode}\n{errors}"
+    if run.returncode == 0:
+        once = printed(program, path)
+        text = "".join(namelist({group: values}) for group, values in once)
+        path.write_bytes(text.encode("utf-8", "surrogateescape"))
+        twice = printed(program, path)
+        return ("accepted", "") if once == twice else ("misread", f"{once}, then {twice}")
     lines = [line for line in errors.split("\n") if not line.startswith("placing disks")]
     if not all(line.startswith(f"{path}:") for line in lines):
         return "unclear message", errors
     return "refused", errors
+
+
+def asked(program: str, path: Path, option: str) -> subprocess.CompletedProcess:
+    command = [*within(MOST_SECONDS), program, path, option]
+    return subprocess.run(command, check=False, capture_output=True, timeout=PATIENCE)
+
+
+def printed(program: str, path: Path) -> list[tuple[str, dict]]:
+    """Groups of an input file and their values."""
+    told = asked(program, path, "--print-input").stdout.decode("utf-8", "surrogateescape")
+    return [(group["group"], group["values"]) for group in json.loads(told or "[]")]
 
 
 def cases(count: int, seed: int):

@@ -1,8 +1,10 @@
 """What the program makes of input files, good, bad and absurd, and of its command line."""
 
+import itertools
 import json
 import math
 import os
+import random
 import re
 import subprocess
 from pathlib import Path
@@ -81,30 +83,74 @@ def test_an_input_that_is_printed_written_and_read_again_is_the_same(ricochet, t
     ]
 
 
-def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path):
-    text = """\ufeff&RUN Title = 'an "odd" \\ one / it''s\t\u00f6' ! & no = 1\r
-    seed=9223372036854775807/ ! &box gravity = 1, 1 /\r
-    &box gravity(2) = -1.5d0, upper = 2*2 /
-    &species count = 5, radius = .05 speed = 1 /
-    &stop collisions = 9 / &output event_log = T /"""
+SPACES = [" ", "\n", "\t", "\r\n", " \r", " ! a / & ' = 1\n \n"]
+LETTERS = "a1 '\"\\&/=!,()*\t\u00f6"
+
+
+def drawn(rng: random.Random, row: dict) -> object:
+    """A value that a variable may have, or a list of them."""
+    if row["size"] != 1:
+        few = [drawn(rng, row | {"size": 1}) for _ in range(rng.randint(1, 3))]
+        return [rng.choice(few) for _ in range(row["size"] or rng.randint(2, 9))]
+    if row["type"] == "logical":
+        return rng.random() < 0.5
+    if row["type"] == "text":
+        return rng.choice(row["choices"] or ["".join(rng.choices(LETTERS, k=9)) + "x"])
+    low, high = row["from"] or row["above"] or 0, row["to"] or row["below"]
+    if row["type"] == "integer":
+        return rng.randint(int(low) + 1, int(high or 2**63 - 1))
+    return rng.uniform(low, high) if high else rng.choice([1, 7.5, 10.0 ** rng.uniform(-90, 90)])
+
+
+def spelt(rng: random.Random, value: object) -> str:
+    """One of the ways to write a value, or a list; of a list what is equal may be counted."""
+    if isinstance(value, list):
+        words = []
+        for one, row in itertools.groupby(value):
+            times = len(list(row))
+            word = spelt(rng, one)
+            words += [f"{times}*{word}"] if rng.random() < 0.5 else [word] * times
+        return words[0] + "".join(rng.choice([",", " , ", *SPACES]) + word for word in words[1:])
+    if isinstance(value, bool):
+        return rng.choice(["T", ".true.", "True", ".t."] if value else ["f", ".FALSE.", "false"])
+    if isinstance(value, str):
+        quote = rng.choice("'\"")
+        return quote + value.replace(quote, 2 * quote) + quote
+    sign = "-" if value < 0 else rng.choice(["", "+", "0"])
+    number = repr(abs(value)).replace("e", rng.choice("eEdD"))
+    return sign + rng.choice([number, number.removeprefix("0")] if "." in number else [number])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_values_in_all_their_spellings_are_printed(ricochet, tmp_path, seed):
+    """Also of an input that is refused since they do not go together."""
+    rng = random.Random(seed)
+    table = json.loads(ricochet("--print-variables").stdout)
+    text, written = rng.choice(["", "\ufeff"]), []
+    for group in rng.sample(sorted(table.keys() - {"contact"}), rng.randint(1, 5)):
+        names = table[group].keys() - ({"name"} if group != "side" else set())
+        values = {name: drawn(rng, table[group][name]) for name in rng.sample(sorted(names), 4)}
+        text += "&" + rng.choice([group, group.upper()]) + rng.choice(SPACES)
+        for name, value in values.items():
+            parts = [(name, value)]
+            if group == "box" and isinstance(value, list) and rng.random() < 0.5:
+                parts = [(f"{name}({k + 1})", one) for k, one in enumerate(value)]
+                rng.shuffle(parts)
+            for left, right in parts:
+                word = rng.choice([left, left.title()]) + rng.choice(["", *SPACES])
+                text += word + "=" + rng.choice(["", *SPACES]) + spelt(rng, right)
+                text += rng.choice([", ", *SPACES])
+        text += "/" + rng.choice(SPACES)
+        written.append((group, values))
     (tmp_path / "odd.nml").write_text(text, newline="")
-    groups = groups_of(ricochet, "odd.nml", "--set", "run.threads=2", "--set", "contact.inertia=1")
-    assert [(group["group"], group["name"], group["values"]) for group in groups] == [
-        (
-            "run",
-            None,
-            {"title": 'an "odd" \\ one / it\'s\t\u00f6', "seed": 2**63 - 1, "threads": 2},
-        ),
-        ("box", None, {"upper": [2, 2], "gravity": [0, -1.5]}),
-        ("species", "species1", {"count": 5, "radius": 0.05, "speed": 1}),
-        ("stop", None, {"collisions": 9}),
-        ("output", None, {"event_log": True}),
-        ("contact", None, {"inertia": 1}),
-    ]
+    told = ricochet("--print-input", "odd.nml", "--set", "contact.inertia=0.5")
+    groups = json.loads(told.stdout)
+    written.append(("contact", {"inertia": 0.5}))
+    assert [(group["group"], group["values"]) for group in groups] == written, told.stderr
     data = text.removeprefix("\ufeff").replace("\r\n", "\n").encode()
     places = [(group["from"], group["to"]) for group in groups]
-    assert places[-1] == (None, None)
-    assert all(data[a : a + 1] + data[b - 1 : b] == b"&/" for a, b in places[:-1])
+    assert places.pop() == (None, None)
+    assert all(data[a : a + 1] + data[b - 1 : b] == b"&/" for a, b in places)
 
 
 def test_of_a_wrong_input_what_is_understood_is_printed(ricochet, tmp_path):
