@@ -29,6 +29,8 @@ def bed(tmp_path):
         "radius": rng.uniform(0.01, 0.06, COUNT),
         "mass": rng.uniform(0.1, 9, COUNT),
         "species": np.where(np.arange(COUNT) % 10 == 3, "stone", "bed"),
+        "angular_velocity": rng.normal(size=COUNT),
+        "orientation": rng.uniform(-9, 9, COUNT),
     }
     write_start(tmp_path / "bed.txt", **arrays)
     write_input(tmp_path, INPUT)
@@ -47,92 +49,58 @@ def finished(ricochet, path, *options):
     return run
 
 
-def test_every_column_arrives_to_the_last_digit(ricochet, tmp_path, bed):
-    names, disks = (tmp_path / "bed.txt").read_text().split("\n", 1)
-    text = f"# a bed\n{names.upper()}\n\n" + disks.replace(" ", ",\t")
-    (tmp_path / "bed.txt").write_text("\ufeff" + text.replace("\n", "\r\n") + "# its end")
-    finished(ricochet, "gas.h5")
-    run, there = read_run(tmp_path / "gas.h5"), by_species(bed)
-    for name in ("radius", "mass"):
-        assert (getattr(run, name) == there[name]).all()
-    assert (run.position[0] == there["position"]).all()
-    assert (run.velocity[0] == there["velocity"]).all()
-    assert [kind.disks.sum() for kind in run.by_species] == [108, 12]
-    own = run.parameters["species"]["bed"]
-    assert own["count"] == 108 and "mass" not in own and "radius" not in own
-    area = np.pi * np.sum(there["radius"][:108] ** 2)
-    assert own["packing_fraction"] == pytest.approx(area / 2)
-
-
-def test_a_run_from_the_last_frame_of_another_has_its_disks(ricochet, tmp_path, bed):
-    finished(ricochet, "gas.h5")
-    write_input(tmp_path, INPUT.replace("bed.txt", "gas.h5"), "gas.nml")
-    finished(ricochet, "next.h5")
-    one, other = read_run(tmp_path / "gas.h5"), read_run(tmp_path / "next.h5")
-    assert (one.position[-1] == other.position[0]).all()
-    assert (one.radius == other.radius).all() and (one.mass == other.mass).all()
-    finished(
-        ricochet, "equal.h5", "--set", "species.bed.radius=0.01", "--set", "species.bed.mass=2"
-    )
-    equal = read_run(tmp_path / "equal.h5")  # what the input says counts
-    assert set(equal.radius[:108]) == {0.01} and set(equal.mass[:108]) == {2}
-    assert (equal.radius[108:] == one.radius[108:]).all()
+def disks_in(path, frame):
+    """What each disk has at a frame."""
+    with h5py.File(path) as file:
+        disks = file["particles/disks"]
+        moving = ("position", "velocity", "angular_velocity", "orientation")
+        found = {name: disks[f"{name}/value"][frame] for name in moving}
+        return found | {name: disks[name][:] for name in ("radius", "mass")}
 
 
 SPINNING = INPUT + "&contact tangential_restitution = 0.3 friction = 0.2 restitution = 0.9 /"
 
 
-@pytest.fixture
-def spins(tmp_path, bed):
-    """The bed with a spin and a direction of each disk."""
-    rng = np.random.default_rng(8)
-    bed |= {"angular_velocity": rng.normal(size=COUNT), "orientation": rng.uniform(-9, 9, COUNT)}
-    write_start(tmp_path / "bed.txt", **bed)
-    return bed
-
-
-def turning(path):
-    """Angular velocities and orientations of all frames."""
-    with h5py.File(path) as file:
-        disks = file["particles/disks"]
-        return {name: disks[f"{name}/value"][:] for name in ("angular_velocity", "orientation")}
-
-
 @pytest.mark.parametrize("text", [INPUT, SPINNING])
-def test_spins_and_directions_arrive_to_the_last_digit(ricochet, tmp_path, spins, text):
-    """They let disks turn, smooth ones too; whether the input has the sizes does not matter."""
+def test_every_column_arrives_to_the_last_digit_and_that_of_a_last_frame(
+    ricochet, tmp_path, bed, text
+):
+    """Spins let disks turn, smooth ones too; what the input says of a species counts instead."""
+    names, rows = (tmp_path / "bed.txt").read_text().split("\n", 1)
+    rows = f"# a bed\n{names.upper()}\n\n" + rows.replace(" ", ",\t")
+    (tmp_path / "bed.txt").write_text("\ufeff" + rows.replace("\n", "\r\n") + "# its end")
     write_input(tmp_path, text)
     finished(ricochet, "gas.h5")
-    found, there = turning(tmp_path / "gas.h5"), by_species(spins)
-    for name in ("angular_velocity", "orientation"):
-        assert (found[name][0] == there[name]).all()
-    kept = (found["angular_velocity"] == there["angular_velocity"]).all()
+    first, there = disks_in(tmp_path / "gas.h5", 0), by_species(bed)
+    assert all((first[name] == there[name]).all() for name in first)
+    run = read_run(tmp_path / "gas.h5")
+    assert [kind.disks.sum() for kind in run.by_species] == [108, 12]
+    own = run.parameters["species"]["bed"]
+    assert own["count"] == 108 and "mass" not in own and "radius" not in own
+    area = np.pi * np.sum(there["radius"][:108] ** 2)
+    assert own["packing_fraction"] == pytest.approx(area / 2)
+    last = disks_in(tmp_path / "gas.h5", -1)
+    kept = (last["angular_velocity"] == first["angular_velocity"]).all()
     assert kept == (text == INPUT)
+    write_input(tmp_path, text.replace("bed.txt", "gas.h5"))
+    finished(ricochet, "next.h5")
+    begun = disks_in(tmp_path / "next.h5", 0)
+    assert all((begun[name] == last[name]).all() for name in last)
+    said = {"radius": 0.01, "mass": 2, "angular_velocity": 0}
+    finished(ricochet, "new.h5", *(f"--set=species.bed.{name}={said[name]}" for name in said))
+    new = disks_in(tmp_path / "new.h5", 0)
+    for name, value in said.items():
+        assert (new[name][:108] == value).all() and (new[name][108:] == last[name][108:]).all()
 
 
-def test_a_file_says_nothing_of_spins_where_the_input_says_how_disks_start(
-    ricochet, tmp_path, spins
-):
+def test_a_file_says_nothing_of_spins_where_the_input_says_how_disks_start(ricochet, tmp_path, bed):
     """Then directions are those of the file all the same, as places are."""
     rest = [f"--set=species.{name}.velocities=rest" for name in ("bed", "stone")]
     finished(ricochet, "gas.h5", "--set=stop.time=1", *rest)
     with h5py.File(tmp_path / "gas.h5") as file:
         assert "angular_velocity" not in file["particles/disks"]
         angle = file["particles/disks/orientation/value"]
-        assert (angle[:] == by_species(spins)["orientation"]).all()
-
-
-def test_a_run_from_the_last_frame_of_a_rough_one_turns_as_it_did(ricochet, tmp_path, spins):
-    write_input(tmp_path, SPINNING)
-    finished(ricochet, "gas.h5")
-    write_input(tmp_path, SPINNING.replace("bed.txt", "gas.h5"))
-    finished(ricochet, "next.h5")
-    one, other = turning(tmp_path / "gas.h5"), turning(tmp_path / "next.h5")
-    assert all((one[name][-1] == other[name][0]).all() for name in one)
-    finished(ricochet, "new.h5", "--set", "species.bed.angular_velocity=0")
-    new = turning(tmp_path / "new.h5")["angular_velocity"][0]
-    assert (new[:108] == 0).all()  # what the input says counts
-    assert (new[108:] == one["angular_velocity"][-1, 108:]).all()
+        assert (angle[:] == by_species(bed)["orientation"]).all()
 
 
 def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):

@@ -49,22 +49,18 @@ def observable(path, name):
         return file[f"observables/{name}/value"][0]
 
 
-def test_disks_in_the_file_of_a_run_need_no_count(onward, tmp_path):
-    assert onward(1, 0.02).returncode == FINISHED
-    (x, v), (y, w) = last_and_first(tmp_path)
-    assert (x == y).all() and (v == w).all()
-    with h5py.File(tmp_path / "next.h5") as file:
-        assert list(file["parameters/species/counts"]) == [150, 50]
-        assert file["parameters/species/light"].attrs["count"] == 150
-        packing = file["parameters/species/light"].attrs["packing_fraction"]
-        assert packing == pytest.approx(150 * math.pi * 0.02**2)
-
-
-@pytest.mark.parametrize("size", [0.9, 1.3])
-def test_positions_are_stretched_to_another_box(onward, tmp_path, size):
+@pytest.mark.parametrize("size", [1, 0.9, 1.3])
+def test_disks_in_the_file_of_a_run_are_stretched_to_the_box_and_need_no_count(
+    onward, tmp_path, size
+):
     assert onward(size, 0.01, "scale_positions = .true.").returncode == FINISHED
     (x, v), (y, w) = last_and_first(tmp_path)
     assert np.allclose(y, size * x, rtol=1e-14) and (v == w).all()
+    with h5py.File(tmp_path / "next.h5") as file:
+        assert list(file["parameters/species/counts"]) == [150, 50]
+        light = file["parameters/species/light"].attrs
+        assert light["count"] == 150
+        assert light["packing_fraction"] == pytest.approx(150 * math.pi * (0.01 / size) ** 2)
 
 
 def test_disks_that_a_smaller_box_makes_overlap_are_named(onward):
