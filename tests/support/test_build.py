@@ -157,10 +157,18 @@ def test_a_film_takes_one_command(program, tmp_path):
     assert (tmp_path / "browse.txt").read_text().strip() == (film / "my gas.html").as_uri()
 
 
-def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
-    place = [f"DESTDIR={tmp_path / 'root'}", "PREFIX=/usr"]
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """A folder with all that an install brings, and an uninstall takes away again."""
+    root = tmp_path_factory.mktemp("root")
+    place = [f"DESTDIR={root}", "PREFIX=/usr"]
     assert make("install", *place).returncode == 0
-    installed = tmp_path / "root/usr"
+    yield root / "usr"
+    assert make("uninstall", *place).returncode == 0
+    assert files_in(root) == [] and not (root / "usr/share/doc/ricochet").exists()
+
+
+def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_path):
     inputs = installed / "share/ricochet/input"
     ensemble = [installed / "bin/ricochet-ensemble", inputs / "lab.nml", "-d", "here"]
     environment = {name: value for name, value in os.environ.items() if name != "RICOCHET"}
@@ -174,14 +182,19 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(tmp_path):
         installed / "bin/ricochet-lab", "--help", cwd=tmp_path, env=environment | {"PATH": path}
     )
     assert done.returncode == 0 and "--no-open" in done.stdout, done.stderr
-    assert make("uninstall", *place).returncode == 0
-    assert files_in(tmp_path / "root") == []
 
 
 def test_only_what_was_installed_goes(tmp_path):
-    """Runs, notes and folders of users stay, and so does what a user puts where a file was."""
+    """Another program stays; so do runs, notes and folders of users, from install to uninstall."""
     prefix = tmp_path / "it's a folder"
-    shared, place = prefix / "share/ricochet", f"PREFIX={prefix}"
+    shared, place, program = prefix / "share/ricochet", f"PREFIX={prefix}", prefix / "bin/ricochet"
+    program.parent.mkdir(parents=True)
+    program.write_text("another program")
+    for action in ("install", "uninstall"):
+        done = make(action, place)
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 2, done.stderr
+        assert files_in(prefix) == [program] and program.read_text() == "another program"
+    program.unlink()
     mine = [shared / name for name in ("runs/gas.h5", "input/mine.nml", "post/page/notes.txt")]
 
     def mine_are_there():
@@ -203,37 +216,16 @@ def test_only_what_was_installed_goes(tmp_path):
     assert make("install", place).returncode == 0
     assert installed < set(files_in(prefix)) and mine_are_there()
     assert not old.parent.exists()
-    assert make("uninstall", place).returncode == 0
-    assert set(files_in(prefix)) == {*mine, prefix / "bin/other"} and mine_are_there()
-    assert not (shared / "post/ricochet").exists()
-
-
-def test_a_file_that_no_install_has_listed_is_not_replaced(tmp_path):
-    place = f"PREFIX={tmp_path}"
-    (tmp_path / "bin").mkdir()
-    program = tmp_path / "bin/ricochet"
-    program.write_text("another program")
-    for action in ("install", "uninstall"):
-        done = make(action, place)
-        assert done.returncode == 2 and len(done.stderr.splitlines()) == 2, done.stderr
-        assert files_in(tmp_path) == [program] and program.read_text() == "another program"
-
-
-def test_an_install_without_a_list_is_replaced_and_its_other_files_stay(tmp_path):
-    """As earlier versions made them."""
-    place, shared = f"PREFIX={tmp_path}", tmp_path / "share/ricochet"
-    assert make("install", place).returncode == 0
-    (shared / "installed").unlink()
+    (shared / "installed").unlink()  # as the first versions left none
     (shared / "input/gas.nml").write_text("of an earlier version")
-    (shared / "runs").mkdir()
-    (shared / "runs/gas.h5").write_text("mine")
     done = make("uninstall", place)
     assert done.returncode == 2 and str(shared / "installed") in done.stderr.splitlines()[0]
     done = make("install", place)
     assert done.returncode == 0 and "has left no list" in done.stdout
     assert "of an earlier version" not in (shared / "input/gas.nml").read_text()
     assert make("uninstall", place).returncode == 0
-    assert files_in(tmp_path) == [shared / "runs/gas.h5"]
+    assert set(files_in(prefix)) == {*mine, prefix / "bin/other"} and mine_are_there()
+    assert not (shared / "post/ricochet").exists()
 
 
 def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_path):
@@ -252,26 +244,24 @@ def test_a_program_that_is_older_than_its_source_is_not_installed(program, tmp_p
     assert files_in(build) == [Path(copy)]
 
 
-def test_what_the_manual_pages_speak_of_is_installed(tmp_path):
+def test_what_the_manual_pages_speak_of_is_installed(installed):
     """All places in them are absolute, and every command says that it is the one it is called."""
-    place, root = [f"DESTDIR={tmp_path}", "PREFIX=/usr"], tmp_path / "usr"
-    assert make("install", *place).returncode == 0
-    pages = sorted(path.name for path in (root / "share/man/man1").iterdir())
+    pages = sorted(path.name for path in (installed / "share/man/man1").iterdir())
     assert pages == ["ricochet-ensemble.1", "ricochet.1"]
-    version = ran(root / "bin/ricochet", "--version").stdout.split()[1]
+    version = ran(installed / "bin/ricochet", "--version").stdout.split()[1]
     for name in pages:
-        page = root / "share/man/man1" / name
+        page = installed / "share/man/man1" / name
         text = page.read_text().replace("\\-", "-")
         assert f'"Ricochet {version}"' in text and f".SH NAME\n{page.stem} - " in text
         named = set(re.findall(r"(?<![\w/])/usr/[\w./-]*\w", text))
         assert len(named) >= 3
-        assert [name for name in named if not (tmp_path / name[1:]).exists()] == []
+        assert [name for name in named if not (installed.parent / name[1:]).exists()] == []
         assert not re.search(r"(?<![\w/])(input|post|docs|share)/", text)
         commands = re.findall(r"\bricochet-\w[\w-]*", text)
-        assert [name for name in commands if not (root / "bin" / name).exists()] == []
+        assert [name for name in commands if not (installed / "bin" / name).exists()] == []
         if shutil.which("man"):
             assert ran("man", "--warnings", "-l", page).stderr == ""
-    table = json.loads(ran(root / "bin/ricochet", "--print-variables").stdout)
+    table = json.loads(ran(installed / "bin/ricochet", "--print-variables").stdout)
     shared = table["side"].keys() & table["wall"].keys() & table["obstacle"].keys() - {"name"}
     walls = ("side", "wall", "obstacle")
     named = [
@@ -279,18 +269,16 @@ def test_what_the_manual_pages_speak_of_is_installed(tmp_path):
         for group in table
         for name in table[group]
     ]
-    page = (root / "share/man/man1/ricochet.1").read_text().replace("\\-", "-")
+    page = (installed / "share/man/man1/ricochet.1").read_text().replace("\\-", "-")
     assert "run.seed" in named and [name for name in named if f"\n.B {name}\n" not in page] == []
-    assert (root / "share/doc/ricochet/LICENSE").exists()
+    assert (installed / "share/doc/ricochet/LICENSE").exists()
     links = [
         (page, link)
-        for page in (root / "share/doc/ricochet").rglob("*.md")
+        for page in (installed / "share/doc/ricochet").rglob("*.md")
         for link in re.findall(r"\]\((?!\w+:|#)([^)\s#]+)", page.read_text())
     ]
     lost = {link for page, link in links if not (page.parent / link).exists()}
     assert {link.removeprefix("../").split("/")[0] for link in lost} <= SOURCES
-    assert make("uninstall", *place).returncode == 0
-    assert files_in(tmp_path) == [] and not (root / "share/doc/ricochet").exists()
 
 
 def test_pip_brings_package_commands_and_inputs(program, tmp_path):
