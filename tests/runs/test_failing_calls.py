@@ -175,29 +175,6 @@ def go_on(program, stage, folder, option):
     assert same_results(stage, folder / "gas.h5")
 
 
-@pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [300, pytest.param(1, marks=pytest.mark.check)])
-def test_a_call_that_fails_costs_nothing_but_one_line(program, stage, call, step):
-    cases = [
-        (option, f"inject={call}:error={error}:when={number}{again}")
-        for option in OPTIONS
-        for number in chosen(stage, option, call, step)
-        for error, again in (way.partition("+")[:2] for way in WAYS[call])
-    ]
-    assert problems(check_after_failure, program, stage, call, cases) == []
-
-
-def problems(check, program, stage, call, cases) -> list[str]:
-    """What is wrong in any of the cases, each an option and an injection."""
-
-    def problem(case):
-        option, inject = case
-        return outcome(check, program, stage, option, call, inject)
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return [found for found in pool.map(problem, cases) if found]
-
-
 def check_after_kill(program, stage, folder, option, call, inject):
     """What the final name names is an earlier result or the whole one; the other file goes on."""
     result = folder / "gas.h5"
@@ -208,17 +185,6 @@ def check_after_kill(program, stage, folder, option, call, inject):
         assert same_results(stage, result)
     else:
         go_on(program, stage, folder, option)
-
-
-@pytest.mark.parametrize("call", ["pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat"])
-@pytest.mark.parametrize("step", [200, pytest.param(1, marks=pytest.mark.check)])
-def test_a_kill_at_any_call_costs_nothing(program, stage, call, step):
-    cases = [
-        (option, f"inject={call}:signal=SIGKILL:when={number}")
-        for option in OPTIONS
-        for number in chosen(stage, option, call, step)
-    ]
-    assert problems(check_after_kill, program, stage, call, cases) == []
 
 
 def check_after_signal(program, stage, folder, option, call, inject):
@@ -250,15 +216,30 @@ def contents_of(folder) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "trace"}
 
 
-@pytest.mark.parametrize("call", WAYS)
-@pytest.mark.parametrize("step", [300, pytest.param(1, marks=pytest.mark.check)])
-def test_a_signal_at_any_moment_stops_the_run_or_finds_it_finished(program, stage, call, step):
+#: What meets a call, as strace says it, and what must hold then.
+KILLED = ("pwrite64", "ftruncate", "fsync", "rename", "unlink", "openat")
+MEETINGS = [(check_after_failure, call, [f"error={way}" for way in WAYS[call]]) for call in WAYS]
+MEETINGS += [(check_after_signal, call, ["signal=SIGTERM"]) for call in WAYS]
+MEETINGS += [(check_after_kill, call, ["signal=SIGKILL"]) for call in KILLED]
+
+
+@pytest.mark.parametrize(("check", "call", "ways"), MEETINGS)
+@pytest.mark.parametrize("step", [250, pytest.param(1, marks=pytest.mark.check)])
+def test_whatever_meets_a_call_costs_nothing(program, stage, check, call, ways, step):
+    """A failure one line; a signal stops the run, or finds it finished; a kill leaves what was."""
     cases = [
-        (option, f"inject={call}:signal=SIGTERM:when={number}")
+        (option, f"inject={call}:{what}:when={number}{again}")
         for option in OPTIONS
         for number in chosen(stage, option, call, step)
+        for what, again in (way.partition("+")[:2] for way in ways)
     ]
-    assert problems(check_after_signal, program, stage, call, cases) == []
+
+    def problem(case):
+        option, inject = case
+        return outcome(check, program, stage, option, call, inject)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        assert [found for found in pool.map(problem, cases) if found] == []
 
 
 @pytest.mark.parametrize("error", ["EINTR", "EAGAIN"])
