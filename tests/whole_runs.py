@@ -216,14 +216,6 @@ def filled_pipe():
     os.close(outlet)
 
 
-def processor_time_of(process) -> float:
-    """What a process has used at its end, for which this waits [s]."""
-    wait_for(lambda: has_ended(process))
-    used = processor_time(process.pid)
-    process.wait()
-    return used
-
-
 def ended_soon(process, number, seconds=1.0, members=()) -> str:
     """Sends a signal; what the process says until its end, which takes less than so long.
 

@@ -160,22 +160,8 @@ def test_members_take_a_core_each_whatever_the_cluster_says(lab, monkeypatch):
 
 def test_names_and_values_may_be_anything(lab):
     """Also when the folder's own list is taken as the manifest of another ensemble."""
-    names = [
-        "*",
-        "@",
-        "$HOME",
-        "a;b",
-        "[x]",
-        "'",
-        '"',
-        "!",
-        "~",
-        "a&b",
-        "%s",
-        "\\n",
-        "ü",
-        "one two",
-    ]
+    names = ["*", "@", "$HOME", "a;b", "[x]", "'", '"', "!", "~", "a&b"]
+    names += ["%s", "\\n", "ü", "one two"]
     rest = "--set run.title=a b --set species.ball.velocity=0,-1"
     manifest = lab / "members.txt"
     manifest.write_text("# many\n\nbare\n" + "".join(f"{name}\t{rest}\n" for name in names))
@@ -346,6 +332,9 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--manifest", "/dev/zero"], "cannot read"),
         (["--manifest", "fifo"], "cannot read"),
         (["--seeds", "1", "--engine", "parallel", "--sshloginfile", "fifo"], "cannot read"),
+        (["--seeds", "1", "--engine", "cloud"], "--engine cloud: pool, slurm or parallel"),
+        (["--seeds", "1", "--sshloginfile", "hosts"], "goes with --engine parallel"),
+        (["--seeds", "1", "--share", "0/3"], "--share 0/3: write K/M"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):
