@@ -1,43 +1,21 @@
 !> Runs `.pf` tests where pFUnit is not installed: its rules of comparison, its words, its exit codes.
 !> `translate_pf.py` turns each `@assert` into a call of what is below. What pFUnit refuses does not
-!> compile here either: `pf_pair` exists only for the combinations of types that pFUnit accepts.
+!> compile here either: comparisons exist only for combinations of types that pFUnit accepts.
 module funit
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use, intrinsic :: iso_fortran_env, only: error_unit, int32, int64, output_unit, real32, real64
+  use, intrinsic :: iso_fortran_env, only: error_unit, int32, int64, output_unit, real64
   implicit none
   private
-  public :: anyexceptions, pf_real, pf_begin, pf_run, pf_finish, pf_fail, pf_fail_pair
-  public :: pf_conform, pf_same, pf_close, pf_relatively_close, pf_width
-  public :: pf_holds
-  public :: pf_pair, pf_number_pair, pf_real_pair
+  public :: anyexceptions, pf_real, pf_begin, pf_run, pf_finish, pf_fail, pf_check
+  public :: pf_conform, pf_unequal, pf_apart, pf_unordered, pf_holds
 
-  integer, parameter :: pf_real = real64      !! the kind in which tolerances apply
+  integer, parameter :: pf_real = real64      !! the kind in which numbers are compared
   integer, parameter :: pair_length = 132     !! enough for two numbers; long texts are cut
   character(len=*), parameter :: pair_format = "(""expected <"",g0,""> actual <"",g0,"">"")"
 
-  !> Whether two values are equal, by the rules of `@assertEqual`.
-  interface pf_same
-    module procedure same_int32, same_int32_int64, same_int64, same_int32_real64
-    module procedure same_real32_real64, same_real64, same_logical, same_text
-  end interface pf_same
-
-  !> What was compared, for the report: of any type, of numbers, of numbers that have a tolerance.
-  interface pf_pair
-    module procedure pair_int32, pair_int32_int64, pair_int64, pair_int32_real64
-    module procedure pair_real32_real64, pair_real64, pair_logical, pair_text
-  end interface pf_pair
-  interface pf_number_pair
-    module procedure pair_int32, pair_int32_int64, pair_int64, pair_int32_real64
-    module procedure pair_real32_real64, pair_real64
-  end interface pf_number_pair
-  interface pf_real_pair
-    module procedure pair_int32_real64, pair_real32_real64, pair_real64
-  end interface pf_real_pair
-
-  !> A tolerance: default real or the kind of the values.
-  interface pf_width
-    module procedure width_real32, width_real64
-  end interface pf_width
+  !> What differs, by the rules of `@assertEqual`; '' if nothing does.
+  interface pf_unequal
+    module procedure unequal_int32, unequal_int32_int64, unequal_int64, unequal_real64, unequal_logical, unequal_text
+  end interface pf_unequal
 
   abstract interface
     !> A test or fixture.
@@ -129,23 +107,19 @@ contains
     if (what /= "") report = report//"  "//what//nl
   end subroutine pf_fail
 
-  !> A failed comparison, reported at the first element that is wrong.
-  subroutine pf_fail_pair(file, line, what, good, pairs, message)
+  !> A comparison of elements: it fails at the first that is wrong.
+  subroutine pf_check(file, line, what, pairs, message)
     character(len=*), intent(in) :: file, what
     integer, intent(in) :: line
-    logical, intent(in) :: good(:)            !! (n) in array element order
-    character(len=*), intent(in) :: pairs(:)  !! (n) as from `pf_pair`
+    character(len=*), intent(in) :: pairs(:)  !! (n) what is wrong with each, in array element order
     character(len=*), intent(in), optional :: message
     character(len=12) :: number
     integer :: k
-    k = findloc(good, .false., dim=1)
+    k = findloc(pairs /= "", .true., dim=1)
+    if (k == 0) return
     write (number, "(i0)") k
-    if (size(good) == 1) then
-      call pf_fail(file, line, what//" failed: "//trim(pairs(k)), message)
-    else
-      call pf_fail(file, line, what//" failed at element "//trim(number)//": "//trim(pairs(k)), message)
-    end if
-  end subroutine pf_fail_pair
+    call pf_fail(file, line, what//" failed at element "//trim(number)//": "//trim(pairs(k)), message)
+  end subroutine pf_check
 
   !> Arrays of the same shape, or a scalar expected of every element.
   pure logical function pf_conform(expected, actual)
@@ -154,76 +128,60 @@ contains
     if (size(expected) == size(actual)) pf_conform = all(expected == actual)
   end function pf_conform
 
-  elemental logical function same_int32(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_int32(expected, actual) result(pair)
     integer(int32), intent(in) :: expected, actual
-    same = expected == actual
-  end function same_int32
+    pair = ""
+    if (expected /= actual) write (pair, pair_format) expected, actual
+  end function unequal_int32
 
-  elemental logical function same_int32_int64(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_int32_int64(expected, actual) result(pair)
     integer(int32), intent(in) :: expected
     integer(int64), intent(in) :: actual
-    same = expected == actual
-  end function same_int32_int64
+    pair = ""
+    if (expected /= actual) write (pair, pair_format) expected, actual
+  end function unequal_int32_int64
 
-  elemental logical function same_int64(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_int64(expected, actual) result(pair)
     integer(int64), intent(in) :: expected, actual
-    same = expected == actual
-  end function same_int64
-
-  elemental logical function same_int32_real64(expected, actual) result(same)
-    integer(int32), intent(in) :: expected
-    real(real64), intent(in) :: actual
-    same = expected == actual
-  end function same_int32_real64
-
-  elemental logical function same_real32_real64(expected, actual) result(same)
-    real(real32), intent(in) :: expected
-    real(real64), intent(in) :: actual
-    same = expected == actual
-  end function same_real32_real64
+    pair = ""
+    if (expected /= actual) write (pair, pair_format) expected, actual
+  end function unequal_int64
 
   !> Infinite values equal themselves; NaN equals nothing.
-  elemental logical function same_real64(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_real64(expected, actual) result(pair)
     real(real64), intent(in) :: expected, actual
-    same = expected == actual
-  end function same_real64
+    pair = pf_unordered(expected, actual, expected == actual)
+  end function unequal_real64
 
-  elemental logical function same_logical(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_logical(expected, actual) result(pair)
     logical, intent(in) :: expected, actual
-    same = expected .eqv. actual
-  end function same_logical
+    pair = ""
+    if (expected .neqv. actual) write (pair, pair_format) expected, actual
+  end function unequal_logical
 
   !> Blanks at both ends do not count.
-  elemental logical function same_text(expected, actual) result(same)
+  elemental character(len=pair_length) function unequal_text(expected, actual) result(pair)
     character(len=*), intent(in) :: expected, actual
-    same = adjustl(expected) == adjustl(actual)
-  end function same_text
+    character(len=50) :: shown(2)
+    shown = [character(len=50) :: adjustl(expected), adjustl(actual)]
+    pair = ""
+    if (adjustl(expected) /= adjustl(actual)) write (pair, pair_format) trim(shown(1)), trim(shown(2))
+  end function unequal_text
 
-  !> Within an absolute tolerance.
-  elemental logical function pf_close(expected, actual, tolerance)
+  !> What differs by more than an absolute tolerance.
+  elemental character(len=pair_length) function pf_apart(expected, actual, tolerance) result(pair)
     real(real64), intent(in) :: expected, actual, tolerance
-    pf_close = expected == actual
-    if (pf_close .or. ieee_is_nan(expected) .or. ieee_is_nan(actual)) return
-    pf_close = abs(actual - expected) <= tolerance
-  end function pf_close
+    pair = ""
+    if (expected /= actual) pair = pf_unordered(expected, actual, abs(actual - expected) <= tolerance)
+  end function pf_apart
 
-  !> Within a tolerance relative to the expected value, which must not be 0.
-  elemental logical function pf_relatively_close(expected, actual, tolerance)
-    real(real64), intent(in) :: expected, actual, tolerance
-    pf_relatively_close = .false.
-    if (expected == 0.0_real64) return
-    pf_relatively_close = pf_close(expected, actual, tolerance*abs(expected))
-  end function pf_relatively_close
-
-  pure real(real64) function width_real32(tolerance) result(width)
-    real(real32), intent(in) :: tolerance
-    width = real(tolerance, real64)
-  end function width_real32
-
-  pure real(real64) function width_real64(tolerance) result(width)
-    real(real64), intent(in) :: tolerance
-    width = tolerance
-  end function width_real64
+  !> Two numbers that are not in a relation; '' if it holds.
+  elemental character(len=pair_length) function pf_unordered(expected, actual, holds) result(pair)
+    real(real64), intent(in) :: expected, actual
+    logical, intent(in) :: holds
+    pair = ""
+    if (.not. holds) write (pair, pair_format) expected, actual
+  end function pf_unordered
 
   pure logical function holds_scalar(condition) result(holds)
     logical, intent(in) :: condition
@@ -234,49 +192,4 @@ contains
     logical, intent(in) :: condition(:)
     holds = all(condition)
   end function holds_vector
-
-  elemental character(len=pair_length) function pair_int32(expected, actual) result(pair)
-    integer(int32), intent(in) :: expected, actual
-    write (pair, pair_format) expected, actual
-  end function pair_int32
-
-  elemental character(len=pair_length) function pair_int32_int64(expected, actual) result(pair)
-    integer(int32), intent(in) :: expected
-    integer(int64), intent(in) :: actual
-    write (pair, pair_format) expected, actual
-  end function pair_int32_int64
-
-  elemental character(len=pair_length) function pair_int64(expected, actual) result(pair)
-    integer(int64), intent(in) :: expected, actual
-    write (pair, pair_format) expected, actual
-  end function pair_int64
-
-  elemental character(len=pair_length) function pair_int32_real64(expected, actual) result(pair)
-    integer(int32), intent(in) :: expected
-    real(real64), intent(in) :: actual
-    write (pair, pair_format) expected, actual
-  end function pair_int32_real64
-
-  elemental character(len=pair_length) function pair_real32_real64(expected, actual) result(pair)
-    real(real32), intent(in) :: expected
-    real(real64), intent(in) :: actual
-    write (pair, pair_format) expected, actual
-  end function pair_real32_real64
-
-  elemental character(len=pair_length) function pair_real64(expected, actual) result(pair)
-    real(real64), intent(in) :: expected, actual
-    write (pair, pair_format) expected, actual
-  end function pair_real64
-
-  elemental character(len=pair_length) function pair_logical(expected, actual) result(pair)
-    logical, intent(in) :: expected, actual
-    write (pair, pair_format) expected, actual
-  end function pair_logical
-
-  elemental character(len=pair_length) function pair_text(expected, actual) result(pair)
-    character(len=*), intent(in) :: expected, actual
-    character(len=50) :: shown(2)
-    shown = [character(len=50) :: adjustl(expected), adjustl(actual)]
-    write (pair, pair_format) trim(shown(1)), trim(shown(2))
-  end function pair_text
 end module funit

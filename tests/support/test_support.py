@@ -30,27 +30,105 @@ end module test_it
 """
 
 
+VERDICTS = """module test_verdicts
+  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
+  use, intrinsic :: iso_fortran_env, only: int64, real64
+  use funit
+  implicit none
+  real(real64), parameter :: matrix(2, 2) = reshape([1.0_real64, 2.0_real64, 3.0_real64, 4.0_real64], [2, 2])
+  integer :: prepared = 0
+contains
+  @before
+  subroutine prepare()
+    prepared = prepared + 1
+  end subroutine prepare
+  @after
+  subroutine tidy_up()
+    prepared = prepared - 1
+  end subroutine tidy_up
+  subroutine helper()
+    @assertEqual(1, 2)
+    prepared = 0
+  end subroutine helper
+  pure real(real64) function endless()
+    endless = ieee_value(endless, ieee_positive_inf)
+  end function endless
+"""
+VERDICT = """  ! A comment between the directive and its subroutine is allowed.
+  @test
+
+  ! Like this one.
+  subroutine {0}()
+    integer, allocatable :: three(:)
+    three = [1, 2, 3]
+    {1}
+    prepared = 0
+  end subroutine {0}
+"""
+PASSES = """
+    @assertEqual(3, 3)
+    @assertEqual(3, 3_int64)
+    @assertEqual(3_int64, 3_int64, message='with a message')
+    @assertEqual(endless(), endless())
+    @assertEqual(.true., prepared == 1)
+    @assertEqual('word', '  word ')
+    @assertEqual('a, b) ''c''', "a, b) 'c'")
+    @assertEqual(matrix, 1.0_real64*matrix)
+    @assertEqual([1, 2], [1, 2])
+    @assertEqual(2, spread(spread([2, 2], 2, 2), 3, 2))
+    @assertEqual(1.0_real64, 1.0_real64 + 1.0e-9_real64, tolerance=1.0e-8_real64, message='both '//'keywords')
+    @assertLessThan(1, 2)
+    @assertLessThan(0.0_real64, matrix)
+    @assertLessThanOrEqual(2_int64, 2_int64)
+    @assertGreaterThan(5.0_real64, matrix)
+    @assertGreaterThanOrEqual(2, 2, message='equal')
+    @assertTrue(1 < 2)
+    @assertTrue(matrix(:, 1) > 0)
+    @assertFalse(1 > 2)
+    @assertFalse(matrix(:, 1) < 0)
+"""
+FAILS = """
+    @assertEqual(3, 4, message='the message of a failure')
+    @assertEqual(1.0_real64, 1.0_real64 + epsilon(1.0_real64))
+    @assertEqual(1.0_real64, 1.0_real64 - 1.0e-7_real64, tolerance=1.0e-8_real64)
+    @assertEqual([1, 2, 3], [1, 2, 4])
+    @assertEqual(1.0_real64, matrix)
+    @assertEqual(three, three(:2))
+    @assertEqual(.true., prepared == 2)
+    @assertEqual('word', 'words')
+    @assertLessThan(2, 2)
+    @assertLessThanOrEqual(3.0_real64, matrix)
+    @assertGreaterThan(2.0_real64, 2.0_real64)
+    @assertGreaterThanOrEqual(1_int64, 2_int64)
+    @assertTrue([1, 3] < 2)
+    @assertFalse([1, 3] < 2)
+    call helper(); if (anyExceptions()) return
+"""
+
+
 @pytest.mark.parametrize("pfunit", RUNNERS, ids=["substitute", "pFUnit"][: len(RUNNERS)])
-def test_every_verdict_is_the_name_of_its_test(tmp_path, pfunit):
-    shared = "" if pfunit else "tests/support/funit.f90"
+def test_each_assertion_passes_or_fails_under_the_substitute_as_under_pfunit(tmp_path, pfunit):
+    failing = [f"fails_{k}" for k in range(len(FAILS.strip().splitlines()))]
+    rows = zip(failing, FAILS.strip().splitlines(), strict=True)
+    tests = [VERDICT.format(name, line.strip()) for name, line in rows]
+    tests += [VERDICT.format("passes_after_all_failures", PASSES.strip())]
+    (tmp_path / "test_verdicts.pf").write_text(VERDICTS + "".join(tests) + "end module\n")
     command = [
         "make",
         "unit-tests",
         "sources=",
-        "suites=tests/support/verdicts",
+        f"suites={tmp_path}",
         "DEBUG=1",
-        f"shared={shared}",
+        f"shared={'' if pfunit else 'tests/support/funit.f90'}",
         f"BUILD={tmp_path}",
         f"PFUNIT_DIR={pfunit}",
     ]
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
-    suite = (SUPPORT / "verdicts" / "test_verdicts.pf").read_text()
-    names = re.findall(r"end subroutine (fails_\w+)", suite)
     failed = re.findall(r"test_verdicts(?:_suite)?\.((?:fails|passes)_\w+)", result.stdout)
-    assert failed == names, result.stdout + result.stderr
+    assert failed == failing, result.stdout + result.stderr
     assert result.returncode == 2
-    assert f"Failures: {len(names)}" in result.stdout
+    assert f"Failures: {len(failing)}" in result.stdout
 
 
 def translated(tmp_path: Path, text: str, name: str = "test_it.pf") -> str:
@@ -75,7 +153,6 @@ def translated(tmp_path: Path, text: str, name: str = "test_it.pf") -> str:
         "@assertEqual(1, , n)",
         "@assertEqual(1, f(n)",
         "@assertLessThan(x, y, tolerance=0.1)",
-        "@assertRelativelyEqual(x, y)",
         "@assertFail(message='a')",
         "@asserttrue done",
         "@disable",

@@ -17,13 +17,6 @@ class Refused(Exception):
     """A line that is not in the common language."""
 
 
-class Comparison(NamedTuple):
-    """How a two-sided assertion compares `e_` with `a_` and shows them."""
-
-    good: str
-    shown: str = "pf_number_pair(e_, a_)"
-
-
 class Suite(NamedTuple):
     """The procedures of a file that the driver calls."""
 
@@ -31,19 +24,15 @@ class Suite(NamedTuple):
     fixtures: dict[str, str]
 
 
-CLOSE = "pf_close(real(e_, pf_real), real(a_, pf_real), pf_width({tolerance}))"
-EXACT = {
-    "equal": Comparison("pf_same(e_, a_)", "pf_pair(e_, a_)"),
-    "lessthan": Comparison("e_ < a_"),
-    "lessthanorequal": Comparison("e_ <= a_"),
-    "greaterthan": Comparison("e_ > a_"),
-    "greaterthanorequal": Comparison("e_ >= a_"),
-}
-TOLERANT = {
-    "equal": Comparison(CLOSE, "pf_real_pair(e_, a_)"),
-    "relativelyequal": Comparison(
-        CLOSE.replace("pf_close", "pf_relatively_close"), "pf_real_pair(e_, a_)"
-    ),
+ORDER = "pf_unordered(real(e_, pf_real), real(a_, pf_real), e_ {} a_)"
+# What is wrong with `a_` where `e_` is expected.
+COMPARISON = {
+    "equal": "pf_unequal(e_, a_)",
+    "equal within": "pf_apart(e_, a_, {tolerance})",
+    "lessthan": ORDER.format("<"),
+    "lessthanorequal": ORDER.format("<="),
+    "greaterthan": ORDER.format(">"),
+    "greaterthanorequal": ORDER.format(">="),
 }
 CONDITION = {"true": "pf_holds({})", "false": "pf_holds(.not. ({}))"}
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(\s*\))?\s*(?:!.*)?$", re.IGNORECASE)
@@ -94,21 +83,18 @@ def assertion(name: str, arguments: str, place: str) -> str:
     """The Fortran of one `@assert`; `place` is the file and line for the report."""
     values, keywords = sort_arguments(arguments)
     message = f", message={keywords['message']}" if "message" in keywords else ""
-    table = TOLERANT if "tolerance" in keywords else EXACT
-    kind = name.lower()
-    if kind in table:
+    kind = name.lower() + (" within" if "tolerance" in keywords else "")
+    if kind in COMPARISON:
         expect_count(values, 2)
-        good, shown = (part.format(**keywords) for part in table[kind])
         # Double brackets: of a text in single ones gfortran 14 says that its size is too large.
         check = (
             f"associate (e_ => (({values[0]})), a_ => (({values[1]}))); "
             "if (.not. pf_conform(shape(e_), shape(a_))) then; "
             f"call pf_fail({place}, 'Assert{name} failed: the shapes differ'{message}); "
-            f"else if (.not. all([{good}])) then; "
-            f"call pf_fail_pair({place}, 'Assert{name}', [{good}], [{shown}]{message}); "
-            "end if; end associate"
+            f"else; call pf_check({place}, 'Assert{name}', "
+            f"[{COMPARISON[kind].format(**keywords)}]{message}); end if; end associate"
         )
-    elif kind in CONDITION and "tolerance" not in keywords:
+    elif kind in CONDITION:
         expect_count(values, 1)
         condition = CONDITION[kind].format(values[0])
         check = f"if (.not. {condition}) call pf_fail({place}, 'Assert{name} failed'{message})"
