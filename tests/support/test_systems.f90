@@ -8,17 +8,22 @@ module test_systems
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
+  use initial_state, only: create_simulation
   use partners, only: n_sides
   use random_stream, only: random_stream_t
+  use run_setup, only: input_from_text
   use segments, only: new_segment
+  use settings, only: run_input_t
   use shapes, only: shape_t
   use side_motion, only: side_motion_t
   use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
   use tally, only: dissipated
+  use texts, only: text_t
   use timeline, only: advance
   implicit none
   private
-  public :: add_obstacle, few_disks, system, systems, every_system, prepare, evolve, difference
+  public :: add_obstacle, build, few_disks, system, systems, every_system, prepare, evolve, difference
   public :: total_energy, momentum, tightest_gap
   public :: draw_between, draw_vector, draw_magnitude, disk_named, time_to_contact
 
@@ -37,6 +42,29 @@ module test_systems
     "walls shaken pegs inelastic contact", "walls shaken slants gravity", "walls shaken giants gravity"]
 
 contains
+
+  !> The simulation that an input describes, as the program builds it, and what is wrong with it, '' if nothing; without
+  !> `message` that ends the tests. A text without an end ends at time 1.
+  subroutine build(text, sim, message, input, overrides)
+    character(len=*), intent(in) :: text
+    type(simulation_t), intent(out) :: sim
+    character(len=:), allocatable, intent(out), optional :: message
+    type(run_input_t), intent(out), optional :: input
+    type(text_t), intent(in), optional :: overrides(:)
+    type(run_input_t) :: read
+    type(text_t), allocatable :: changes(:)
+    type(status_line_t) :: line
+    type(error_t), allocatable :: error
+    allocate (changes(0))
+    if (present(overrides)) changes = overrides
+    call input_from_text(text//merge("                 ", " &stop time = 1 /", index(text, "&stop") > 0), "f", changes, read, error)
+    if (.not. allocated(error)) call create_simulation(read, line, sim, error)
+    if (present(input)) input = read
+    if (present(message)) message = ""
+    if (.not. allocated(error)) return
+    if (.not. present(message)) error stop "a test needs a state that cannot be built"
+    message = error%message
+  end subroutine build
 
   !> Disks one by one, each a species of its own, in the unit box with elastic walls.
   function few_disks(x, v, radius, mass) result(sim)
