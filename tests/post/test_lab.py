@@ -10,7 +10,6 @@ import threading
 from pathlib import Path
 
 import pytest
-from tqdm import tqdm
 
 import lab as script
 from ricochet import lab as module
@@ -179,58 +178,14 @@ def going_on(lab, page, **more):
     return run
 
 
-def test_a_page_has_one_run_and_keeps_the_one_to_compare_with(lab):
-    page = lab.new_page()
-    first = going_on(lab, page)
-    second = going_on(lab, page, keep=1)
-    third = going_on(lab, page, keep=1)
-    assert not first.running and not second.running and third.running
-    assert first.folder.exists() and not second.folder.exists()
-    assert list(lab.page(page).runs) == [1, 3]
-
-
-def test_a_stopped_run_goes_on_from_its_checkpoint(lab):
-    page = lab.new_page()
-    run = going_on(lab, page)
-    lab.stop({"page": page})
-    run.process.wait()
-    assert lab.state(page) == {"running": False, "stopped": True, "reason": "stopped"}
-    run = going_on(lab, page, resume=True)
-    assert "--resume" in run.process.args and list(lab.page(page).runs) == [1]
-    lab.stop({"page": page})
-    run.process.wait()
-    assert lab.state(page)["stopped"], run.said()
-
-
-def test_a_film_waits_for_no_progress_bar(lab):
-    """An interrupt may keep the lock of all bars for ever."""
-    page = lab.new_page()
-    wish(lab, page)
-    run = lab.page(page).newest
-    run.process.wait()
-    with tqdm.get_lock():
-        thread = threading.Thread(target=script.filmed, args=[run.opened()], daemon=True)
-        thread.start()
-        thread.join(PATIENCE)
-        assert not thread.is_alive()
-
-
-@pytest.mark.parametrize("how", ["silence", "goodbye", "another page"])
-def test_a_run_ends_when_its_page_goes(lab, monkeypatch, how):
-    page = lab.new_page()
-    run = going_on(lab, page)
-    if how == "goodbye":
-        lab.leave({"page": page})
-        assert not run.folder.exists()
-    else:
-        lab.watch()
-        assert run.running and not run.reason
-        monkeypatch.setattr(module, "SILENCE", -1)
-        if how == "silence":
-            lab.watch()
-        else:
-            monkeypatch.setattr(module, "PAGES", 1)
-            lab.new_page()
+@pytest.mark.parametrize(("limit", "most"), [("SILENCE", -1), ("PAGES", 1)])
+def test_a_run_ends_when_its_page_is_silent_and_another_comes(lab, monkeypatch, limit, most):
+    run = going_on(lab, lab.new_page())
+    lab.watch()
+    assert run.running and not run.reason
+    monkeypatch.setattr(module, "SILENCE", -1)
+    monkeypatch.setattr(module, limit, most)
+    lab.watch() if limit == "SILENCE" else lab.new_page()
     run.process.wait(PATIENCE)
     assert not run.running
 
@@ -298,27 +253,14 @@ def test_only_its_own_pages_may_start_runs(lab, server):
         assert post(server, "/start", good, Origin=origin)[0] == 403, origin
     assert post(server, "/start", good, Host="evil.example")[0] == 403
     assert post(server, "/start", good | {"page": "1234"})[0] == 409
+    senseless = {"input": ["../gas", ["gas"]], "settings": [[]], "added": ["obstacle"]}
+    for name, values in {**senseless, "page": [None]}.items():
+        for value in values:
+            status, text = post(server, "/start", good | {name: value})
+            assert status in (400, 409) and len(text.splitlines()) == 1, text
     assert lab.page(page).runs == {}
     assert post(server, "/start", good)[0] == 200
     assert lab.page(page).newest.running
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"input": "../gas"},
-        {"input": ["gas"]},
-        {"settings": []},
-        {"added": "obstacle"},
-        {"page": None},
-    ],
-)
-def test_wishes_that_make_no_sense_are_refused_in_one_line(lab, server, change):
-    page = lab.new_page()
-    good = {"page": page, "input": "gas", "settings": {}, "added": []}
-    status, text = post(server, "/start", good | change)
-    assert status in (400, 409) and len(text.splitlines()) == 1, text
-    assert lab.page(page).runs == {}
 
 
 # --- the command ---
@@ -421,8 +363,6 @@ def test_the_form_has_every_variable_and_sliders_keep_to_what_is_allowed(opened,
         if name != "name"
     }
     assert rows == wanted
-    offered = opened.run("return [...$('add').options].map(option => option.value)")
-    assert {value.split()[0] for value in offered if value} == named
     wrong = opened.run(
         """const wrong = [];
         const all = Object.entries(lab.table).flatMap(([kind, own]) =>
@@ -503,7 +443,7 @@ def test_pause_stops_run_and_film_and_go_on_goes_on(opened, lab):
     assert not page.newest.running and opened.run("return !films().some(isPlaying)")
     opened.click("pause")
     wait_for(lambda: page.newest.running)
-    assert list(page.runs) == [2]
+    assert list(page.runs) == [2] and "--resume" in page.newest.process.args
     opened.open("about:blank")  # the page says goodbye
     wait_for(lambda: lab.pages == {})
 
@@ -519,18 +459,9 @@ def test_the_keyboard_is_enough(opened):
     opened.press("s")
     assert opened.run("return getComputedStyle($('form')).display") == "none"
     opened.press("s")
-    opened.run("document.querySelector('[data-place=\"species.gas.count\"] [type=range]').focus()")
-    opened.press("\ue014")
-    shows(opened, 2)
-    assert int(opened.run("return state.settings['species.gas.count']")) > 1000
-    seen = set()
-    for _ in range(12):
-        opened.press("\ue004")  # tab
-        seen.add(opened.run("return document.activeElement.id || document.activeElement.tagName"))
-    assert len(seen) > 5
     opened.run("document.querySelector('iframe').contentWindow.focus()")
     opened.press("r")
-    run_of(opened, 3)
+    run_of(opened, 2)
 
 
 @pytest.mark.parametrize(
@@ -551,10 +482,3 @@ def test_nothing_is_wider_than_the_screen(server, lab, browser, monkeypatch, wid
         )
         assert wide == []
         assert browser.run("return document.documentElement.scrollHeight <= innerHeight + 1")
-    browser.run("bare(true)")
-    bottom, size = browser.run(
-        """const frame = document.querySelector('iframe').getBoundingClientRect();
-        const box = inFilm(films()[0], 'stage').getBoundingClientRect();
-        return [frame.top + box.bottom, box.height]"""
-    )
-    assert bottom <= height and size >= 190
