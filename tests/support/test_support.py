@@ -35,7 +35,7 @@ VERDICTS = """module test_verdicts
   use, intrinsic :: iso_fortran_env, only: int64, real64
   use funit
   implicit none
-  real(real64), parameter :: matrix(2, 2) = reshape([1.0_real64, 2.0_real64, 3.0_real64, 4.0_real64], [2, 2])
+  real(real64), parameter :: matrix(2, 2) = reshape(1.0_real64*[1, 2, 3, 4], [2, 2])
   integer :: prepared = 0
 contains
   @before
@@ -76,7 +76,7 @@ PASSES = """
     @assertEqual(matrix, 1.0_real64*matrix)
     @assertEqual([1, 2], [1, 2])
     @assertEqual(2, spread(spread([2, 2], 2, 2), 3, 2))
-    @assertEqual(1.0_real64, 1.0_real64 + 1.0e-9_real64, tolerance=1.0e-8_real64, message='both '//'keywords')
+    @assertEqual(1.0_real64, 1 + 1.0e-9_real64, tolerance=1.0e-8_real64, message='both '//'words')
     @assertLessThan(1, 2)
     @assertLessThan(0.0_real64, matrix)
     @assertLessThanOrEqual(2_int64, 2_int64)
