@@ -74,54 +74,33 @@ class Browser:
             count,
         )
 
+    def element(self, name: str) -> dict:
+        return self.call("POST", "/element", {"using": "css selector", "value": f"#{name}"})
+
     def click(self, name: str) -> None:
-        found = self.call("POST", "/element", {"using": "css selector", "value": f"#{name}"})
-        self.call("POST", f"/element/{next(iter(found.values()))}/click", {})
+        self.call("POST", f"/element/{next(iter(self.element(name).values()))}/click", {})
+
+    def on_stage(self, x: float, y: float) -> dict:
+        """A place in CSS pixels from the corner of the stage, as the driver has it."""
+        box = self.run("return $('stage').getBoundingClientRect().toJSON()")
+        place = {"x": round(x - box["width"] / 2), "y": round(y - box["height"] / 2)}
+        return {"origin": self.element("stage"), **place}
 
     def point(self, kind: str, *fingers: list[tuple[float, float]]) -> None:
-        """Put down a mouse or fingers on the stage, move each along its places, and lift them.
-
-        Places are in CSS pixels from the corner of the stage.
-        """
-        element = self.call("POST", "/element", {"using": "css selector", "value": "#stage"})
-        box = self.run("return $('stage').getBoundingClientRect().toJSON()")
-        middle = box["width"] / 2, box["height"] / 2
+        """Put down a mouse or fingers on the stage, move each along its places, and lift them."""
         moves = []
         for number, places in enumerate(fingers):
-            to = [
-                {
-                    "type": "pointerMove",
-                    "duration": 30,
-                    "origin": element,
-                    "x": round(x - middle[0]),
-                    "y": round(y - middle[1]),
-                }
-                for x, y in places
-            ]
-            actions = [
-                to[0],
-                {"type": "pointerDown", "button": 0},
-                *to[1:],
-                {"type": "pointerUp", "button": 0},
-            ]
-            parameters = {"pointerType": kind}
-            moves.append(
-                {
-                    "type": "pointer",
-                    "id": f"p{number}",
-                    "parameters": parameters,
-                    "actions": actions,
-                }
-            )
+            move = {"type": "pointerMove", "duration": 30}
+            first, *others = [{**move, **self.on_stage(*place)} for place in places]
+            down, lift = {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}
+            one = {"type": "pointer", "id": f"p{number}", "parameters": {"pointerType": kind}}
+            moves.append({**one, "actions": [first, down, *others, lift]})
         self.call("POST", "/actions", {"actions": moves})
         self.call("DELETE", "/actions")
 
     def wheel(self, x: float, y: float, steps: int) -> None:
         """Turn the wheel over a place of the stage."""
-        element = self.call("POST", "/element", {"using": "css selector", "value": "#stage"})
-        box = self.run("return $('stage').getBoundingClientRect().toJSON()")
-        place = {"x": round(x - box["width"] / 2), "y": round(y - box["height"] / 2)}
-        scroll = {"type": "scroll", "origin": element, "deltaX": 0, "deltaY": -100, **place}
+        scroll = {"type": "scroll", "deltaX": 0, "deltaY": -100, **self.on_stage(x, y)}
         body = {"actions": [{"type": "wheel", "id": "wheel", "actions": [scroll] * steps}]}
         self.call("POST", "/actions", body)
 

@@ -137,7 +137,9 @@ def server(tmp_path):
     one.server_close()
 
 
-def test_requests_under_another_name_and_what_is_none_are_refused_without_a_word(server, capfd):
+def test_requests_under_another_name_are_refused(server, capfd):
+    """Without a word; so is what is no request."""
+
     def status_of(line, *hosts):
         head = "".join(f"Host: {one}\r\n".replace("PORT", str(server)) for one in hosts)
         with socket.create_connection(("127.0.0.1", server), timeout=PATIENCE) as connection:

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
-from ricochet import Obstacle, RunError, read_run
+from ricochet import RunError, read_run
 from ricochet.drawing import draw_box, plt, radius_marks
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 from whole_runs import FINISHED, MIXTURE, STOPPED, frames_in, wait_for, write_input
@@ -33,40 +33,18 @@ def tiny(path, frames=1, count=1, **more):
 def small(tmp_path):
     """Three frames of two disks that move apart."""
     x = np.array([[[0.2, 0.5], [0.7, 0.5]], [[0.1, 0.5], [0.8, 0.5]], [[0.0, 0.5], [0.9, 0.5]]])
-    v = np.array([[[-3.0, 4.0], [0.0, 1.0]]] * 3)
-    disks = {"mass": [2.0, 1.0], "radius": [0.1, 0.2], "species": [2, 1]}
-    disks |= {"names": ("light", "heavy one"), "collisions": [[0, 0], [1, 0], [3, 2]]}
-    box = {"edges": (2, 4), "lower": (-1, -2), "periodic": (True, False), "time": [0, 0.5, 1]}
-    box["image"] = np.array([[[0, 0], [0, 0]], [[0, 0], [1, 0]], [[-1, 0], [1, 0]]])
-    box["obstacles"] = [((0.5, 0.25), 0.2, 0)]
-    observables = {"collisions": [0, 2, 6], "all/kinetic_energy": [1.0, 2.0, 3.0]}
-    parameters = {"run": {"seed": 7}, "contact": {"restitution": 0.5}}
-    parameters["box"] = {"gravity": [0.0, -9.81]}
-    more = {"observables": observables, "parameters": parameters}
-    return write_run(tmp_path / "small.h5", x, v, **disks, **box, **more)
+    return write_run(tmp_path / "small.h5", x, 0 * x, collisions=[[0, 0], [1, 0], [3, 2]])
 
 
-def test_constants_and_parameters(small):
-    run = read_run(small)
-    assert (run.count, run.frames, run.names) == (2, 3, ("light", "heavy one"))
-    assert run.seed == 7 and run.restitution == 0.5
-    np.testing.assert_array_equal(run.gravity, [0, -9.81])
-    np.testing.assert_array_equal(run.upper, [1, 2])
-    np.testing.assert_array_equal(run.periodic, [True, False])
-    np.testing.assert_array_equal(run.of_species("heavy one"), [True, False])
-    (obstacle,) = run.obstacles
-    assert obstacle[1:] == Obstacle(None, 0.2, False)[1:]
-    assert repr(run) == f"<Run {small}: 1 light, 1 heavy one; 3 frames, t = 0 to 1>"
-
-
-def test_derived_quantities(small):
-    run = read_run(small)
-    np.testing.assert_allclose(run.speed(0), [5, 1])
-    np.testing.assert_allclose(run.kinetic_energy(-1), [25, 0.5])
-    np.testing.assert_allclose(run.unwrapped(2), [[-2, 0.5], [2.9, 0.5]])
-    np.testing.assert_allclose(run.displacement(2), [2.2, 2.2])
-    np.testing.assert_allclose(run.displacement(slice(0, 2)), [[0, 0], [0.1, 2.1]])
-    np.testing.assert_allclose(run.collisions_per_disk_at([0.25, 1.0]), [1, 6])
+def test_constants_are_those_of_the_input_and_energies_those_of_the_observables(simulated):
+    run = simulated(FALLING + "&run seed = 7 / &stop time = 1 / " + BOTH.format(""))
+    assert (run.count, run.names, run.seed, run.restitution) == (16, ("A", "B"), 7, 1)
+    np.testing.assert_array_equal([run.gravity, run.upper], [[0, -9.81], [4, 4]])
+    for kind in run.by_species:
+        energies = run.kinetic_energy(slice(None))[:, kind.disks].mean(axis=1)
+        found = run.observable(f"{kind.name}/kinetic_energy").value
+        np.testing.assert_allclose(energies, found, rtol=1e-9)
+    assert repr(run) == f"<Run {run.path}: 8 A, 8 B; {run.frames} frames, t = 0 to 1>"
 
 
 def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
@@ -190,15 +168,6 @@ def test_scripts_answer_a_bad_file_with_one_line_and_exit_2(tmp_path, script, ca
         assert words in said
 
 
-def read_everything(path):
-    """All numbers that a script could ask for."""
-    run = read_run(path)
-    asked = [run.time, run.position[-1], run.velocity[:], run.speed(0), run.kinetic_energy(-1)]
-    asked += [run.unwrapped(-1), *run.events, run.collisions_per_disk_at(run.time)]
-    for name in ("total_energy", "momentum", *(f"{name}/kinetic_energy" for name in run.names)):
-        asked += run.observable(name)
-
-
 @pytest.fixture
 def unfinished(ricochet, tmp_path) -> Path:
     """What a run has written that its wall clock stopped."""
@@ -217,13 +186,14 @@ def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
         for k in range(cuts):
             path.write_bytes(data[: k * len(data) // cuts])
             with pytest.raises(RunError, match=r"is empty|cut short") as caught:
-                read_everything(path)
+                read_run(path)
             assert "\n" not in str(caught.value)
 
 
 # --- runs that go on, or ended early ---
 
-OUTPUT = "&stop time = 1e5 / &output frames_every_time = 0.2 observables_every_time = 0.2 {}/\n"
+BOTH = "&output frames_every_time = 0.2 observables_every_time = 0.2 {}/\n"
+OUTPUT = "&stop time = 1e5 / " + BOTH
 LONGER = OUTPUT.format("").replace("1e5", "1e6")  # of few disks
 PAIR = "&species name = 'one' count = 1 radius = 0.1 position = {}, 0.3 velocity = 1, 0.3 /\n"
 FALLING = """&box upper = 4, 4 gravity = 0, -9.81 /

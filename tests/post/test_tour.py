@@ -33,19 +33,24 @@ def test_the_page_says_all_that_a_run_can_do():
     assert [name for name in sorted(names) if not re.search(rf"`{name}\b", page)] == []
 
 
-@pytest.fixture(scope="module")
-def cells(program):
-    """The code of each cell with what it shows: kinds of data and texts."""
+@pytest.mark.check
+def test_each_cell_shows_what_it_promises(program, monkeypatch):
+    """Figures, a film with buttons, a conserved energy, a mistake that is told; no warning."""
     nbclient = pytest.importorskip("nbclient")
     import nbformat
 
     notebook = nbformat.read(ROOT / "docs" / "tour.ipynb", as_version=4)
-    with pytest.MonkeyPatch.context() as environment:
-        environment.setenv("RICOCHET", str(program))
-        kernel = {"kernel_name": "python3", "timeout": 300}
-        folder = {"metadata": {"path": str(ROOT / "docs")}}
-        nbclient.NotebookClient(notebook, resources=folder, **kernel).execute()
-    return [(cell.source, shown(cell)) for cell in notebook.cells if cell.cell_type == "code"]
+    monkeypatch.setenv("RICOCHET", str(program))
+    kernel = {"kernel_name": "python3", "timeout": 300}
+    folder = {"metadata": {"path": str(ROOT / "docs")}}
+    nbclient.NotebookClient(notebook, resources=folder, **kernel).execute()
+    cells = [(one.source, shown(one)) for one in notebook.cells if one.cell_type == "code"]
+    drawn = [output for source, output in cells if "plt.subplots" in source]
+    assert len(drawn) == 4 and all("image/png" in output for output in drawn)
+    assert "Animation(frames" in showing(cells, "animate(run")
+    assert float(showing(cells, "largest relative").split(":")[1]) < 1e-12
+    assert "contact.restitution" in showing(cells, "except ricochet.ProgramError")
+    assert [source for source, output in cells if "Warning" in output] == []
 
 
 def shown(cell):
@@ -60,25 +65,3 @@ def showing(cells, code):
     """What the one cell shows that contains this code."""
     (found,) = [output for source, output in cells if code in source]
     return found
-
-
-@pytest.mark.check
-def test_every_figure_is_drawn(cells):
-    drawn = [output for source, output in cells if "plt.subplots" in source]
-    assert len(drawn) == 4 and all("image/png" in output for output in drawn)
-
-
-@pytest.mark.check
-def test_the_film_has_buttons(cells):
-    assert "Animation(frames" in showing(cells, "animate(run")
-
-
-@pytest.mark.check
-def test_energy_is_conserved_and_mistakes_are_told(cells):
-    assert float(showing(cells, "largest relative").split(":")[1]) < 1e-12
-    assert "contact.restitution" in showing(cells, "except ricochet.ProgramError")
-
-
-@pytest.mark.check
-def test_no_cell_warns(cells):
-    assert [source for source, output in cells if "Warning" in output] == []
