@@ -25,7 +25,7 @@ module test_systems
   private
   public :: add_obstacle, build, few_disks, system, systems, every_system, prepare, evolve, difference
   public :: total_energy, momentum, tightest_gap
-  public :: draw_between, draw_vector, draw_magnitude, disk_named, time_to_contact
+  public :: draw_between, draw_vector, draw_magnitude, time_to_contact
 
   !> What has to hold in every system holds in these, each feature with and without most others.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
@@ -387,14 +387,6 @@ contains
     disc = sigma**2*dot_product(dv, dv) - (dx(1)*dv(2) - dx(2)*dv(1))**2
     if (b < 0 .and. disc > 0) s = max(dot_product(dx, dx) - sigma**2, 0.0_dp)/(sqrt(disc) - b)
   end function time_to_contact
-
-  !> Where the disk with this id is in memory.
-  pure function disk_named(sim, id) result(i)
-    type(simulation_t), intent(in) :: sim
-    integer, intent(in) :: id
-    integer(int32) :: i
-    i = findloc(sim%tag%id, id, dim=1)
-  end function disk_named
 
   !> A number uniform between two.
   subroutine draw_between(stream, low, high, u)
