@@ -5,10 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ricochet import read_run
 from ricochet.paths import Paths
 from synthetic_run import written
-from whole_runs import FINISHED, write_input
 
 SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
 &wall name = 'ramp' from = 0.2, 0.2 to = 0.5, 0.4 /
@@ -16,6 +14,7 @@ SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
 DISKS = """&species name = 'a' count = 20 radius = 0.03 temperature = 1 /
 &species name = 'b' count = 10 radius = 0.05 mass = 4 temperature = 1 /
 """
+LOG = "output.event_log=.true."
 SYSTEMS = {
     "periodic": "&box boundary = 'periodic', 'periodic' /\n&contact restitution = 0.9 /\n" + SHAPES,
     "half": "&box boundary = 'periodic', 'wall' gravity = 0, -2 /\n" + SHAPES,
@@ -34,16 +33,13 @@ SYSTEMS = {
 
 
 @pytest.fixture(params=SYSTEMS)
-def runs(request, ricochet, tmp_path):
+def runs(request, simulated):
     """One trajectory with few frames and an event log, with some, and with many frames."""
-    write_input(tmp_path, SYSTEMS[request.param] + DISKS + "&stop time = 1 /\n")
-    found = []
-    for gap, log in ((0.25, True), (0.05, False), (0.01, False)):
-        settings = f"output.frames_every_time={gap}", f"output.event_log=.{str(log).lower()}."
-        done = ricochet("gas.nml", "-o", f"{gap}.h5", "--set", settings[0], "--set", settings[1])
-        assert done.returncode == FINISHED, done.stderr
-        found.append(read_run(tmp_path / f"{gap}.h5"))
-    return found
+    text = SYSTEMS[request.param] + DISKS + "&stop time = 1 /\n"
+    return [
+        simulated(text, f"output.frames_every_time={gap}", *log, name=f"{gap}")
+        for gap, log in ((0.25, [LOG]), (0.05, []), (0.01, []))
+    ]
 
 
 def places(run, frame, ends, turns, disk, times):
@@ -85,11 +81,9 @@ def test_a_single_collision_between_frames_is_found_without_a_log(runs):
     assert gap < 1e-6 and guessed == np.sum(hits > 1)
 
 
-def test_a_log_that_leads_elsewhere_is_not_believed(ricochet, tmp_path):
+def test_a_log_that_leads_elsewhere_is_not_believed(simulated):
     """That of a run leads from its first frame to its last; not so with a collision less."""
-    write_input(tmp_path, DISKS + "&stop time = 5 /\n&output event_log = .true. /\n")
-    assert ricochet("gas.nml", "-o", "a.h5", "--set", "output.precision='single'").returncode == 0
-    run = read_run(tmp_path / "a.h5")
+    run = simulated(DISKS + "&stop time = 5 /\n", LOG, "output.precision='single'")
     (turns,) = Paths(run).along([0, run.frames - 1])
     assert not turns.guessed.any()
     run.events.momentum_change[7] = 0
@@ -97,12 +91,9 @@ def test_a_log_that_leads_elsewhere_is_not_believed(ricochet, tmp_path):
     assert turns.guessed[run.events.i[7] - 1]
 
 
-def test_turns_beyond_the_room_for_them_are_guessed(ricochet, tmp_path):
+def test_turns_beyond_the_room_for_them_are_guessed(simulated):
     """And not looked for: a log may hold 1e9 events."""
-    write_input(tmp_path, DISKS + "&stop time = 2 /\n&output event_log = .true. /\n")
-    done = ricochet("gas.nml", "-o", "a.h5", "--set", "output.frames_every_time=0.5")
-    assert done.returncode == FINISHED
-    run = read_run(tmp_path / "a.h5")
+    run = simulated(DISKS + "&stop time = 2 /\n", LOG, "output.frames_every_time=0.5")
     frames = list(range(run.frames))
     all_turns = [len(turns.disk) for turns in Paths(run).along(frames)]
     some = list(Paths(run, all_turns[0] + 1).along(frames))
@@ -118,10 +109,8 @@ def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_
     assert turns.guessed.tolist() == [False, True]
 
 
-def test_with_kicks_no_path_between_frames_is_known(ricochet, tmp_path):
+def test_with_kicks_no_path_between_frames_is_known(simulated):
     drive = "&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n"
-    write_input(tmp_path, DISKS + drive + "&stop time = 1 / &output frames_every_time = 0.05 /\n")
-    assert ricochet("gas.nml", "-o", "run.h5", "--set=output.event_log=true").returncode == FINISHED
-    run = read_run(tmp_path / "run.h5")
+    run = simulated(drive + DISKS + "&stop time = 1 /\n", LOG, "output.frames_every_time=0.05")
     for turns in Paths(run).along(list(range(run.frames))):
         assert len(turns.disk) == 0 and turns.guessed.all()

@@ -16,21 +16,22 @@ from ricochet import ProgramError, program
 from synthetic_run import ROOT
 from whole_runs import STOPPED, USAGE, differences, is_asleep, wait_for
 
-#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays.
+THIRD = 0.1 / 3
+#: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays; as of numpy.
 GROUPS = {
-    "run": {"title": "it's a test", "seed": 5},
-    "box": {"lower": (-1, 0), "boundary": ["periodic", "wall"]},
-    "species": [
-        {"name": "light", "count": 20, "radius": 0.02, "speed": 1},
-        {"name": "heavy", "position": np.array([[-0.5, 0.2], [0.5, 0.8]]), "radius": 1e-2},
-    ],
+    "run": {"title": np.str_("it's a test"), "seed": np.array(5)},
+    "box": {"lower": np.array([-1, 0], np.int8), "boundary": ["periodic", "wall"]},
+    "species": (
+        {"name": "light", "count": 20, "radius": np.float32(0.03125), "speed": np.longdouble(1)},
+        {"name": "heavy", "position": np.array([[[-0.5, 0.2]], [[0.5, 0.8]]]), "radius": THIRD},
+    ),
     "stop": {"collisions": 30},
-    "output": {"event_log": True},
+    "output": {"event_log": np.bool_(True)},
 }
-TEXT = """&run title = 'it''s a test' seed = 5 /
+TEXT = f"""&run title = 'it''s a test' seed = 5 /
 &box lower = -1, 0 boundary = 'periodic', 'wall' /
-&species name = 'light' count = 20 radius = 0.02 speed = 1 /
-&species name = 'heavy' position = -0.5, 0.2, 0.5, 0.8 radius = 1e-2 /
+&species name = 'light' count = 20 radius = 0.03125 speed = 1 /
+&species name = 'heavy' position = -0.5, 0.2, 0.5, 0.8 radius = {THIRD!r} /
 &stop collisions = 30 /
 &output event_log = .true. /
 """
@@ -46,7 +47,7 @@ def its_program(program, monkeypatch, tmp_path):
 def test_a_dictionary_is_the_same_run_as_the_file(tmp_path, ricochet):
     (tmp_path / "gas.nml").write_text(TEXT)
     assert ricochet("gas.nml", "-o", "a.h5", "--set", "species.light.mass=2.5").returncode == 0
-    heavier = {"species.light.mass": np.float64(2.5)}
+    heavier = {"species.light.mass": np.array(2.5)}
     run = package.run(GROUPS, heavier, tmp_path / "b.h5")
     assert run.parameter("run", "title") == "it's a test" and run.mass[0] == 2.5
     of_file = package.run("gas.nml", overrides=heavier)
@@ -62,7 +63,10 @@ def test_what_the_program_says_is_the_message(tmp_path):
     package.run(GROUPS, output="a.h5")
     with pytest.raises(ProgramError, match=r"a\.h5.*exists"):
         package.run(GROUPS, output="a.h5")
-    assert package.run(GROUPS, {"run.seed": 6}, "a.h5", force=True).seed == 6
+    others = {"run.seed": 6, "run.title": np.array("no"), "output.event_log": np.array(False)}
+    run = package.run(GROUPS, others, "a.h5", force=True)
+    assert run.seed == 6 and run.parameter("run", "title") == "no"
+    assert not run.parameter("output", "event_log")
 
 
 def test_nothing_is_left_of_a_run_without_output(tmp_path):
@@ -131,23 +135,6 @@ def test_what_is_no_input_is_refused(groups, words):
     with pytest.raises(TypeError, match=re.escape(words)) as refused:
         package.run(groups)
     assert "\n" not in str(refused.value)
-
-
-def test_values_of_numpy_are_numbers():
-    """Of any number of dimensions; the last digit counts."""
-    third = 1 / np.float64(3)
-    groups = {
-        "run": {"seed": np.array(7), "title": np.str_("it's")},
-        "box": {"lower": np.zeros(2, np.int8), "upper": [np.float32(2), np.array(third + 1)]},
-        "species": ({"position": np.full((2, 1, 2), [[[0.3, 0.4]], [[1.2, 1.1]]]), "radius": 0.1},),
-        "stop": {"events": np.array(50), "time": np.longdouble(0)},
-        "output": {"event_log": np.bool_(True)},
-    }
-    run = package.run(groups, {"run.title": np.array("no"), "output.event_log": np.array(False)})
-    assert run.seed == 7 and run.parameter("run", "title") == "no"
-    np.testing.assert_array_equal(run.edges, [2, third + 1])
-    np.testing.assert_array_equal(run.position[0], [[0.3, 0.4], [1.2, 1.1]])
-    assert run.parameter("stop", "events") == 50 and not run.parameter("output", "event_log")
 
 
 def test_file_names_may_begin_with_a_dash(tmp_path):

@@ -101,14 +101,12 @@ def test_straight_walls_are_read_and_drawn_with_their_images(tmp_path):
                 assert any(np.allclose(wall + np.array([i, 0]), line) for line in drawn)
 
 
-def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(ricochet, tmp_path):
-    text = """&side name = 'left' temperature = 2 / &wall name = 'w' from = 0.2, 0.2 to = 0.4, 0.3 /
+def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
+    run = simulated("""&side name = 'left' temperature = 2 /
+    &wall name = 'w' from = 0.2, 0.2 to = 0.4, 0.3 /
     &contact tangential_restitution = 0.5 wall_rule = 'normal' /
     &species count = 20 radius = 0.03 temperature = 1 rotational_temperature = 1 /
-    &stop time = 1 / &output frames_every_time = 0.1 event_log = .true. /"""
-    write_input(tmp_path, text)
-    assert ricochet("gas.nml", "-o", "gas.h5").returncode == FINISHED
-    run = read_run(tmp_path / "gas.h5")
+    &stop time = 1 / &output frames_every_time = 0.1 event_log = .true. /""")
     assert set(run.elements) == {"angular_velocity", "orientation"}
     energy = 0.5 * np.mean(run.inertia * run.angular_velocity[:] ** 2, axis=1)
     assert run.observable("all/rotational_energy").value[-1] == pytest.approx(energy[-1])
