@@ -61,12 +61,18 @@ def sections_of(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_somewhere(page):
-    links = re.findall(r"\]\(([^)\s]+)\)", page.read_text())
+def test_what_a_page_leads_to_and_names_is_there(page):
+    text = page.read_text()
+    links = re.findall(r"\]\(([^)\s]+)\)", text)
     local = [link.partition("#") for link in links if not link.startswith(ELSEWHERE)]
     assert [name for name, _, _ in local if not (page.parent / name).exists()] == []
     sections = [(page.parent / name, section) for name, _, section in local if section]
     assert [section for path, section in sections if section not in sections_of(path)] == []
+    folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
+    named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", text)
+    mine = {"runs/mine.nml", *re.findall(r"`(src/\S+)`, a new file", text)}
+    missing = [name for name in named if not (ROOT / name).exists()]
+    assert [name for name in missing if name not in mine and name == name.lower()] == []
 
 
 def test_the_readme_leads_to_every_page():
@@ -175,15 +181,6 @@ def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(fol
     there = {str(path.relative_to(ROOT / "tests")) for path in ROOT.glob("tests/**/*")}
     there |= {name.rpartition("/")[2] for name in there}
     assert protected and named and [name for name in named if name not in there] == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_scripts_and_inputs_that_are_named_exist(page):
-    folders, endings = "post|runs|input|tests|src|docs", "py|sh|nml|f90|pf"
-    named = re.findall(rf"\b((?:{folders})/(?:\w+/)*\w+\.(?:{endings})\b)", page.read_text())
-    mine = {"runs/mine.nml", *re.findall(r"`(src/\S+)`, a new file", page.read_text())}
-    missing = [name for name in named if not (ROOT / name).exists()]
-    assert [name for name in missing if name not in mine and name == name.lower()] == []
 
 
 def test_options_that_are_named_exist(program):
