@@ -72,6 +72,7 @@ class Draw:
         self.falls = self.chance(0.3) and not all(self.periodic)
         self.sheared = all(self.periodic) and not self.steps and self.chance(0.5)
         self.worked = False  # by walls: the energy that is left says nothing
+        self.drifts = all(self.periodic)  # all disks together, for ever, if none moves at random
         self.columns: list[str] = []
         self.table = np.empty((0, 8))
         self.kinds = 1
@@ -219,6 +220,7 @@ class Draw:
             ]
         )
         if words.split()[0] in ("temperature", "velocities", "speed") and "rest" not in words:
+            self.drifts = False
             words += self.maybe(0.2 if count > 2 else 0, f"exact_temperature = {v**2!r}")
         if self.turns and self.chance(0.4):
             rate = v / min(self.edges) * 10.0 ** rng.uniform(-1, 2)
@@ -351,7 +353,7 @@ class Draw:
         words += self.maybe(0.2, f"collisions_per_disk = {rate!r}")
         if not (self.driven or self.sheared or self.worked):
             words += self.maybe(0.3, f"energy_fraction = {rng.uniform(0.05, 0.95)!r}")
-        if self.chance(0.3) or self.steps or self.driven or self.disks < 4:
+        if self.chance(0.3) or self.steps or self.driven or self.drifts or self.disks < 4:
             words += f" time = {rng.uniform(0.01, 1) * min(self.edges) / self.speed!r}"
         return words + " /"
 
