@@ -112,7 +112,8 @@ def test_each_assertion_passes_or_fails_under_the_substitute_as_under_pfunit(tmp
     rows = zip(failing, FAILS.strip().splitlines(), strict=True)
     tests = [VERDICT.format(name, line.strip()) for name, line in rows]
     tests += [VERDICT.format("passes_after_all_failures", PASSES.strip())]
-    (tmp_path / "test_verdicts.pf").write_text(VERDICTS + "".join(tests) + "end module\n")
+    text = "".join([VERDICTS, *tests, "end module test_verdicts\n"])
+    (tmp_path / "test_verdicts.pf").write_text(text)
     command = [
         "make",
         "unit-tests",
