@@ -101,19 +101,6 @@ def test_shares_are_the_whole_without_overlap(ensemble):
     assert [len(part) for part in parts] == [3, 2, 2]
 
 
-@pytest.mark.parametrize(("engine", "tool"), [("slurm", "sbatch"), ("parallel", "parallel")])
-def test_a_missing_engine_is_said(ensemble, tmp_path, engine, tool):
-    tools = tmp_path / "tools"
-    tools.mkdir()
-    for path in ("/bin", "/usr/bin"):
-        for one in Path(path).iterdir():
-            link = tools / one.name
-            if one.name != tool and not link.exists() and not link.is_symlink():
-                link.symlink_to(one)
-    result = ensemble("--seeds", 1, "--engine", engine, PATH=str(tools))
-    assert result.returncode == 2 and f"--engine {engine} needs" in result.stderr
-
-
 # --- GNU parallel ---
 
 

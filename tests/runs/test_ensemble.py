@@ -83,16 +83,24 @@ def ensemble(lab, *options, seconds=None):
     )
 
 
-def test_a_system_without_flock_is_told_the_package(lab, tmp_path):
-    for tool in ("dirname", "nproc"):
-        (tmp_path / tool).symlink_to(shutil.which(tool))
-    few = environment(lab) | {"PATH": str(tmp_path)}
-    words = [shutil.which("bash"), *command(lab, "--seeds", "1")]
-    done = subprocess.run(words, env=few, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (
-        2,
-        "ensemble.sh: needs flock (package util-linux)\n",
-    )
+@pytest.mark.parametrize(
+    ("tool", "engine", "said"),
+    [
+        ("flock", "pool", "ensemble.sh: needs flock (package util-linux)\n"),
+        ("sbatch", "slurm", "--engine slurm needs"),
+        ("parallel", "parallel", "--engine parallel needs"),
+    ],
+)
+def test_a_tool_that_is_missing_is_told(lab, tool, engine, said):
+    (lab / "tools").mkdir()
+    for path in {*Path("/bin").iterdir(), *Path("/usr/bin").iterdir()}:
+        link = lab / "tools" / path.name
+        if path.name != tool and not link.is_symlink():
+            link.symlink_to(path)
+    few = environment(lab) | {"PATH": str(lab / "tools")}
+    words = command(lab, "--seeds", "1", "--engine", engine)
+    done = subprocess.run(["bash", *words], env=few, capture_output=True, text=True)
+    assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1
 
 
 def started(lab, *options, members):
