@@ -140,12 +140,6 @@ def words_on(figure):
     return " ".join(" ".join(parts).split())
 
 
-@pytest.mark.parametrize("script", ["equipartition", "mixture"])
-def test_what_compares_species_wants_several(tmp_path, rng, capsys, script):
-    path = gas(tmp_path / "gas.h5", rng, names=("one",))
-    assert f": {path}: needs " in refusal(capsys, script, path)
-
-
 def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
     mass = np.repeat([1.0, 4.0], 500)
     v = maxwell_velocities(rng, 31, 1000) / np.sqrt(mass)[:, None] * np.sqrt(1.25)
