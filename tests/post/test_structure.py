@@ -86,26 +86,6 @@ def test_a_cluster_hangs_together_across_a_periodic_side_and_not_across_a_wall(t
 # --- motion ---
 
 
-def test_velocities_that_turn_are_remembered_as_a_cosine(tmp_path):
-    time = np.arange(101) * 0.1
-    v = np.stack([np.cos(time), np.sin(time)], axis=1)[:, None].repeat(3, axis=1)
-    run = written(tmp_path / "run.h5", 0 * v, v, time=time)
-    at = transport.lags(100)
-    assert at[0] == 1 and at[-1] == 50 and np.all(np.diff(at) > 0)
-    memory = transport.velocity_memory(run, slice(101), at)
-    np.testing.assert_allclose(memory, np.cos(0.1 * at), atol=1e-12)
-
-
-def test_disks_that_fly_apart_spread_as_the_square_of_time(tmp_path):
-    time = np.arange(51) * 0.1
-    v = np.array([[1.0, 0.0], [-1.0, 0.0]])[None].repeat(51, axis=0)
-    flight = 0.5 + v * time[:, None, None]
-    image = np.floor(flight).astype(int)
-    run = written(tmp_path / "run.h5", flight - image, v, image=image, time=time, periodic=PERIODIC)
-    at = np.array([1, 5, 20])
-    np.testing.assert_allclose(transport.displacement(run, slice(51), at), (0.1 * at) ** 2)
-
-
 def flights(rng, count, time):
     """Positions and velocities (T, count, 2) of points that take a new velocity at the rate 1.
 
@@ -124,7 +104,7 @@ def flights(rng, count, time):
 
 
 @pytest.mark.parametrize(("step", "lag"), [(0.4, 8), (1.0, 4), (2.0, 2), (5.0, 2)])
-def test_diffusion_is_right_however_far_apart_frames_are(tmp_path, rng, step, lag):
+def test_memory_and_diffusion_are_right_however_far_apart_frames_are(tmp_path, rng, step, lag):
     """In mean free times; the ways and slopes of each flight are exact."""
     count, time = 1000, step * np.arange(1200)
     x, v = flights(rng, count, time)
@@ -139,6 +119,10 @@ def test_diffusion_is_right_however_far_apart_frames_are(tmp_path, rng, step, la
     at = np.array([1, 2, 4])
     in_time = transport.integrated_memory(run, slice(None), at)
     np.testing.assert_allclose(in_time, 1 - np.exp(-step * at), atol=0.015)
+    memory = transport.velocity_memory(run, slice(1200), at)
+    np.testing.assert_allclose(memory, np.exp(-step * at), atol=0.015)
+    far = 4 * (step * at - 1 + np.exp(-step * at))
+    np.testing.assert_allclose(transport.displacement(run, slice(1200), at), far, rtol=0.015)
 
 
 # --- formulas ---
