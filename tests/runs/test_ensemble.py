@@ -219,7 +219,7 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     with started(lab, "--seeds", "1-6", "-j", "2", members=2) as process:
         os.killpg(process.pid, how)  # as a terminal does
         said = process.communicate(timeout=PATIENCE)[1]
-    assert process.returncode == 75 and living(lab) == []
+    assert process.returncode == 75 and not processes_of(lab)
     assert "0 of 6 members finished" in said and "stopped: the same command goes on" in said
     assert len(list((lab / "out").glob("*.h5.part"))) == 2
     assert [p.read_text() for p in (lab / "out").glob("*.signals")] == ["TERM\n"] * 2
@@ -269,18 +269,19 @@ def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
         timeout=PATIENCE,
     )
     assert (lab / "sent").exists() and run.returncode == 75, run.stderr
-    assert not living(lab)
+    assert not processes_of(lab)
     (lab / "hold").unlink()
     assert ensemble(lab, "--seeds", "1-3").returncode == 0
 
 
-def living(lab) -> list[str]:
-    """Commands of processes that name the folder."""
-    found = []
+def processes_of(folder) -> dict[int, list[str]]:
+    """The commands of processes that name a folder."""
+    found = {}
     for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with contextlib.suppress(OSError):
-            line = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
-            found += [line] * (str(lab) in line)
+        with contextlib.suppress(OSError):  # gone
+            words = path.read_bytes().decode(errors="replace").split("\0")
+            if any(str(folder) in word for word in words):
+                found[int(path.parent.name)] = words
     return found
 
 
@@ -458,15 +459,7 @@ def finish(process) -> int:
 
 def members_in(folder) -> list[int]:
     """Process ids of the programs that write into a folder."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            words = path.read_bytes().split(b"\0")
-        except OSError:  # gone
-            continue
-        if any(word.startswith(f"{folder}/".encode()) for word in words) and b"-o" in words:
-            found.append(int(path.parent.name))
-    return found
+    return [pid for pid, words in processes_of(f"{folder}/").items() if "-o" in words]
 
 
 def disturb(process, folder, rng):
