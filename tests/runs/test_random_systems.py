@@ -105,12 +105,23 @@ class Case:
         return End(FINISHED, "") if end.code == -signal.SIGKILL else end
 
     def continued(self, name: str, _seconds: float) -> End:
-        """Lets a run end early, and continues it."""
+        """Lets a run end early, by its time or by collisions, and later, and continues it."""
         with h5py.File(self.result("plain")) as file:
             last = float(file["particles/disks/position/time"][-1])
-        early = f"--set=stop.time={min(self.rng.uniform(0, 0.99) * last, LATEST)!r}"
-        end = self.whole(name, *self.way(), *([early] if last > 0 else []))
-        return self.whole(name, *self.way(), "--resume") if last > 0 and not end.code else end
+            collisions = int(file["observables/collisions/value"][-1])
+        times = sorted({min(self.rng.uniform(0, 0.99) * last, LATEST) for _ in "12"})
+        ends = [f"time={time!r}" for time in times if last > 0]
+        in_steps = "'steps'" in self.system.text  # which end with all collisions of a step
+        if collisions > 2 and not in_steps and self.rng.random() < 0.5:
+            numbers = self.rng.sample(range(1, collisions), 2)
+            ends = [f"collisions={number}" for number in sorted(numbers)]
+        resume = []
+        for early in ends:
+            end = self.whole(name, *self.way(), f"--set=stop.{early}", *resume)
+            if end.code:
+                return end
+            resume = ["--resume"]
+        return self.whole(name, *self.way(), *resume)
 
     def with_other_samples(self, name: str, _seconds: float) -> End:
         return self.whole(name, *self.way(), *self.samples(self.rng.randint(3, 20)))

@@ -181,27 +181,6 @@ def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp
 # --- a finished run goes on ---
 
 
-@pytest.mark.parametrize(
-    "ends",
-    [
-        ("stop.time=3.21", "stop.time=5.005", "stop.time=9"),
-        ("stop.events=77", "stop.events=1031", "stop.events=2000"),
-        ("stop.time=0.05", "stop.events=300", "stop.collisions=703"),
-        ("stop.collisions=57", "stop.collisions_per_disk=10", "stop.time=40"),
-    ],
-)
-def test_a_run_that_ends_three_times_is_one_long_run(ricochet, tmp_path, ends):
-    """Every kind of stop rule, between samples and at them, and of a planned number or not."""
-    write_input(tmp_path, GAS + GROWING)
-    options = [] if "time=9" in ends[-1] else ["--set", "output.event_log=F"]
-    assert ricochet("gas.nml", "-o", "whole.h5", *options, "--set", ends[-1]).returncode == FINISHED
-    for k, end in enumerate(ends):
-        resume = ["--resume"] * (k > 0)
-        assert ricochet(*COMMAND, *options, "--set", end, *resume).returncode == FINISHED
-    assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
-    assert {path.name for path in tmp_path.iterdir()} == {"gas.nml", "whole.h5", "gas.h5"}
-
-
 #: Three collisions at the time 0.5, and walls from 2.25 on.
 TOGETHER = """&box upper = 8, 8 /
 &species radius = 0.25 position = 1,1, 2,1, 1,3, 2,3, 1,5, 2,5
