@@ -2,6 +2,7 @@
 program four_disks
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: int32, int64, real64
+  use box_geometry, only: box_t
   use cell_grid, only: cell_grid_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
@@ -41,6 +42,7 @@ contains
     integer(int32) :: i
 
     allocate (sim%species(1))
+    sim%box = box_t()
     call sim%make_room(n)
     sim%law%restitution = reshape([1.0_real64], [1, 1])
     sim%box%upper = 4
