@@ -166,7 +166,7 @@ contains
       t = sim%disk(i)%event_time
       code = sim%disk(i)%partner
       if (.not. t <= t_limit) exit
-      call self%queue%drop_first(sim%tag, i)
+      call self%queue%drop_first(sim%tag)
       sim%now = max(sim%now, t)
       call execute(self, sim, i, code, t, log)
       if (sim%tally%events >= pause_at) exit

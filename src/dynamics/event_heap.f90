@@ -17,8 +17,8 @@ module event_heap
   contains
     procedure :: initialise
     procedure :: update
-    procedure :: remove
     procedure :: first
+    procedure :: drop_first
   end type event_heap_t
 
 contains
@@ -71,24 +71,6 @@ contains
     if (self%slot(event%disk) == k) call sift_down(self, k, event, tag)
   end subroutine update
 
-  !> Removes a disk's event, if there is one.
-  pure subroutine remove(self, disk, tag)
-    class(event_heap_t), intent(inout) :: self
-    integer(int32), intent(in) :: disk
-    type(tag_t), intent(in) :: tag(*)            !! of all disks
-    type(event_t) :: last
-    integer(int32) :: k
-
-    k = self%slot(disk)
-    if (k == 0) return
-    self%slot(disk) = 0
-    last = self%entry(self%n)
-    self%n = self%n - 1
-    if (last%disk == disk) return
-    call sift_up(self, k, last, tag)
-    if (self%slot(last%disk) == k) call sift_down(self, k, last, tag)
-  end subroutine remove
-
   !> The earliest event. The heap must not be empty.
   pure function first(self) result(event)
     class(event_heap_t), intent(in) :: self
@@ -96,6 +78,18 @@ contains
 
     event = self%entry(1)
   end function first
+
+  !> Removes the earliest event. The heap must not be empty.
+  pure subroutine drop_first(self, tag)
+    class(event_heap_t), intent(inout) :: self
+    type(tag_t), intent(in) :: tag(*)            !! of all disks
+    type(event_t) :: last
+
+    self%slot(self%entry(1)%disk) = 0
+    last = self%entry(self%n)
+    self%n = self%n - 1
+    if (self%n > 0) call sift_down(self, 1_int32, last, tag)
+  end subroutine drop_first
 
   !> Moves the hole at `start` up to where `event` belongs and fills it.
   pure subroutine sift_up(self, start, event, tag)

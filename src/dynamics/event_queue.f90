@@ -237,21 +237,20 @@ contains
         if (.not. event%time*self%per_time < self%next_window) exit
         return
       end if
-      call self%heap%remove(i, tag)
+      call self%heap%drop_first(tag)
     end do
     i = 0
   end subroutine first_in_heap
 
   !> Removes the event that `first` found.
-  subroutine drop_first(self, tag, i)
+  subroutine drop_first(self, tag)
     class(event_queue_t), intent(inout) :: self
     type(tag_t), intent(in) :: tag(*)
-    integer(int32), intent(in) :: i                !! as given by `first`
 
     if (self%n_near > 0) then
       self%n_near = self%n_near - 1
     else
-      call self%heap%remove(i, tag)
+      call self%heap%drop_first(tag)
     end if
     self%n_taken = self%n_taken + 1
   end subroutine drop_first
@@ -354,7 +353,7 @@ contains
     do while (self%near_is_open)
       call self%first_in_heap(disk, tag, i)
       if (i == 0) return
-      call self%heap%remove(i, tag)
+      call self%heap%drop_first(tag)
       call self%insert_near(disk, tag, i)
     end do
     call hand_over(self, disk, tag)
