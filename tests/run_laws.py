@@ -169,7 +169,7 @@ def log_error(found: Found) -> float:
     walls = [(-k, f"sides/{name}") for k, name in enumerate(SIDES)]
     names = [*found.get("/parameters/obstacle/name", ()), *found.get("/parameters/wall/name", ())]
     walls += [(-4 - k, f"walls/{name.decode()}") for k, name in enumerate(names)]
-    change = found.get("/events/momentum_change")
+    change = found["/events/momentum_change"]
     wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
     wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
     of_disks = found["/particles/disks/collisions/value"][-1]
@@ -179,10 +179,9 @@ def log_error(found: Found) -> float:
         count, last = series(found, f"{name}/collisions"), series(found, f"{name}/impulse")
         if len(count):
             wrong.append(np.sum(j == code) - count[-1])
-            if change is not None:
-                mine = change[j == code]
-                scale = 1e-12 * np.abs(mine).sum() + 1e-300
-                wrong += list((mine.sum(axis=0) + last[-1]) / scale)
+            mine = change[j == code]
+            scale = 1e-12 * np.abs(mine).sum() + 1e-300
+            wrong += list((mine.sum(axis=0) + last[-1]) / scale)
     return max(np.abs(wrong))
 
 

@@ -18,9 +18,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "post"))
 
-from validation import report
+from validation import CASES, report
 from validation.running import validate
-from validation.tables import CASES
 
 ROOT = Path(__file__).resolve().parents[1]
 

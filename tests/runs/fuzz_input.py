@@ -46,19 +46,7 @@ SEEDS = [
 &stop time = 1.5 collisions = 20 /
 &output precision = 'single' event_log = .true. frames_every_time = 0.25 /
 """,
-    """&obstacle
-  name = 'pin'
-  centre = 0.5, 0.5
-  radius = 0.2
-/
-&species grid = 3, 3  radius = 0.02  speed = 2.5  velocities = 'uniform'
-  region = 0.05, 0.25, 0.05, 0.95 /
-&stop events = 10  energy_fraction = 0.1 /
-""",
-    """&species count = 5 radius = 0.05 temperature = 2 /
-&stop collisions_per_disk = 3 wall_clock = 60 /
-&run search = 'pairs' queue = 'heap' /
-""",
+    *(path.read_text() for path in sorted((ROOT / "input").glob("*.nml"))),
 ]
 
 NUMBERS = re.findall(

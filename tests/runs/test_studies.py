@@ -112,3 +112,15 @@ def test_what_is_missing_shows_before_anything_runs(study):
     assert run.returncode == 2 and "make demo" in run.stderr.splitlines()[-1]
     run = study("figures", "gasses")
     assert run.returncode == 2 and "there are: scattering" in run.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(("per_collision", "code"), [(2080, 0), (2120, 1), (0, 1)])
+def test_the_gate_on_instructions_lets_nothing_through_that_it_did_not_count(
+    study, program, tmp_path, per_collision, code
+):
+    many = 100000 * per_collision + 5000
+    count = f'case "$* " in *collisions=1\\ *) n=5000 ;; *) n={many} ;; esac'
+    stand_in(tmp_path / "bin" / "valgrind", f'{count}\necho "==1== Collected : $n" >&2')
+    gate = study("bench", "--check", RICOCHET=str(program))
+    assert gate.returncode == code, gate.stderr
+    assert f"packing 0.5: {per_collision} instructions per collision" in gate.stdout

@@ -1,10 +1,9 @@
 !> Simulations for tests: states built in a line, followed by any method, and compared; and random cases.
 module test_systems
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds, only: dp => real64, int32, int64, never
   use box_geometry, only: box_t, obstacle_gap
   use box_sides, only: bounds
-  use circles, only: new_circle
-  use disks, only: disk_t, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
@@ -12,14 +11,12 @@ module test_systems
   use partners, only: n_sides
   use random_stream, only: random_stream_t
   use run_setup, only: input_from_text
-  use segments, only: new_segment
   use settings, only: run_input_t
   use shapes, only: shape_t
-  use side_motion, only: side_motion_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use tally, only: dissipated
-  use texts, only: text_t
+  use texts, only: text_t, written
   use timeline, only: advance
   implicit none
   private
@@ -62,6 +59,7 @@ contains
     if (present(input)) input = read
     if (present(message)) message = ""
     if (.not. allocated(error)) return
+    if (.not. present(message)) write (error_unit, "(a)") text, error%message
     if (.not. present(message)) error stop "a test needs a state that cannot be built"
     message = error%message
   end subroutine build
@@ -104,79 +102,66 @@ contains
 
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
   !> origin: `periodic` or `channel` (periodic in x), else walls; `gravity`; `pegs` and `slants` to bounce off and a
-  !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the first
-  !> disk hits; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
+  !> `round` container; `mixture` of two species; a `giant` or two `giants`; a `bed` at rest that the giant
+  !> hits; `inelastic`; `smooth` walls; `contact` time; sides that are `shaken`; `few`, `dilute` or `dense`.
   function system(words, seed, scale) result(sim)
     character(len=*), intent(in) :: words
     integer(int64), intent(in) :: seed
     integer, intent(in), optional :: scale     !! of the box; there are as many more disks as its square
     type(simulation_t) :: sim
-    type(random_stream_t) :: stream
-    real(dp) :: spacing, radius(3)
-    integer(int32) :: i
-    call stream%seed(seed, [1])
-    sim%box = box_t()
-    sim%box%lower = [-1.0_dp, 0.5_dp]
-    sim%box%upper = [2.0_dp, 2.5_dp]
-    if (present(scale)) sim%box%upper = sim%box%lower + scale*[3.0_dp, 2.0_dp]
-    sim%box%periodic = [has("periodic") .or. has("channel"), has("periodic")]
-    if (has("gravity")) sim%box%gravity = merge([0.0_dp, -1.0_dp], [0.5_dp, -1.0_dp], has("channel"))
-    call add_obstacles(sim, words)
-    spacing = merge(1.0_dp, 0.2_dp, has("few"))
-    radius(1) = 0.32_dp*spacing
-    if (has("dilute")) radius(1) = 0.13_dp*spacing
-    if (has("dense")) radius(1) = 0.46_dp*spacing
-    allocate (sim%species(3))
-    sim%species(1)%name = "small"
-    sim%species(2)%name = "other"
-    sim%species(3)%name = "giant"
-    radius(2:) = [merge(0.5_dp, 1.0_dp, has("mixture"))*radius(1), 0.35_dp]
-    sim%species%mass = [1.0_dp, merge(5.0_dp, 1.0_dp, has("mixture")), 30.0_dp]
-    allocate (sim%law%restitution(3, 3))
-    sim%law%restitution = 1
-    if (has("inelastic")) then
-      sim%law%restitution = reshape([0.9_dp, 0.8_dp, 0.7_dp, 0.8_dp, 0.95_dp, 0.6_dp, 0.7_dp, 0.6_dp, &
-        0.5_dp], [3, 3])
-      sim%box%surface(:n_sides)%law%restitution = 0.85_dp
-    end if
-    sim%box%surface(:n_sides)%law%rule = merge(2, 1, has("smooth"))
-    if (has("contact")) sim%law%contact_time = 0.01_dp
-    if (has("shaken")) then                       ! far, fast, and on the spot; all from their places
-      sim%box%surface(3)%motion = side_motion_t(kind=3, amplitude=0.5_dp, period=4.0_dp)
-      if (.not. sim%box%periodic(1)) sim%box%surface(2)%motion = side_motion_t(kind=2, amplitude=0.03_dp, period=0.25_dp, &
-        phase=0.5_dp)
-      sim%box%surface(4)%motion = side_motion_t(kind=4, strike=0.5_dp)
-    end if
-    call fill_lattice(sim, spacing, radius, count([has("giant"), has("giants")]), stream)
-    do i = 2, merge(sim%n_disks(), 1_int32, has("bed"))
-      sim%disk(i)%v = 0
-    end do
-    sim%start_energy = sim%kinetic_energy()
+    real(dp) :: upper(2), radius
+    integer :: n
+    n = 1
+    if (present(scale)) n = scale
+    upper = [-1.0_dp, 0.5_dp] + n*[3.0_dp, 2.0_dp]
+    n = n**2*merge(3, merge(40, 70, has("round")), has("few"))
+    radius = 0.2_dp*merge(5, 1, has("few"))*merge(0.13_dp, merge(0.46_dp, 0.32_dp, has("dense")), has("dilute"))
+    call build("&run seed = "//written(seed)//" / &box lower = -1, 0.5 upper = "//written(upper(1))//","//written(upper(2)) &
+      //" boundary = "//given("periodic", "'periodic','periodic'", given("channel", "'periodic','wall'", "'wall','wall'")) &
+      //given("gravity", " gravity = 0,-1")//" /" &
+      //" &contact"//given("smooth", " wall_rule = 'normal'")//given("contact", " contact_time = 0.01") &
+      //given("inelastic", " wall_restitution = 0.85 pair_restitution = " &
+      //given("giant", "0.5,0.6,0.7,0.6,0.9,0.8,0.7,0.8,0.95", "0.9,0.8,0.8,0.95"))//" /" &
+      //given("giant", " &species name = 'giant' mass = 30 radius = 0.35 velocity = 0.7,-1.5" &
+      //given("giants", " position = 0.1,1.7,1.3,1.2 /", " position = 0.1,1.7 /")) &
+      //gas("small", "1", radius)//gas("other", given("mixture", "5", "1"), merge(0.5_dp, 1.0_dp, has("mixture"))*radius) &
+      ! circles of different size, one of them astride the left side
+      //given("pegs", " &obstacle centre = -1,1.1 radius = 0.15 / &obstacle centre = 0.9,1.9 radius = 0.2 /" &
+      //" &obstacle centre = 1.2,1.2 radius = 0.3 /") &
+      //given("round", " &obstacle centre = 0.5,1.5 radius = 0.98 side = 'inside' /") &
+      ! so far from sides that are shaken that no disk is crushed
+      //given("slants", " &wall from = -1.0,1.2 to = -0.6,1.6 / &wall from = 0.2,1.9 to = 1.6,1.3 /") &
+      ! far, on the spot, and fast; all from their places
+      //given("shaken", " &side name = 'bottom' motion = 'parabolic' amplitude = 0.5 period = 4 /" &
+      //" &side name = 'top' motion = 'sawtooth' velocity = 0.5 /" &
+      //given("channel", "", " &side name = 'right' motion = 'sine' amplitude = 0.03 period = 0.25 phase = 0.5 /")), sim)
 
   contains
+
+    !> A species of the gas.
+    function gas(name, mass, radius) result(text)
+      character(len=*), intent(in) :: name, mass
+      real(dp), intent(in) :: radius
+      character(len=:), allocatable :: text
+      text = " &species name = '"//name//"' count = "//written(n)//" mass = "//mass//" radius = "//written(radius) &
+        //given("dense", " placement = 'dense'")//" velocities = "//given("bed", "'rest' /", "'uniform' /")
+    end function gas
 
     pure logical function has(word)
       character(len=*), intent(in) :: word
       has = index(words, word) > 0
     end function has
-  end function system
 
-  !> Circles: three of different size, one of them astride the left side, or one container; and straight walls.
-  subroutine add_obstacles(sim, words)
-    type(simulation_t), intent(inout) :: sim
-    character(len=*), intent(in) :: words
-    if (index(words, "pegs") > 0) then
-      call add_obstacle(sim%box, "small", new_circle([-1.0_dp, 1.1_dp], 0.15_dp, .false.))
-      call add_obstacle(sim%box, "middle", new_circle([0.9_dp, 1.9_dp], 0.2_dp, .false.))
-      call add_obstacle(sim%box, "large", new_circle([1.2_dp, 1.2_dp], 0.3_dp, .false.))
-    end if
-    if (index(words, "round") > 0) call add_obstacle(sim%box, "round", new_circle([0.5_dp, 1.5_dp], 0.98_dp, .true.))
-    if (index(words, "slants") > 0) then
-      ! so far from sides that are shaken that no disk is crushed
-      call add_obstacle(sim%box, "short", new_segment([-1.2_dp, 1.2_dp], [-0.6_dp, 1.6_dp]))
-      call add_obstacle(sim%box, "long", new_segment([0.2_dp, 1.9_dp], [1.6_dp, 1.3_dp]))
-    end if
-  end subroutine add_obstacles
+    !> A text if the words have this one, else another or ''.
+    pure function given(word, text, otherwise) result(this)
+      character(len=*), intent(in) :: word, text
+      character(len=*), intent(in), optional :: otherwise
+      character(len=:), allocatable :: this
+      this = ""
+      if (present(otherwise)) this = otherwise
+      if (has(word)) this = text
+    end function given
+  end function system
 
   !> Adds an obstacle to a box.
   subroutine add_obstacle(box, name, shape)
@@ -191,73 +176,6 @@ contains
       allocate (added%shape, source=shape)
     end associate
   end subroutine add_obstacle
-
-  !> One disk on each site of a square lattice that is clear of the obstacles and the giant, a bit off the
-  !> site, with velocity components uniform in (-1,1).
-  subroutine fill_lattice(sim, spacing, radius, giants, stream)
-    type(simulation_t), intent(inout) :: sim
-    real(dp), intent(in) :: spacing
-    real(dp), intent(in) :: radius(:)              !! by species
-    integer, intent(in) :: giants                  !! 0, 1 or 2
-    type(random_stream_t), intent(inout) :: stream
-    type(disk_t) :: disk
-    type(tag_t) :: tag
-    type(disk_t), allocatable :: disks(:)
-    type(tag_t), allocatable :: tags(:)
-    real(dp) :: jitter(2), site(2), room
-    integer(int32) :: ix, iy, n(2)
-    integer :: k
-    allocate (sim%disk(0), sim%tag(0))
-    do k = 1, giants
-      disk%x = merge([0.1_dp, 1.7_dp], [1.3_dp, 1.2_dp], k == 1)
-      disk%v = [0.7_dp, -1.5_dp]
-      disk%radius = radius(3)
-      tag%id = k
-      tag%species = 3
-      sim%disk = [sim%disk, disk]
-      sim%tag = [sim%tag, tag]
-    end do
-    n = nint(sim%box%edges()/spacing, int32)
-    do iy = 1, n(2)
-      do ix = 1, n(1)
-        tag%species = 1 + modulo(ix + iy, 2)
-        disk%radius = radius(tag%species)
-        room = 0.5_dp*spacing - disk%radius
-        call draw_vector(stream, 0.7_dp*room, jitter)
-        call draw_vector(stream, 1.0_dp, disk%v)
-        site = sim%box%lower + ([ix, iy] - 0.5_dp)*spacing
-        if (.not. clear(sim, site, disk%radius + room)) cycle
-        disk%x = site + jitter
-        tag%id = tag%id + 1
-        sim%disk = [sim%disk, disk]
-        sim%tag = [sim%tag, tag]
-      end do
-    end do
-    disks = sim%disk
-    tags = sim%tag
-    deallocate (sim%disk, sim%tag)
-    call make_room(sim, size(disks, kind=int32))
-    sim%disk = disks
-    sim%tag = tags
-  end subroutine fill_lattice
-
-  !> Whether a circle at a site keeps off the obstacles and the giant, the disk of species 3.
-  pure function clear(sim, site, radius) result(yes)
-    type(simulation_t), intent(in) :: sim
-    real(dp), intent(in) :: site(2), radius
-    logical :: yes
-    integer :: k
-    yes = .true.
-    do k = n_sides + 1, size(sim%box%surface)
-      associate (shape => sim%box%surface(k)%shape)
-        yes = yes .and. .not. shape%covers(shape%from_nearest(site, sim%box%images()), [0.0_dp, 0.0_dp], radius)
-      end associate
-    end do
-    do k = 1, size(sim%disk)
-      if (sim%tag(k)%species == 3) yes = yes &
-        .and. norm2(site - sim%disk(k)%x) > radius + sim%disk(k)%radius
-    end do
-  end function clear
 
   !> The dynamics that a method names: `cells`, `pairs` or `rescan`; with `heap`, else a calendar.
   subroutine prepare(dynamics, method, sim)

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from ricochet import program
+
 from .case import Member
 
 EVERY_EVENT = {"frames_every_events": 1, "observables_every_events": 1, "event_log": True}
@@ -11,23 +13,7 @@ ROOT_2 = 1.4142135623730951  #: speed at which K = m, so kT = 1
 
 def namelist(**groups: dict | list[dict]) -> str:
     """Groups of variables; a list of dictionaries is a group that is repeated."""
-    lines = []
-    for name, contents in groups.items():
-        for content in contents if isinstance(contents, list) else [contents]:
-            assignments = [f"  {key} = {written(value)}" for key, value in content.items()]
-            lines += [f"&{name}", *assignments, "/"]
-    return "\n".join(lines) + "\n"
-
-
-def written(value: object) -> str:
-    """A value as a namelist wants it, with all its digits."""
-    if isinstance(value, str):
-        return f"'{value}'"
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, Iterable):
-        return ", ".join(map(written, value))
-    return repr(int(value)) if isinstance(value, int) else repr(float(value))
+    return program.namelist(groups)
 
 
 def ensemble(seeds: int | Iterable[int], *, run: dict = {}, **groups) -> tuple[Member, ...]:  # noqa: B006

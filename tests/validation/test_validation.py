@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from ricochet.statistics import Estimate
-from validation import report
+from validation import CASES, report
 from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relative, sigmas, within
 from validation.running import validate
-from validation.tables import CASES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 QUICK = ("P1-", "P2-", "P3-", "P4-", "P9-07", "P9-1", "P10-07", "P12-", "P13-02")
