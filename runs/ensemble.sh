@@ -191,7 +191,7 @@ remember() {
       fail 3 "$folder/input.nml is not of an ensemble: choose another folder"
     for name in "${!before[@]}"; do
       ! has_data "${name#x}" ||
-        die "$folder holds members of another version of $input (see $folder/input.nml):" \
+        die "$folder holds members of another input, or of $input before a change (see $folder/input.nml):" \
           "choose another folder, or remove this one"
     done
   fi

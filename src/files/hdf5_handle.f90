@@ -66,14 +66,14 @@ contains
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: free
 
     if (.not. allocated(self%failure)) return
-    if (self%unsaved > 0) then
-      call fail(error, exit_files, self%final_path//": cannot "//self%failure//": "//written(self%unsaved) &
-        //" bytes needed, "//written(free_bytes(self%path))//" bytes free")
-    else
-      call fail(error, exit_files, self%final_path//": cannot "//self%failure)
-    end if
+    call fail(error, exit_files, self%final_path//": cannot "//self%failure)
+    free = free_bytes(self%path)
+    if (self%unsaved <= 0 .or. free == huge(free)) return
+    error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
+    if (free > self%unsaved) error%message = error%message//": is there a quota, or a limit (ulimit -f)?"
   end subroutine report
 
   !> The version of the HDF5 library, for the provenance.

@@ -301,7 +301,7 @@ def test_results_of_other_settings_are_not_mixed(lab):
     assert result.returncode == 2 and "other settings" in result.stderr
     (lab / "gas.nml").write_text("&run\n  title = 'new'\n/\n")
     result = ensemble(lab, "--seeds", "1")
-    assert result.returncode == 2 and "another version" in result.stderr
+    assert result.returncode == 2 and "another input" in result.stderr
 
 
 def test_settings_of_a_failed_member_may_be_mended(lab):
