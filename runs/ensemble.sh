@@ -85,11 +85,13 @@ scan_seeds() {
 # Every combination of the scans (first varies slowest) and the seeds; species.ball.mass, 5 becomes
 # ball.mass_5 in the name, without blanks and slashes.
 generate_members() {
-  local scan variable list values separator value k short old_names old_overrides
+  local scan variable list values separator value k short old_names old_overrides known=' '
   names=("") overrides=("")
   for scan in "${scans[@]}"; do
     [[ $scan == *.*=?* ]] || die "--scan $scan: write VARIABLE=VALUE,VALUE,..."
     variable=${scan%%=*} list=${scan#*=} separator=,
+    [[ $known != *" $variable "* ]] || die "--scan $variable: is given twice (--seeds is run.seed)"
+    known+="$variable "
     [[ $list == *';'* ]] && separator=';'
     mapfile -t -d "$separator" values < <(printf '%s' "$list")
     short=${variable#species.}

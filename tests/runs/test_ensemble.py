@@ -321,6 +321,7 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--seeds", "1-"], "neither a number nor a range"),
         (["--seeds", "3-1"], "neither a number nor a range"),
         (["--scan", "mass"], "write VARIABLE=VALUE"),
+        (["--seeds", "1-2", "--scan", "run.seed=1,2"], "run.seed: is given twice"),
         (["--seeds", "1", "-j", "0"], "-j 0"),
         (["--frobnicate"], "unknown option --frobnicate, see --help"),
         (["--sedes", "1"], "unknown option --sedes; did you mean --seeds?"),
