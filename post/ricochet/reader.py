@@ -22,6 +22,7 @@ import h5py
 import numpy as np
 
 from .files import RunError, Unsound, open_file, tree
+from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
 
@@ -297,6 +298,18 @@ class Run:
     def kicked(self) -> bool:
         """Whether velocities change between collisions, too."""
         return self.parameter("drive", "kind", "none") != "none"
+
+    @cached_property
+    def nature(self) -> Nature:
+        """What kind of run this is: see `ricochet.nature`."""
+        lost = self.observable("dissipated_energy").value[-1]
+        most = self.kinetic_energy([0, -1]).sum(axis=1).max()
+        found = nature_of(self.parameters, self.mass, self.radius, lost / most if most else 0.0)
+        more = {
+            "turning": "angular_velocity" in self.elements,
+            "collapsed": "collapse" in str(self.provenance.get("note", "")),
+        }
+        return Nature(found | {name for name, there in more.items() if there})
 
     @property
     def shortcoming(self) -> str:

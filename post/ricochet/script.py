@@ -18,6 +18,7 @@ import numpy as np
 
 from .drawing import LABELS, STYLE, plt, save, warn
 from .files import did_you_mean, destination
+from .nature import Refused
 from .reader import Run, RunError, read_run
 from .statistics import Curve, Estimate, SeriesMean, combined, doubts
 from .thermodynamics import frames_from, packing, start_of_equilibrium
@@ -305,7 +306,7 @@ def text_of(table: Table) -> str:
 
 
 def launch(main: Callable[[], None]) -> None:
-    """Run a script; whatever it cannot use is one line on stderr and exit code 2.
+    """Run a script; whatever it cannot use is one line on stderr and exit code 2, or 1 (`Refused`).
 
     That includes numbers it can make no sense of: `python -X dev` shows where.
     """
@@ -315,7 +316,7 @@ def launch(main: Callable[[], None]) -> None:
     try:
         main()
     except RunError as problem:
-        give_up(name, str(problem))
+        give_up(name, str(problem), code=1 if isinstance(problem, Refused) else 2)
     except OSError as problem:  # without a name: while writing, on a full disk
         give_up(name, f"{problem.filename or 'cannot write the output'}: {problem.strerror}")
     except Exception as problem:
@@ -327,7 +328,7 @@ def launch(main: Callable[[], None]) -> None:
         sys.exit(130)
 
 
-def give_up(name: str, reason: str) -> NoReturn:
-    """Exit code 2 and one line."""
+def give_up(name: str, reason: str, code: int = 2) -> NoReturn:
+    """One line and the exit code: 1 where a law does not hold for a run, else 2."""
     print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)

@@ -1,0 +1,135 @@
+"""What kind of run this is: the one place that says it, and in which words a law refuses a run.
+
+    run.nature                      # Nature({'lossy', 'periodic', ...}), what sets it apart from
+    run.nature.closed               # equal smooth elastic disks in an empty box with walls
+    allow(run, "Haff's law", "lossy", "mixture")   # refuses a run with any other trait
+
+A trait is found from the parameters of a run and from its balance of energy, by a pure function of
+both: a file, a file that is still being written and a simulation in memory have the same nature.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .files import RunError
+
+ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
+#: What a run may be, and the words in which that is a reason.
+TRAITS = {
+    "changed": "was changed while it ran",
+    "collapsed": "passed a collapse, and is decided by rounding from then on",
+    "stepped": "is made by time steps",
+    "sheared": "is sheared (box.shear_rate)",
+    "noisy": "is heated by noise (&drive)",
+    "active": "has disks that drive themselves (&drive)",
+    "moving": "has sides that move",
+    "sliding": "has surfaces that slide",
+    "uneven": "is heated and cooled at different temperatures",
+    "bathed": "is kicked by a heat bath (&drive)",
+    "thermal": "has walls that heat and cool (temperature)",
+    "falling": "falls (box.gravity)",
+    "lossy": "is not elastic: it loses energy in collisions",
+    "rough": "has rough disks, whose collisions turn them",
+    "turning": "has disks that turn",
+    "obstructed": "has obstacles or walls in the box",
+    "unlike": "has a restitution for each pair of species",
+    "mixture": "has disks of different mass or radius",
+}
+#: By which energy comes and goes, other than by being lost in collisions.
+SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed", "thermal"}
+#: With which velocities do not settle to Maxwell's law.
+UNSETTLED = {*SOURCES, "uneven", "lossy"} - {"bathed", "thermal"}
+
+
+class Refused(RunError):
+    """A run that a law does not hold for; the message names the cause."""
+
+
+class Nature(frozenset):
+    """The traits of a run."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether no energy comes or goes but what collisions lose."""
+        return not self & SOURCES
+
+    @property
+    def driven(self) -> bool:
+        """Whether something gives the disks energy, or takes it, besides their collisions."""
+        return not self.closed
+
+    @property
+    def cooling(self) -> bool:
+        """Whether disks only lose energy: nothing lasts."""
+        return self.closed and "lossy" in self
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether the total energy is that of the start at any time."""
+        return self.closed and "lossy" not in self
+
+    @property
+    def in_equilibrium(self) -> bool:
+        """Whether velocities settle to Maxwell's law, of one temperature everywhere."""
+        return not self & UNSETTLED
+
+
+def nature_of(parameters: Mapping, mass: np.ndarray, radius: np.ndarray, lost: float) -> Nature:
+    """The nature of a run, from the parameters that it uses and what its disks are.
+
+    `lost` is the share of its largest energy that was lost in collisions so far: a simulation can
+    be asked at any time.
+    """
+    contact, drive = parameters.get("contact", {}), parameters.get("drive", {})
+    box, kind = parameters.get("box", {}), drive.get("kind", "none")
+    surfaces = [
+        *parameters.get("side", {}).values(),
+        *rows_of(parameters.get("obstacle", {})),
+        *rows_of(parameters.get("wall", {})),
+    ]
+    baths = {float(one["temperature"]) for one in surfaces if known(one.get("temperature"))}
+    thermal = bool(baths)
+    if kind in ("andersen", "brownian"):
+        baths.add(float(drive["temperature"]))
+    beta = float(contact.get("tangential_restitution", -1.0))
+    pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
+    # What may take energy counts before it has taken any, but for walls, which may not be met.
+    inelastic = len(mass) > 1 and (pairs.min() < 1 or -1 < beta < 1)
+    found = {
+        "changed": bool(parameters.get("changes")),
+        "stepped": parameters.get("run", {}).get("dynamics") == "steps",
+        "sheared": box.get("shear_rate", 0.0) != 0,
+        "noisy": kind == "noise",
+        "active": kind == "active",
+        "moving": any(one.get("motion", "still") != "still" for one in surfaces),
+        "sliding": any(one.get("speed", 0.0) != 0 for one in surfaces),
+        "uneven": len(baths) > 1,
+        "bathed": kind in ("andersen", "brownian"),
+        "thermal": thermal,
+        "falling": bool(np.any(box.get("gravity", 0.0))),
+        "lossy": inelastic or lost > ROUNDING,
+        "rough": beta > -1,
+        "obstructed": "obstacle" in parameters or "wall" in parameters,
+        "unlike": len(pairs) > 1,
+        "mixture": bool(np.ptp(mass) > 0 or np.ptp(radius) > 0),
+    }
+    return Nature(name for name, there in found.items() if there)
+
+
+def rows_of(group: Mapping) -> list[dict]:
+    """The obstacles, or the straight walls, one by one: the file has a column for each variable."""
+    columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def known(value: object) -> bool:
+    """Whether a variable was given: a wall among others that has none is NaN, or 0, there."""
+    return value is not None and bool(np.isfinite(value)) and float(value) > 0
+
+
+def allow(run, law: str, *traits: str) -> None:
+    """Refuse a run that has any trait but these; `law` says in words what is not for it."""
+    for trait, reason in TRAITS.items():
+        if trait in run.nature and trait not in traits:
+            raise Refused(f"{run.path}: {reason}; {law}")
