@@ -12,7 +12,7 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 (`.part`) is read up to its last committed frame.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,10 @@ from .files import RunError, Unsound, open_file, tree
 from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
+
+
+class NoSuchFrame(RunError, IndexError):
+    """An index that the frames of a run do not have."""
 
 
 class Series(NamedTuple):
@@ -102,20 +106,42 @@ class Frames:
             raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
         return self[:] if dtype is None else self[:].astype(dtype)
 
-    def __getitem__(self, frame: int | slice | list[int]) -> np.ndarray:
+    @property
+    def ndim(self) -> int:
+        """The number of axes."""
+        return len(self.shape)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Of the numbers as they are read."""
+        return self.read([]).dtype
+
+    def __getitem__(self, index: object) -> np.ndarray:
+        """As NumPy has it: the first axis chooses in the file, the others in what was read."""
+        first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
-            chosen = np.arange(len(self))[frame]
-        except IndexError:
-            raise RunError(f"{self.path}: no frame {frame}, there are {len(self)}") from None
-        steps = np.unique(np.diff(chosen)) if chosen.ndim else ()
+            if first is None or first is Ellipsis or isinstance(first, bool | np.bool_) or np.ndim(first) > 1:
+                return self.read(range(len(self)))[index]
+            chosen = np.arange(len(self))[first]
+            if chosen.ndim == 0:
+                return self.read([chosen])[(0, *rest)]
+            whole = slice(None) if isinstance(first, slice) else np.arange(len(chosen))
+            return self.read(chosen)[(whole, *rest)]
+        except IndexError as problem:
+            shape = " x ".join(map(str, self.shape))
+            raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
+
+    def read(self, chosen: Sequence[int]) -> np.ndarray:
+        """These frames, in this order."""
+        steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
             data = file[f"{DISKS}/{self.name}/value"]
-            if len(steps) == 1 and steps[0] > 0:
+            if len(chosen) == 0:
+                values = data[:0]
+            elif len(steps) == 1 and steps[0] > 0:
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
-            elif chosen.ndim and chosen.size:  # far faster than a list as index in h5py
+            else:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
-            else:
-                values = data[chosen] if chosen.size else data[:0]
         return values.astype(float) if values.dtype.kind == "f" else values
 
     def __iter__(self) -> Iterator[np.ndarray]:
@@ -273,8 +299,24 @@ class Run:
         return Series(time, 2 * collisions / self.count)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
-        """The same at other times, by linear interpolation."""
-        return np.interp(time, *self.collisions_per_disk)
+        """The same at other times, by linear interpolation.
+
+        Between few observables it goes with the collisions of any kind, which frames know better.
+        """
+        known, tau = self.collisions_per_disk
+        if self.collisions is None or len(known) >= self.frames:
+            return np.interp(time, known, tau)
+        hits, rising = self.hits_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # even without hits
+
+        def clock(t: np.ndarray) -> np.ndarray:
+            return np.interp(t, self.time, hits) + rising * np.asarray(t)
+
+        return np.interp(clock(time), clock(known), tau)
+
+    @cached_property
+    def hits_per_disk(self) -> np.ndarray:
+        """(T,) collisions of any kind per disk, at the frames."""
+        return np.array([hits.mean() for hits in self.collisions])
 
     def parameter(self, group: str, variable: str, default: object = None) -> object:
         """A variable of the input file as it was used."""
