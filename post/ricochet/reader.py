@@ -25,6 +25,7 @@ from .files import RunError, Unsound, open_file, tree
 from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
+WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
 
 
 class NoSuchFrame(RunError, IndexError):
@@ -120,7 +121,7 @@ class Frames:
         """As NumPy has it: the first axis chooses in the file, the others in what was read."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
-            if first is None or first is Ellipsis or isinstance(first, bool | np.bool_) or np.ndim(first) > 1:
+            if type(first) in WHOLE or np.ndim(first) > 1:
                 return self.read(range(len(self)))[index]
             chosen = np.arange(len(self))[first]
             if chosen.ndim == 0:

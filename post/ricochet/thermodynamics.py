@@ -49,37 +49,51 @@ def after_start(run: Run, skip: float | None = None) -> float:
 
     A run too short for that counts from its middle.
     """
-    time, tau = run.collisions_per_disk
-    if skip is not None and tau[-1] < skip:
+    time = np.union1d(run.time, run.collisions_per_disk.time)
+    tau = run.collisions_per_disk_at(time)
+    if skip is not None and tau[-1] < skip * (1 - 1e-9):
         ends = f"ends after {tau[-1]:.4g} collisions per disk"
         raise RunError(f"{run.path}: {ends}, before --skip {skip:g}")
     if skip is not None:
-        return float(time[np.searchsorted(tau, skip)])
+        return float(time[np.searchsorted(tau, skip * (1 - 1e-9))])
     if not tau[-1] > 0:
         return float(time[-1] / 2)
     return float(np.interp(min(SPEEDS_FORGET, tau[-1] / 2), tau, time))
 
 
 def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
-    """The time after `skip` collisions per disk, or else that from which nothing drifts.
+    """The time from which the gas is in equilibrium: see `start_of_steady_state`.
 
-    Looked at are the collision rate and the kinetic energy of each species.  Speeds get
-    `SPEEDS_FORGET`, as those series say nothing of their distribution.  A run too short for all
-    that counts from its middle.  Raises RunError if the run loses energy in collisions.
+    Raises RunError if the run loses energy in collisions.
     """
     if loses_energy(run):
         raise RunError(
             f"{run.path}: is not elastic: it loses energy in collisions and has no equilibrium"
         )
+    return start_of_steady_state(run, skip)
+
+
+def start_of_steady_state(run: Run, skip: float | None = None) -> float:
+    """The time after `skip` collisions per disk, or else that from which nothing drifts.
+
+    Looked at are the collision rate and the kinetic energy of each species, at the observables or,
+    if there are more of these, at the frames.  Speeds get `SPEEDS_FORGET`, as those series say
+    nothing of their distribution.  A run too short for all that counts from its middle.
+    """
     if skip is not None:
         return after_start(run, skip)
-    time, tau = run.collisions_per_disk
+    few = len(run.collisions_per_disk.time) < run.frames
+    time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
-        return float(time[-1] / 2)
+        return max(float(time[-1] / 2), after_start(run))
     apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
-    series = [np.diff(tau) / apart]
-    if len(run.names) > 1 or run.gravity.any():
-        series += [run.observable(f"{name}/kinetic_energy").value[1:] for name in run.names]
+    series = [np.diff(run.collisions_per_disk_at(time)) / apart]
+    if len(run.names) > 1 or run.gravity.any() or not run.nature.keeps_energy:
+        if few:
+            energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.frames)])
+            series += [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
+        else:
+            series += [run.observable(f"{name}/kinetic_energy").value[1:] for name in run.names]
     first = max(equilibration(values) for values in series)
     return max(float(time[first]), after_start(run))
 

@@ -51,13 +51,18 @@ def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
     run = read_run(small)
     whole = run.position[:]
     assert whole.shape == run.position.shape == (3, 2, 2)
-    for index in (0, -1, slice(None, None, -1), slice(2, 0, -2), slice(1, 9), [2, -3]):
+    assert (run.position.ndim, run.position.dtype) == (whole.ndim, whole.dtype)
+    every, mask = slice(None), np.array([True, False, True])
+    axes = ((..., 0), (every, 0), (-1, 1), (every, every, 1), (mask, 0), ([0, 2], [1, 0]))
+    axes += ((0, every, [0, 1]), None, (), ([], 0), whole > 0.5, [[0], [2]])
+    for index in (0, -1, slice(None, None, -1), slice(2, 0, -2), slice(1, 9), [2, -3], *axes):
         np.testing.assert_array_equal(run.position[index], whole[index])
     np.testing.assert_array_equal(np.array(list(run.position)), whole)
     np.testing.assert_array_equal(run.position, whole)
     assert np.asarray(run.collisions, dtype=float).dtype == float
-    with pytest.raises(RunError, match="no frame 3, there are 3"):
-        run.position[3]
+    for index, words in ((3, "0 with size 3"), ((0, 2), "1 with size 2"), ("x", "only integers")):
+        with pytest.raises(RunError, match=f"small.h5: position.*{words}"):
+            run.position[index]
 
 
 def frames_seen_by_another_program(path):

@@ -88,6 +88,11 @@ def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
     assert frames(skip=39, apart=0) == [39, 40]
     with pytest.raises(RunError, match="ends after 40 collisions per disk, before --skip 50"):
         frames(skip=50, apart=5)
+    hits, ends = np.full((200, 41), 3 * np.arange(41)).T, {"collisions": [0, 100 * 40]}
+    v, time = maxwell_velocities(rng, 41, 200), np.arange(41.0) ** 2
+    more = {"collisions": hits, "observables": ends, "observable_time": time[[0, -1]]}
+    run = written(tmp_path / "frames.h5", 0 * v, v, time=time, **more)
+    assert frames(skip=15, apart=5) == [15, 20, 25, 30, 35, 40], "by the collisions in the frames"
 
 
 def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path, rng):
