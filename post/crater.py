@@ -23,7 +23,7 @@ from matplotlib.ticker import LogLocator
 
 def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits: tuple):
     """Bed disks coloured by value, the projectile black."""
-    draw_box(axes, run)
+    draw_box(axes, run, run.time[frame])
     colours = plt.get_cmap("viridis")(plt.Normalize(*limits)(values))
     colours[projectile(run)] = (0, 0, 0, 1)
     disk_collection(axes, run, run.position[frame], facecolors=colours)

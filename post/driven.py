@@ -69,7 +69,7 @@ def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> 
     pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
     if len(groups) == 1:
         pictures = [(runs[0], frame, "") for frame in (0, -1)]
-    width = HEIGHT * min(1.0, runs[0].edges[0] / runs[0].edges[1])
+    width = HEIGHT * min(1.0, 1 / drawing.aspect_of(runs[0]))
     figure, (axes, *panels) = plt.subplots(
         1,
         1 + len(pictures),
@@ -79,7 +79,7 @@ def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> 
     draw_curves(axes, tracks, laws)
     axes.set_ylabel(label)
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
-        drawing.draw_box(panel, run)
+        drawing.draw_box(panel, run, run.time[frame])
         shades = drawing.species_colours(run)
         drawing.disk_collection(panel, run, run.position[frame], facecolors=shades)
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))

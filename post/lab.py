@@ -113,7 +113,7 @@ def picture(lab: Lab, name: str) -> bytes:
             raise Refused("there is no picture")
         figure, file = Figure(figsize=(1.6, 1.6), layout="none"), io.BytesIO()
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
-        draw_box(axes, run)
+        draw_box(axes, run, run.time[-1])
         axes.set_axis_off()
         disk_collection(axes, run, run.position[-1], facecolors=species_colours(run))
         figure.savefig(file, format="png")

@@ -6,8 +6,8 @@
     python post/player.py runs/gas.h5.part --live             while the run goes on
 
 Disks of true size with walls and obstacles, in true time: between two frames they fly along their
-paths, and colours, energies and counts follow them, if no disk collided more than once or the run
-has an event log; else the film shows frames.  Play, step to the next frame or event, speed, zoom;
+paths, and colours, energies and counts follow them, if the run has an event log; else the film
+shows frames.  Play, step to the next frame, or event of the log, speed, zoom;
 colour by species, speed, displacement or collisions; a click on a disk shows its trace, and the
 camera follows it; speeds, energies, and for up to 20 disks the events to come.  Without --count a
 film has as many frames, evenly spread, as fit into 30 MB.
@@ -33,9 +33,9 @@ from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, scale
 from ricochet.files import destination
 from ricochet.live import serve
 from ricochet.paths import MOST_AT_ONCE, Paths
-from ricochet.reader import span
+from ricochet.reader import SIDES, amplitude, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
-from ricochet.thermodynamics import SIDES, has_log
+from ricochet.thermodynamics import has_log
 
 import numpy as np
 from matplotlib.colors import to_hex
@@ -43,9 +43,10 @@ from tqdm import tqdm
 
 PAGE = Path(__file__).with_name("page")  # what the page is made of
 SCRIPTS = ("film", "motion", "camera", "stage", "panels", "queue", "controls", "live")
+MOTION = ("motion", "amplitude", "period", "phase")  # of a side
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
-TURN = (20 + 8 / 2) * 4 / 3  # bytes of a collision of a disk between two frames, and half its time
+TURN = (20 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, and of its time
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
@@ -76,14 +77,28 @@ def quantities(run: Run) -> list[str]:
     return ["speed", "displacement"] + ["collisions"] * (run.collisions is not None)
 
 
+def in_room(run: Run, place: np.ndarray) -> np.ndarray:
+    """Places in units of what the page shows: the box, with room for sides that move."""
+    lower, upper = run.room
+    return (place - lower) / (upper - lower)
+
+
+def sides(run: Run) -> list[dict]:
+    """Of each side its place, and how it moves about it; nothing of the latter if it stays."""
+    places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
+    own = [run.parameters.get("side", {}).get(name, {}) for name in SIDES]
+    moves = [{k: side[k] for k in MOTION} if amplitude(side) else {} for side in own]
+    return [{"place": float(at), **move} for at, move in zip(places, moves, strict=True)]
+
+
 def moving(run: Run, frames: list[int], before: int, tops: dict) -> dict[str, np.ndarray]:
     """(T, N, ...) what differs from frame to frame; `before` is the frame before them.
 
-    Positions in units of the box, as 16-bit integers, of few disks with every digit; colours as
+    Positions in units of the room, as 16-bit integers, of few disks with every digit; colours as
     places 0 to 255 on their scales; periods crossed along x and y since the frame before, four bits
     each; angles.
     """
-    inside = (run.position[frames] - run.lower) / run.edges
+    inside = in_room(run, run.position[frames])
     if run.count > FEW_DISKS:
         inside = np.round(65535 * np.clip(inside, 0, 1))
     found = {"positions": inside.astype("<u2" if run.count > FEW_DISKS else "<f8")}
@@ -105,7 +120,7 @@ def coded_turns(
     """Collisions between the frames, and how many disks have unknown paths.
 
     Of each gap between two frames the number of collisions; of each collision its disk, three
-    numbers: when, as share of the gap, and where, in units of the box; and the kinetic energy that
+    numbers: when, as share of the gap, and where, in units of the room; and the kinetic energy that
     the disk gains.  Of disks with unknown paths the heading in the first frame.
     """
     kind = "<f8" if run.count <= FEW_DISKS else "<f4"
@@ -115,7 +130,7 @@ def coded_turns(
     for k, turns in enumerate(paths.along(frames)):
         start, end = run.time[[frames[k], frames[k + 1]]]
         when = (turns.time - start) / (end - start if end > start else 1)
-        where = (turns.place - run.lower) / run.edges
+        where = in_room(run, turns.place)
         blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
         blocks["turning"] += turns.disk.astype("<u4").tobytes()
         blocks["turns"] += np.column_stack([when, where]).astype(kind).tobytes()
@@ -128,23 +143,28 @@ def coded_turns(
     return blocks, guesses
 
 
-def counted(run: Run, paths: Paths, frames: list[int], most: float) -> tuple[dict, np.ndarray]:
-    """Collisions per disk in each frame, with what, and the moments of those in the film.
+def counted(
+    run: Run, paths: Paths, frames: list[int], most: float
+) -> tuple[dict, dict[str, np.ndarray]]:
+    """Collisions per disk in each frame, with what, and the moments of all events in the film.
 
-    Those of "pairs" are known from the log.  Without one, or if they were more than `most`, frames
+    Those of "pairs" are known from the log.  Without one, or if it is longer than `most`, frames
     tell how often each disk has collided with anything ("all", or "disks" if there is nothing
     else), and no moments are known.
     """
     time = run.time[frames]
     if paths.log is not None:
-        moments = paths.log[0][paths.log[2] > 0]
-        before = np.searchsorted(moments, time, "right")
-        if before[-1] - before[0] <= most:
-            means = (2 * before / run.count).tolist()
-            return {"collisions": means, "with": "pairs"}, moments[before[0] : before[-1]]
+        moments, pair = paths.log[0], paths.log[2] > 0
+        some = slice(*np.searchsorted(moments, time[[0, -1]], "right"))
+        if some.stop - some.start <= most:
+            means = 2 * np.searchsorted(moments[pair], time, "right") / run.count
+            known = {"pairs": moments[some][pair[some]], "others": moments[some][~pair[some]]}
+            return {"collisions": means.tolist(), "with": "pairs"}, known
     hits = None if run.collisions is None else [float(run.collisions[f].mean()) for f in frames]
     walled = bool(not run.periodic.all() or run.obstacles or len(run.walls))
-    return {"collisions": hits, "with": "all" if walled else "disks"}, np.zeros(0)
+    return {"collisions": hits, "with": "all" if walled else "disks"}, dict.fromkeys(
+        ("pairs", "others"), np.zeros(0)
+    )
 
 
 def events_of(run: Run, paths: Paths, frames: list[int]) -> dict:
@@ -266,11 +286,11 @@ def film(
     paths = Paths(run, most)
     turns, guesses = coded_turns(run, paths, frames)
     counts_of, moments = counted(run, paths, frames, most / 2)
-    blocks |= turns | {"moments": moments.astype("<f8").tobytes()}
+    blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
     blocks["mass"] = run.mass.astype("<f4").tobytes()
     # Where displacements count from, without jumps until the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
-    blocks["origins"] = ((origin - run.lower) / run.edges).astype("<f4").tobytes()
+    blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     blocks["species"] = (run.species - 1).astype("<u2").tobytes()
     radii, own = radii_of(run)
     blocks["sizes"] = own.astype("u1").tobytes()
@@ -282,8 +302,9 @@ def film(
         "guesses": guesses,
         "kicked": run.kicked,
         "gravity": run.gravity.tolist(),
-        "lower": run.lower.tolist(),
-        "edges": run.edges.tolist(),
+        "lower": run.room[0].tolist(),
+        "edges": (run.room[1] - run.room[0]).tolist(),
+        "sides": sides(run),
         "periodic": run.periodic.tolist(),
         "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
         "walls": run.walls.tolist(),

@@ -34,7 +34,7 @@ def scale(values: np.ndarray, log: bool, colour: str) -> Normalize:
 
 def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> plt.Figure:
     """One panel per frame."""
-    aspect = run.edges[1] / run.edges[0]
+    aspect = drawing.aspect_of(run)
     rows, columns = drawing.panel_grid(len(frames), aspect)
     width = min(10.5, (6.0 if len(frames) == 1 else 3.4) * columns) / columns
     figure, panels = plt.subplots(
@@ -56,7 +56,7 @@ def draw(run: Run, frames: list[int], colour: str, args: argparse.Namespace) -> 
         if k >= len(frames):
             axes.set_visible(False)
             continue
-        drawing.draw_box(axes, run)
+        drawing.draw_box(axes, run, run.time[frames[k]])
         if colour == "species":
             style = {"facecolors": drawing.species_colours(run)}
         else:

@@ -43,7 +43,7 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
 
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
     """Paths, with the disk where it is at the end; the others grey."""
-    draw_box(axes, run)
+    draw_box(axes, run, run.time[frames[-1]])
     others = np.full(run.count, "0.85")
     others[disks] = "none"
     disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)

@@ -1,6 +1,7 @@
 // ---------- which part of the box is seen ----------
 
-// The canvas has the shape of the box. At zoom 1 it shows all of it; a periodic box goes on beyond its sides.
+// The canvas has the shape of the room: the box, and where its sides move. At zoom 1 it shows all of it; a periodic box goes
+// on beyond its sides.
 const camera = { zoom: 1, x: 0, y: 0, follow: -1 };
 const page = { dots: 1, width: 0, height: 0, unit: 1, margin: 3 };  // of the canvas, in pixels
 const view = { unit: 1, x: 0, y: 0 };  // pixels per length; what is at the lower left corner of the canvas

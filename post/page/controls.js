@@ -33,7 +33,7 @@ function prepareFilm() {
   $('sofar').hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed. Curves: Maxwell’s law at the mean kinetic energy of the species.';
   $('guess').hidden = !film.guesses.some(count => count);
-  $('event').hidden = !turning.length;
+  $('event').hidden = !(pairs.length + others.length);
 }
 
 // ---------- what is shown ----------
@@ -200,7 +200,7 @@ function on(id, action) { $(id).addEventListener('click', action); }
 
 const turn = name => () => { state[name] = !state[name]; refresh(); };
 const actions = {
-  play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => go(nextTurn()),
+  play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => $('event').hidden || go(nextEvent()),
   clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
   nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
   whole: () => { lookAtAll(); look(); }, theme: () => { theme(!dark()); refresh(); },

@@ -4,17 +4,17 @@
 
 const $ = id => document.getElementById(id);
 let film, frames, disks, kinds;  // facts; the number of frames, of disks; species
-let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the box
+let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the room
 let speciesOf, sizeOf, masses;   // by disk
-let origins;                     // x1 y1 x2 y2 ... where displacements count from, in units of the box
+let origins;                     // x1 y1 x2 y2 ... where displacements count from, in units of the room
 let codes, viridis;              // places on the colour scales, frame by frame; the colours of the scale
 let angles;                      // orientations frame by frame, not wrapped; none if disks have none
 let shifts;                      // periods crossed since the frame before, x + 8 and y + 8 in four bits each
-let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, x, y in the box
+let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, x, y in the room
 let gains;                       // kinetic energy that the disk has from each of them
 let guessed, guessedRow;         // bits, gap by gap: disks whose paths there are not known; bytes of a gap
 let headings, headingsStart;     // of these disks in the frame before, a full turn in 256 parts; first one of each gap
-let moments;                     // times of all collisions of two disks, if they are known
+let pairs, others;               // times of all collisions of two disks, and of other ones, if they are known
 
 function load({ facts, blocks }) {
   const bytes = name => {
@@ -41,7 +41,7 @@ function load({ facts, blocks }) {
   headings = bytes('headings');
   headingsStart = [0];
   film.guesses.forEach((count, gap) => headingsStart.push(headingsStart[gap] + count));
-  moments = new Float64Array(bytes('moments').buffer);
+  [pairs, others] = ['pairs', 'others'].map(name => new Float64Array(bytes(name).buffer));
   masses = new Float32Array(bytes('mass').buffer);
   origins = new Float32Array(bytes('origins').buffer);
   guessed = bytes('guessed');

@@ -6,7 +6,7 @@
 const moment = { time: 0, frame: 0, gap: 0, share: 0, known: true, shown: 0, hits: 0, kinetic: [], potential: [] };
 const MANY = 0.1;  // of the disks
 let X, Y, VX, VY;  // of all disks at the moment; inside the box along a periodic axis
-let UX, UY;        // the same places in units of the box, without jumps since the frame before
+let UX, UY;        // the same places in units of the room, without jumps since the frame before
 let HITS;          // collisions of each disk since the frame before
 let ANCHOR, FALL;  // of its flight: the frame that it begins or ends in, else -1; what the square of its speed has won since
 
@@ -86,26 +86,25 @@ function upTo(values, value) {
   return low;
 }
 
+// Where the sides are at a time: a picture only, events are those of the log. Left, right, bottom, top.
+function sidesAt(time) {
+  return film.sides.map(({ place, motion, amplitude, period, phase }, k) => {
+    if (!motion) return place;
+    const s = time / period + phase, part = s - Math.floor(s);
+    const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));
+    return place + (k % 2 ? -1 : 1) * amplitude * f;
+  });
+}
+
 // Collisions per disk: of two disks if the log tells, else those in frames and known turns; null where nothing tells.
 function collisionsNow() {
   const { collisions } = film.counted, { frame, gap, known } = moment;
-  if (film.counted.with === 'pairs') return collisions[0] + 2 * upTo(moments, moment.shown) / disks;
+  if (film.counted.with === 'pairs') return collisions[0] + 2 * upTo(pairs, moment.shown) / disks;
   return collisions && collisions[frame] + (known && frame === gap ? moment.hits / disks : 0);
 }
 
-// When a disk next collides with anything, or the next frame where that is not known.
-function nextTurn() {
-  const least = 4 * Number.EPSILON * Math.max(Math.abs(first()), Math.abs(last()));  // lets the moment be not before it
-  for (let gap = frameAt(moment.time); gap < frames - 1; gap++) {
-    const start = film.time[gap], h = film.time[gap + 1] - start, count = gapStart[gap + 1] - gapStart[gap];
-    if (film.guesses[gap]) return film.time[gap + 1];
-    const times = Array.from({ length: count }, (_, k) => start + h * turns[3 * (gapStart[gap] + k)] + least);
-    const soonest = times.reduce((a, b) => b > moment.time && b < a ? b : a, Infinity), alike = (film.exact ? 1e-9 : 1e-6) * h;
-    // The two disks of a collision may have its time with different rounding.
-    if (soonest < Infinity) return times.reduce((a, b) => b <= soonest + alike ? Math.max(a, b) : a, soonest);
-  }
-  return last();
-}
+// The next event of the log.
+const nextEvent = () => Math.min(...[pairs, others].map(times => times[upTo(times, moment.time)] ?? last()));
 
 // The periods crossed since the first frame, x1 y1 x2 y2 ..., or nothing without periods; summed up as the film goes on.
 let crossings;
@@ -155,7 +154,7 @@ const codesBetween = {
   },
 };
 
-// The flights of a disk in a gap, in units of the box: [share of the gap, x, y] of each end, without jumps.
+// The flights of a disk in a gap, in units of the room: [share of the gap, x, y] of each end, without jumps.
 function knots(gap, i) {
   const at = 2 * (gap * disks + i), to = at + 2 * disks, list = [[0, positions[at] / grain, positions[at + 1] / grain]];
   const first = gapStart[gap] + turning.subarray(gapStart[gap], gapStart[gap + 1]).indexOf(i);

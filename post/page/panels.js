@@ -11,16 +11,16 @@ function tell() {
   const { time, frame, gap } = moment, collisions = collisionsNow();
   $('scrub').value = (time - first()) / (last() - first() || 1);
   $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · frame ${frame + 1}/${frames}`
-    + (disks > 1 && collisions !== null ? ` · ${short(+collisions.toPrecision(3))} collisions per disk${film.counted.with === 'all' ? ', with walls' : ''}` : '');
+    + (disks > 1 && collisions !== null ? ` · ${short(+collisions.toPrecision(3))} ${film.counted.with === 'all' ? 'hits per disk (by disks and walls)' : 'collisions per disk'}` : '');
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
   const unknown = film.guesses[gap];
   $('guess').textContent = !film.guesses.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
     : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
-    : `${stands(gap) ? 'Here the film shows frames as they are' : `Here ${unknown} of ${disks} disks stand until the next frame`}: `
-      + `between two frames ${stands(gap) ? `${unknown} of ${disks} disks` : 'they'} have several collisions that are not in the file`
-      + (film.logged ? '.' : '; output.event_log = .true. in the input would tell them.');
+    : (stands(gap) ? `Here the film shows frames as they are: ${unknown} of ${disks} disks collide between two.`
+      : `Here ${unknown} of ${disks} disks, which collide, stand until the next frame.`)
+      + (film.logged ? '' : ' output.event_log = .true. in the input would tell their paths.');
 }
 
 // The colour of a species, to be chosen by the user.
@@ -219,7 +219,7 @@ function layEnergyOut() {
     }
   }));
   pen.setLineDash([]);
-  $('guide').textContent = film.guesses.some(count => count) && sparse(x) ? 'Dots: frames. What happens along the pale lines between them is not in the file.' : '';
+  $('guide').textContent = film.guesses.some(count => count) && sparse(x) ? 'Dots: frames. What happens along the pale lines between them is not in this page.' : '';
   cursorAt = x;
   const heads = ['', 'disks', 'kinetic', ...(film.potential ? ['potential (dashed)'] : [])];
   const rows = kinds.map(({ name, count }) => [`<span class="chip">${safe(name)}</span>`, count, ...heads.slice(2).map(() => '')]);

@@ -58,7 +58,7 @@ function drawStage() {
   aim();
   radii = film.radii.map(radius => Math.max(0.6, radius * view.unit));
   if (stamps.size > 2 * kinds.length) stamps = new Map();  // the zoom has changed
-  const seen = [view.unit, view.x, view.y].join();
+  const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown)].join();
   if (groundShown !== seen) drawGround();
   groundShown = seen;
   drawDisks();
@@ -68,8 +68,14 @@ function drawStage() {
 function drawGround() {
   ground.fillStyle = ink.stage;
   ground.fillRect(0, 0, page.width, page.height);
-  const [x0, y0] = film.lower, [width, height] = film.edges;
+  const [x0, x1, y0, y1] = sidesAt(moment.shown);
   inBox(ground, () => {
+    if (film.sides.some(side => side.motion)) {
+      ground.fillStyle = ink.obstacle;
+      ground.fillRect(0, 0, page.width, page.height);
+      ground.fillStyle = ink.stage;
+      copies([x0, x1], [y0, y1], (dx, dy) => ground.fillRect(across(x0 + dx), up(y1 + dy), (x1 - x0) * view.unit, (y1 - y0) * view.unit));
+    }
     for (const [x, y, radius, inside] of film.obstacles) {
       if (inside) {
         ground.fillStyle = ink.obstacle;
@@ -97,8 +103,8 @@ function drawGround() {
   // The sides, dashed where they are periodic.
   ground.strokeStyle = ink.wall;
   ground.lineWidth = 1.5 * page.dots;
-  copies([x0, x0 + width], [y0, y0 + height], (dx, dy) => {
-    const left = across(x0 + dx), right = across(x0 + dx + width), bottom = up(y0 + dy), top = up(y0 + dy + height);
+  copies([x0, x1], [y0, y1], (dx, dy) => {
+    const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
     for (const [axis, ends] of [[0, [left, top, left, bottom]], [0, [right, top, right, bottom]], [1, [left, top, right, top]], [1, [left, bottom, right, bottom]]]) {
       ground.setLineDash(film.periodic[axis] ? [6 * page.dots, 5 * page.dots] : []);
       ground.beginPath();
@@ -110,7 +116,7 @@ function drawGround() {
   ground.setLineDash([]);
 }
 
-// What is seen of the box and of its periodic images: left, top, right, bottom.
+// What is seen of the room and of its periodic images: left, top, right, bottom.
 function seenBox() {
   const [x0, y0] = film.lower, [width, height] = film.edges, [wrapX, wrapY] = film.periodic;
   return [wrapX ? 0 : Math.max(0, across(x0)), wrapY ? 0 : Math.max(0, up(y0 + height)),

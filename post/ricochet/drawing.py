@@ -130,26 +130,40 @@ def chosen_colour(run: Run, wish: str | None) -> str:
     return wish or ("species" if len(run.names) > 1 else "speed")
 
 
-def draw_box(axes: plt.Axes, run: Run) -> None:
-    """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners."""
-    (x0, y0), (x1, y1) = run.lower, run.upper
-    sides = (axes.axvline, x0, x1), (axes.axhline, y0, y1)
-    for (line, *ends), periodic in zip(sides, run.periodic, strict=True):
-        for end in ends:
-            line(end, ls="--" if periodic else "-", clip_on=False, zorder=3, **WALL)
+def aspect_of(run: Run) -> float:
+    """Height over width of what is drawn."""
+    width, height = run.room[1] - run.room[0]
+    return height / width
+
+
+def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> list:
+    """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
+
+    Sides that move are drawn where they are at this time [their own places], what lies beyond them
+    grey; `move_sides` moves what is returned.
+    """
+    low, high = run.room
+    styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
+    sides = LineCollection([], linestyles=styles, clip_on=False, zorder=3, **WALL)
+    inside, grey = Rectangle((0, 0), 0, 0, facecolor="white", zorder=-1), {"facecolor": "0.85"}
+    axes.add_patch(Rectangle(low, *(high - low), zorder=-2, **grey))
+    axes.add_patch(inside)
+    axes.add_collection(sides)
+    move_sides([sides, inside], run, time)
     for wall in run.walls:
         for shift in periods(run):
             axes.plot(*(wall + shift).T, zorder=3, **WALL)
     for obstacle in run.obstacles:
         if obstacle.inside:
-            axes.add_patch(Rectangle(run.lower, *run.edges, facecolor="0.85", zorder=0))
+            axes.add_patch(Rectangle(run.lower, *run.edges, zorder=0, **grey))
         fill = "white" if obstacle.inside else "0.75"
         for shift in periods(run):
             centre = obstacle.centre + shift
             axes.add_patch(
                 Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
             )
-    axes.set(aspect="equal", xlim=(x0, x1), ylim=(y0, y1))
+    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    (x0, y0), (x1, y1) = run.lower, run.upper
     axes.set_xticks([x0, x1], [f"{x0:g}", f"{x1:g}"])
     axes.set_yticks([y0, y1], [f"{y0:g}", f"{y1:g}"])
     axes.set_xlabel("x", labelpad=-8)
@@ -157,6 +171,16 @@ def draw_box(axes: plt.Axes, run: Run) -> None:
     axes.tick_params(length=3)
     axes.label_outer()
     axes.spines[:].set_visible(False)
+    return [sides, inside]
+
+
+def move_sides(drawn: list, run: Run, time: float | None) -> None:
+    """To where they are at another time; `drawn` is what `draw_box` returns."""
+    sides, inside = drawn
+    (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.sides_at(time)
+    corners = np.array([(x0, y0), (x0, y1), (x1, y0), (x1, y1)])
+    sides.set_segments(corners[[(0, 1), (2, 3), (0, 2), (1, 3)]])  # in the order of their styles
+    inside.set_bounds(x0, y0, x1 - x0, y1 - y0)
 
 
 def periods(run: Run) -> np.ndarray:

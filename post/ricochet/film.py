@@ -21,11 +21,11 @@ def animate(
     if not len(frames):
         raise RunError(f"{run.path}: no frames for a film")
     colour = drawing.chosen_colour(run, colour)
-    aspect = run.edges[1] / run.edges[0]
+    aspect = drawing.aspect_of(run)
     height = min(6.4, 6.4 * aspect)
     width = height / aspect + (1.2 if colour != "species" else 0.2)
     figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
-    drawing.draw_box(axes, run)
+    sides = drawing.draw_box(axes, run, run.time[frames[0]])
 
     def colours_of(frame: int) -> dict:
         if colour == "species":
@@ -46,6 +46,7 @@ def animate(
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
 
     def show(frame: int) -> None:
+        drawing.move_sides(sides, run, run.time[frame])
         drawing.move_disks(disks, run, run.position[frame], **colours_of(frame))
         if marks is not None:
             drawing.move_marks(marks, run, frame)

@@ -1,10 +1,10 @@
 """The true paths of disks between two frames: free flights from collision to collision.
 
 A flight is known from its two ends, so a path is known by its turns, the collisions between the
-frames.  One collision lies where the flight out of the first frame meets the one into the second.
-Several are those of the event log, gone through from the first frame; that they lead to the second
-is checked.  A path that remains unknown is said to be guessed: all of them are where kicks change
-velocities between the collisions.
+frames.  They are those of the event log, gone through from the first frame; that they lead to the
+second is checked.  Without a log a path is known if it has no turns: a free flight leads from one
+frame to the next.  A path that remains unknown is said to be guessed: all of them are where kicks
+change velocities between the collisions.
 """
 
 from collections.abc import Iterator
@@ -124,55 +124,35 @@ class Paths:
             return unknown(np.ones(self.run.count, bool))
         h, g = b.time - a.time, self.run.gravity
         end = b.position + (b.image - a.image) * self.run.edges
-        if a.hits is None:  # a free flight shows in where it leads
-            free = self.near(a.position + h * (a.velocity + 0.5 * h * g), end)
-            hits = np.where(free, 0, 2)
-        else:
-            hits = b.hits - a.hits
-        if hits.sum() > self.most:
-            return unknown(hits > 0)
-        # The flights before and after a single collision: they meet where turning * after = way.
-        turning = a.velocity - b.velocity + h * g
-        way = end - a.position - h * (b.velocity - 0.5 * h * g)
-        square = np.sum(turning**2, axis=1)
-        after = np.sum(turning * way, axis=1) / np.where(square > 0, square, 1)
-        meet = self.near(turning * after[:, None], way) & (after >= -1e-9 * h) & (after <= h)
-        once = (hits == 1) & meet
-        disk = np.flatnonzero(once)
-        t = np.clip(after[disk], 0, h)
-        place = a.position[disk] + t[:, None] * (a.velocity[disk] + 0.5 * t[:, None] * g)
-        before, later = a.velocity[disk] + t[:, None] * g, b.velocity[disk] + (t - h)[:, None] * g
-        gain = 0.5 * self.run.mass[disk] * np.sum(later**2 - before**2, axis=1)
-        found, guessed = [(disk, a.time + t, place, gain)], (hits > 0) & ~once
-        if guessed.any() and self.log is not None:
-            flights = self.replay(a, b)
-            for k in np.flatnonzero(guessed):
-                flight = flights.get(k)
-                if flight is None:
-                    continue
-                flight.fly(b.time, *g.tolist())
-                gap = hypot(flight.x - end[k][0], flight.y - end[k][1])
-                if gap <= CLOSE * self.run.radius[k]:
-                    times, x, y, gain = np.transpose(flight.turns)
-                    place = np.column_stack([x, y])
-                    found.append((np.full(len(times), k), times, place, gain))
-                    guessed[k] = False
-        parts = [np.concatenate(part) for part in zip(*found, strict=True)]
-        order = np.lexsort((parts[1], parts[0]))
-        self.most -= len(order)
-        return Turns(*(part[order] for part in parts), guessed)
+        free = self.near(a.position + h * (a.velocity + 0.5 * h * g), end)
+        flights = self.replay(a, b)
+        guessed, found = ~free, []
+        for k, flight in sorted(flights.items()):
+            turns = flight.turns
+            flight.fly(b.time, *g.tolist())
+            gap = hypot(flight.x - end[k][0], flight.y - end[k][1])
+            guessed[k] = gap > CLOSE * self.run.radius[k]
+            if not guessed[k]:
+                found += [(k, *turn) for turn in turns]
+        self.most -= len(found)
+        disk, time, x, y, gain = np.array(found).reshape(-1, 5).T
+        return Turns(disk.astype(int), time, np.column_stack([x, y]), gain, guessed)
 
     def near(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(N,) whether places agree, by the sizes of their disks."""
         return np.linalg.norm(one - other, axis=1) <= CLOSE * self.run.radius
 
     def replay(self, a: State, b: State) -> dict[int, Flight]:
-        """The flights of all disks that collide between two frames, by the event log."""
+        """The flights of all disks that collide between two frames, by the event log, if any."""
+        if self.log is None:
+            return {}
         run, (time, i, j, changes, total) = self.run, self.log
         if a.hits is None:
             span = slice(*np.searchsorted(time, [a.time, b.time], "right"))
         else:  # which events a frame has seen is clear even if several have the same time
             span = slice(*np.searchsorted(total, [a.hits.sum(), b.hits.sum()], "right"))
+        if np.sum(1 + (j[span] > 0)) > self.most:
+            return {}
         flights = {
             k: Flight(
                 float(run.mass[k]), a.time, *a.position[k].tolist(), *a.velocity[k].tolist(), []

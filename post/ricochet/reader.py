@@ -12,7 +12,7 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 (`.part`) is read up to its last committed frame.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,7 @@ from .files import RunError, Unsound, open_file, tree
 from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
+SIDES = ("left", "right", "bottom", "top")
 WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
 
 
@@ -192,6 +193,18 @@ class Run:
     def upper(self) -> np.ndarray:
         """(2,) upper right corner of the box."""
         return self.lower + self.edges
+
+    def sides_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(..., 2) lower left and upper right corner of the box at a time; its sides may move."""
+        sides = [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
+        inwards = np.stack([displaced(side, np.asarray(time)) for side in sides], axis=-1)
+        return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
+
+    @cached_property
+    def room(self) -> tuple[np.ndarray, np.ndarray]:
+        """(2,) corners of what sides that move never leave: the box with their amplitudes."""
+        swings = [amplitude(self.parameters.get("side", {}).get(name, {})) for name in SIDES]
+        return self.lower - swings[::2], self.upper + swings[1::2]
 
     @cached_property
     def by_species(self) -> tuple[Species, ...]:
@@ -423,6 +436,22 @@ def run_of(path: Path, file: h5py.File) -> Run:
         parameters=parameters,
         provenance=tree(file["provenance"]),
     )
+
+
+def amplitude(side: Mapping) -> float:
+    """How far a side goes from its place, which one that strikes without moving does not leave."""
+    swings = side.get("motion", "still") in ("sine", "parabolic")
+    return float(side["amplitude"]) if swings else 0.0
+
+
+def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
+    """How far inwards of its place a side is at these times: see docs/theory.md."""
+    if amplitude(side) == 0:
+        return np.zeros(np.shape(time))
+    s = (time / side["period"] + side["phase"]) % 1
+    if side["motion"] == "sine":
+        return side["amplitude"] * np.sin(2 * np.pi * s)
+    return side["amplitude"] * 16 * np.where(s < 0.5, s * (0.5 - s), (s - 0.5) * (s - 1))
 
 
 def span(values: np.ndarray) -> str:

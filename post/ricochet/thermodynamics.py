@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
-from .reader import Run, RunError, Species
+from .reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
 ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
-SIDES = ("left", "right", "bottom", "top")
 
 
 class Steps(NamedTuple):

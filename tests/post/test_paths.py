@@ -5,8 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ricochet.paths import Paths
-from synthetic_run import written
+from ricochet.paths import CLOSE, Paths
 
 SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
 &wall name = 'ramp' from = 0.2, 0.2 to = 0.5, 0.4 /
@@ -28,13 +27,16 @@ SYSTEMS = {
     "driven": "&side name = 'left' temperature = 2 /\n"
     "&side name = 'top' temperature = 1 speed = 3 /\n"
     + SHAPES.replace("/", "temperature = 3 /", 1),
+    "moving": "&side name = 'right' motion = 'sine' amplitude = 0.05 period = 0.7 /\n"
+    "&side name = 'bottom' motion = 'sawtooth' velocity = 0.5 /\n"
+    "&side name = 'top' motion = 'parabolic' amplitude = 0.03 period = 0.3 phase = 0.4 /\n",
     "steps": "&run dynamics = 'steps' dt = 1e-4 /\n" + SHAPES,
 }
 
 
 @pytest.fixture(params=SYSTEMS)
 def runs(request, simulated):
-    """One trajectory with few frames and an event log, with some, and with many frames."""
+    """One trajectory with few frames and an event log, with some frames, and with many."""
     text = SYSTEMS[request.param] + DISKS + "&stop time = 1 /\n"
     return [
         simulated(text, f"output.frames_every_time={gap}", *log, name=f"{gap}")
@@ -74,11 +76,10 @@ def test_the_event_log_gives_the_true_paths(runs):
     assert gap < 1e-6 and guessed == 0
 
 
-def test_a_single_collision_between_frames_is_found_without_a_log(runs):
-    hits = np.diff(runs[1].collisions[:], axis=0)
+def test_without_a_log_a_path_is_known_if_it_is_a_free_flight(runs):
+    hits = np.sum(np.diff(runs[1].collisions[:], axis=0) > 0)
     gap, guessed = farthest(runs[1], runs[2])
-    assert np.sum(hits == 1) > 20
-    assert gap < 1e-6 and guessed == np.sum(hits > 1)
+    assert gap < CLOSE * runs[1].radius.max() and 0.99 * hits <= guessed <= hits > 20
 
 
 def test_a_log_that_leads_elsewhere_is_not_believed(simulated):
@@ -99,14 +100,7 @@ def test_turns_beyond_the_room_for_them_are_guessed(simulated):
     some = list(Paths(run, all_turns[0] + 1).along(frames))
     assert [len(turns.disk) for turns in some] == [all_turns[0], 0, 0, 0]
     hits = np.diff(run.collisions[:], axis=0) > 0
-    assert np.array_equal([turns.guessed for turns in some[1:]], hits[1:])
-
-
-def test_without_counts_of_collisions_a_path_is_true_if_it_is_a_free_flight(tmp_path):
-    velocity = np.array([[[0.1, 0.0], [0.1, 0.0]]] * 2)
-    position = np.array([[[0.2, 0.2], [0.2, 0.5]], [[0.3, 0.2], [0.2, 0.6]]])
-    (turns,) = Paths(written(tmp_path / "a.h5", position, velocity)).along([0, 1])
-    assert turns.guessed.tolist() == [False, True]
+    assert np.mean([turns.guessed for turns in some[1:]] != hits[1:]) < 0.02
 
 
 def test_with_kicks_no_path_between_frames_is_known(simulated):

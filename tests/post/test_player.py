@@ -5,6 +5,7 @@ import pytest
 
 import player
 from ricochet import read_run
+from ricochet.reader import SIDES
 from synthetic_run import maxwell_velocities, run_script, write_run, written
 from whole_runs import wait_for
 
@@ -292,6 +293,8 @@ BOXES = {
     "walls": SHAPES,
     "periodic": "&box boundary = 'periodic', 'periodic' /\n" + SHAPES,
     "gravity": "&box boundary = 'periodic', 'wall' gravity = 0, -5 /\n" + SHAPES,
+    "moving": "&side name = 'right' motion = 'sine' amplitude = 0.05 period = 0.7 /\n"
+    "&side name = 'bottom' motion = 'sawtooth' velocity = 0.5 /\n",
     "container": "&obstacle name = 'c' centre = 0.5, 0.5 radius = 0.5 side = 'inside' /\n",
 }
 LOGGED = ("output.frames_every_time=0.5", "output.event_log=.true.")
@@ -373,6 +376,34 @@ def test_events_to_come_are_those_of_the_log(simulated, playing, box):
     assert browser.complaints() == []
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
+    """Of random systems: none is beyond a side, hits touch it; what comes next is in the log."""
+    rng = np.random.default_rng(seed)
+    text = f"&run seed = {seed} /\n&box lower = -3, 2 upper = -1.8, 3.1 /\n" + FEW
+    for name in rng.choice(SIDES, rng.integers(1, 4), replace=False):
+        size, period, phase = rng.uniform((0.02, 0.3, 0), (0.1, 1, 1))
+        text += f"&side name = '{name}' motion = '{rng.choice(['sine', 'parabolic'])}'\n"
+        text += f"amplitude = {size} period = {period} phase = {phase} /\n"
+    run = simulated(text, "output.frames_every_events=1", "output.event_log=.true.")
+    events, reach = run.events, run.radius[:, None] + [-1e-9, -1e-9]
+    (lower, upper), place = run.sides_at(run.time), run.position[:]
+    assert np.all(place - reach >= lower[:, None]) and np.all(place + reach <= upper[:, None])
+    assert np.all(lower >= run.room[0]) and np.all(upper <= run.room[1])
+    sides = np.stack([lower, upper], axis=-1).reshape(-1, 4)
+    hits = np.flatnonzero(events.j <= 0)
+    axis, rim = -events.j[hits] // 2, run.radius[events.i[hits] - 1] * (-1) ** -events.j[hits]
+    touched = place[hits + 1, events.i[hits] - 1, axis] - rim
+    np.testing.assert_allclose(touched, sides[hits + 1, -events.j[hits]], atol=1e-9)
+    browser, some = playing(run.path), rng.uniform(*run.time[[0, -1]], 50)
+    act = "return arguments[0].map(t => { show(t); return [sidesAt(moment.shown), nextEvent()]; })"
+    drawn, told = zip(*browser.run(act, some.tolist()), strict=True)
+    expected = np.stack(run.sides_at(some), axis=-1).reshape(-1, 4)
+    np.testing.assert_allclose(drawn, expected, atol=1e-12)
+    ends = np.append(events.time, run.time[-1])
+    assert list(told) == ends[np.searchsorted(events.time, some, "right")].tolist()
+
+
 def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(simulated, playing):
     """Straight flights would lead them away from the walls where they turn."""
     run = simulated("&box boundary = 'periodic', 'wall' /\n" + FEW)
@@ -387,7 +418,7 @@ def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(sim
     energies = [run.kinetic_energy(at)[kind.disks].mean() for kind in run.by_species]
     assert browser.run("return moment.kinetic") == pytest.approx(energies, rel=1e-6)
     assert browser.run("return collisionsNow()") == pytest.approx(run.collisions[at].mean())
-    assert "collisions per disk, with walls" in browser.run("return $('clock').textContent")
+    assert "hits per disk (by disks and walls)" in browser.run("return $('clock').textContent")
     said = browser.run("return $('guess').textContent")
     assert "shows frames as they are" in said and "output.event_log" in said
     assert "Dots: frames." in browser.run("return $('guide').textContent")
