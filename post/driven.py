@@ -14,7 +14,7 @@ mean diameter.
 A curve for each run, of means over a sixtieth of the time; a colour for each input and species.
 Printed: the mean over the second half of the time, of `share` in the fuller half of the box, its
 error over runs of one input, and its ratio to the theory.  Pictures: the end of the first run of
-each input, or of a single input its start and its end.
+each input, or of a single input its start and its end; the smallest disks are drawn larger.
 """
 
 from ricochet import Run, RunError, drawing
@@ -28,9 +28,10 @@ import numpy as np
 MOST_PICTURES = 3
 POINTS = 60  # of a curve
 HEIGHT = 4.5  # of a picture in inches
+SMALLEST = 2.2  # points across that a disk is drawn with at least
 #: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
-    "temperature": ("T (reduced units)", temperature, noise_law, float),
+    "temperature": ("kT (reduced units)", temperature, noise_law, float),
     "share": ("share of the disks in the left half", share, demon_law, fuller),
     "height": ("mean height (reduced units)", height, lambda run: None, float),
     "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, float),
@@ -59,7 +60,8 @@ def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict)
             axes.axhline(level, color=colour, ls="--", lw=1.6)
     if any(laws.values()):
         axes.plot([], [], color="black", ls="--", label="theory")
-    axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(0, None))
+    top = 1.06 * axes.dataLim.y1
+    axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(0, top))
     axes.legend()
 
 
@@ -81,8 +83,12 @@ def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> 
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         drawing.draw_box(panel, run, run.time[frame])
         shades = drawing.species_colours(run)
-        drawing.disk_collection(panel, run, run.position[frame], facecolors=shades)
+        across = 72 * width * 2 * run.radius.mean() / (run.room[1] - run.room[0])[0]
+        rim = {"linewidths": max(0.0, SMALLEST - across), "edgecolors": "face"}
+        drawing.disk_collection(panel, run, run.position[frame], facecolors=shades, **rim)
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
+    panels[0].tick_params(labelleft=True)
+    panels[0].set_ylabel("y", labelpad=-8)
     if not any(species for _, species in tracks):  # else the curves name them, in their colours
         drawing.species_legend(figure, runs[0])
     figure.suptitle(drawing.titled(runs))
