@@ -2,22 +2,24 @@
 
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
-Disks without gravity.  Runs are combined by packing fraction; lines are means over the runs, bands
-are standard errors, those of a single run for the structure alone, from blocks of its frames.
-Frames must be equally far apart in time; lags are logarithmic, every frame is an origin.
-Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Times are in
-units of the mean free time 1/w, lengths of the mean diameter.  Of runs that lose energy in
-collisions and have no equilibrium only a2 and the structure are found, the latter in the frames
-after --skip, or else 15 collisions per disk, at any times.
+Disks in an empty box, without gravity.  Runs are combined by packing fraction; lines are means over
+the runs, bands are standard errors, those of a single run for the structure alone, from blocks of
+its frames. Frames must be equally far apart in time; lags are logarithmic, every frame is an
+origin. Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Times
+are in units of the mean free time 1/w, lengths of the mean diameter.  Of runs that have no
+equilibrium only a2 and the structure are found, the latter in the frames after --skip, or else
+where nothing drifts, or 15 collisions per disk after the start of a gas that cools, at any times.
 
-VACF: at first it falls as exp(-w t), late, in theory, as 1/t (mode coupling).  Diffusion: D(t) is
-a quarter of the slope of the mean square displacement, here between neighbouring lags; and half the
+VACF: at first it falls as exp(-w t), late, in theory, as 1/t (mode coupling).  Diffusion: D(t) is a
+quarter of the slope of the mean square displacement, here between neighbouring lags; and half the
 integral of <v(0) v(s)> from 0 to t, which is half of <v(0) (x(t) - x(0))> and so exact however far
-apart the frames are.  For equal disks it stands beside D_E of Enskog.  In two dimensions the tail
-makes D(t) grow without end, as the logarithm of t: a D belongs to a time, and to a box, whose
+apart the frames are, unless kicks change velocities on the way: kicked disks have the first alone.
+For equal smooth disks that keep their energy it stands beside D_E of Enskog.  In two dimensions the
+tail makes D(t) grow without end, as the logarithm of t: a D belongs to a time, and to a box, whose
 images are felt when sound has crossed it.  The table has both D, which must agree, between half of
 `D_time` and `D_time`; that is the time of crossing if an eighth of the run is longer.  Periodic
-boxes only.  a2 = <v^4> / (2 <v^2>^2) - 1 is 0 in equilibrium and -1/2 for equal speeds.
+boxes only.  a2 = <v^4> / (2 <v^2>^2) - 1, each species at its own temperature, is 0 in equilibrium
+and -1/2 for equal speeds.
 
 S(k) = <|sum of exp(i k x)|^2> / N.  psi6 of a disk: mean of exp(6 i theta) over its Delaunay
 neighbours; local is its modulus, global the modulus of the mean over all disks: 1 in a perfect
@@ -29,16 +31,20 @@ from typing import NamedTuple
 
 from ricochet import Run, RunError, hard_disks, transport
 from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, plt
+from ricochet.nature import allow
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
-from ricochet.statistics import Curve, SeriesMean, combined, estimate, excess_kurtosis, series_mean
+from ricochet.speeds import relaxation
+from ricochet.statistics import Curve, SeriesMean, combined, estimate, series_mean
 from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
 from ricochet.theory import RELAXATION
-from ricochet.thermodynamics import all_cool, equal_disks, later, loses_energy, mean_free_time
+from ricochet.thermodynamics import FLUID, all_settle, equal_disks, later, mean_free_time
 
 import numpy as np
 
 MOST_FRAMES = 50  # for the structure
 BLOCKS = 8  # of the frames of a single run
+#: What has no equilibrium, but a structure.
+RESTLESS = ("lossy", "unlike", "uneven", "noisy", "active", "sliding")
 NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
@@ -51,15 +57,15 @@ class Found(NamedTuple):
 
 
 def check(run: Run, first: Run) -> None:
-    """Refuse what falls; the lags mean nothing without equal intervals of time."""
-    if run.gravity.any():
-        raise RunError(f"{run.path}: needs a gas without gravity")
+    """Refuse what is not alike everywhere; lags mean nothing without equal intervals of time."""
+    allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
     if equal_disks(run) != equal_disks(first):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
     steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)
-    even = loses_energy(first) or np.ptp(steps) <= 1e-6 * steps[0]  # the last may be out of step
+    settled = first.nature.in_equilibrium
+    even = not settled or np.ptp(steps) <= 1e-6 * steps[0]  # the last may be out of step
     if run.frames < 10 or not even:
-        how = "" if loses_energy(first) else ", written by frames_every_time"
+        how = ", written by frames_every_time" if settled else ""
         raise RunError(f"{run.path}: needs 10 frames and more{how}")
 
 
@@ -98,24 +104,32 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
     return members, curves
 
 
+def free_time(runs: list[Run], frames: list[slice]) -> float:
+    """The mean free time in these frames."""
+    each = zip(runs, frames, strict=True)
+    return float(np.mean([mean_free_time(run, run.time[own.start]) for run, own in each]))
+
+
 def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
     """Curves against w t of memory and diffusion."""
     first, pairs = runs[0], list(zip(runs, frames, strict=True))
     at = transport.lags(min(f.stop - f.start for f in frames))
     time, diameter = at * (first.time[1] - first.time[0]), 2 * first.radius.mean()
-    wt = time / np.mean([mean_free_time(run) for run in runs])
+    wt = time / free_time(runs, frames)
     msd = np.array([transport.displacement(*one, at) for one in pairs])
     curves = {
         "vacf": Curve(wt, *estimate([transport.velocity_memory(*one, at) for one in pairs])),
         "msd": Curve(wt, *estimate(msd / diameter**2)),
     }
-    if equal_disks(first):
-        density = first.count / np.prod(first.edges)
-        tail = hard_disks.long_time_tail(time, density, *transport.enskog_by_rate(first))
+    if not first.nature:
+        density, theory = first.count / np.prod(first.edges), transport.enskog_of(first)
+        kinematic = theory["viscosity"] / (density * first.mass[0])
+        tail = hard_disks.long_time_tail(time, density, theory["D"], kinematic)
         curves["vacf_tail"] = Curve(wt, tail, np.full_like(tail, np.nan))
     if first.periodic.all():
-        memory = estimate([transport.integrated_memory(*one, at) for one in pairs])
-        curves["D_velocities(t)"] = Curve(wt, *memory)
+        if "bathed" not in first.nature:
+            memory = estimate([transport.integrated_memory(*one, at) for one in pairs])
+            curves["D_velocities(t)"] = Curve(wt, *memory)
         ends, slope = np.append(0, wt), np.diff(msd, prepend=0) / np.diff(time, prepend=0)
         middle = (ends[1:] + ends[:-1]) / 2
         curves["D_displacement(t)"] = Curve(middle, *estimate(slope / 4))
@@ -124,16 +138,15 @@ def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
 
 def kurtosis(runs: list[Run], until: int) -> Curve:
     """a2 against collisions per disk in the first frames."""
-    tau = np.mean([run.collisions_per_disk_at(run.time[:until]) for run in runs], axis=0)
-    a2 = [[excess_kurtosis(run.speed(k)) for k in range(until)] for run in runs]
-    return Curve(tau, *estimate(a2))
+    tau, a2 = zip(*(relaxation(run, frames=until) for run in runs), strict=True)
+    return Curve(np.mean(tau, axis=0), *estimate(a2))
 
 
-def analysed(runs: list[Run], skip: float | None, cool: bool) -> Found:
+def analysed(runs: list[Run], skip: float | None) -> Found:
     """All that runs at one packing fraction say."""
-    frames = [later(run, skip, cool) for run in runs]
+    frames = [later(run, skip) for run in runs]
     curves, members, lag = {}, {}, None
-    if cool:
+    if not all_settle(runs):
         curves["a2"] = kurtosis(runs, min(run.frames for run in runs))
     else:
         curves = motion(runs, frames)
@@ -141,9 +154,10 @@ def analysed(runs: list[Run], skip: float | None, cool: bool) -> Found:
         lag = transport.diffusion_lag(runs, frames)
         if runs[0].periodic.all():
             both = [transport.diffusion(*one, lag) for one in zip(runs, frames, strict=True)]
-            members = dict(zip(NUMBERS, map(list, zip(*both, strict=True)), strict=False))
+            ways = 1 if "bathed" in runs[0].nature else 2
+            members = dict(zip(NUMBERS[:ways], map(list, zip(*both, strict=True)), strict=False))
         step = runs[0].time[1] - runs[0].time[0]
-        lag *= float(step / np.mean([mean_free_time(run) for run in runs]))
+        lag *= float(step / free_time(runs, frames))
     orders, shown = structure(runs, frames)
     return Found(members | orders, curves | shown, lag)
 
@@ -158,8 +172,7 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
                 row |= over_runs(name, found.members[name], notes, f"η = {eta:g}, {name}")
             else:
                 row |= measured(name, None)
-        known = equal_disks(runs[0]) and found.lag is not None
-        row["D_enskog"] = transport.enskog_by_rate(runs[0])[0] if known else None
+        row["D_enskog"] = None if runs[0].nature else float(transport.enskog_of(runs[0])["D"])
         rows.append(row | {"g_first_bin": float(found.curves["g"].y[0])})
     return rows, notes
 
@@ -233,19 +246,20 @@ def draw(
         draw_group(panels, found, row, colour, sum(run.count for run in runs))
     for name, style in shown.items():
         panels[name].set(**{"xlabel": "$w\\,t$", **style})
-    equal = equal_disks(groups[0][1][0])
+    known = not groups[0][1][0].nature
     if not cool:
         wt = np.geomspace(min(f.curves["vacf"].x[0] for f in results), 5, 200)
-        if equal:
+        if known:
             panels["vacf"].plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
             panels["tail"].plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")
         else:
             panels["D"].set_ylabel("$D(t)$ / its largest value")
         panels["D"].plot([], [], color="black", marker=".", label="from displacements")
-        panels["D"].plot([], [], color="black", marker="x", label="from velocities")
+        if any("D_velocities(t)" in found.curves for found in results):
+            panels["D"].plot([], [], color="black", marker="x", label="from velocities")
         panels["tail"].set_ylim(1e-4, 1.2)
     start = min(found.curves["a2"].y[0] for found in results)
-    if start < -0.4 and equal and not cool:
+    if start < -0.4 and known:
         dilute_limit(panels["a2"], RELAXATION)
     for name, level in (("vacf", 0), ("D", 1), ("a2", 0), ("g", 1), ("S", 1)):
         if name in panels:
@@ -264,11 +278,11 @@ def main() -> None:
     args = command_line(__doc__, "correlations.png", skip=None).parse_args()
     for run in args.runs:
         check(run, args.runs[0])
-    cool, groups = all_cool(args.runs), by_packing(args.runs)
-    results = [analysed(members, args.skip, cool) for _, members in groups]
+    cool, groups = not all_settle(args.runs), by_packing(args.runs)
+    results = [analysed(members, args.skip) for _, members in groups]
     rows, notes = table(groups, results)
     if cool:
-        notes.append("the gas loses energy, no equilibrium: no memory and no diffusion coefficient")
+        notes.append("no equilibrium: no memory and no diffusion coefficient")
     figure = draw(groups, results, rows, cool)
     report(args, figure, rows, data=curves(groups, results), notes=notes)
 

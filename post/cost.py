@@ -69,7 +69,7 @@ def draw(
 
 
 def main() -> None:
-    parser = command_line(__doc__, "cost.png")
+    parser = command_line(__doc__, "cost.png", repeated=True)
     parser.add_argument(
         "--fit", type=float, nargs=2, default=[128, 1e4], metavar="N", help="[128 1e4]"
     )

@@ -10,8 +10,9 @@ For comparison: the error that takes every sample of the observables for indepen
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
+from ricochet.nature import allow
 from ricochet.script import by_packing, command_line, launch, report
-from ricochet.thermodynamics import steps, temperature, z_virial
+from ricochet.thermodynamics import FLUID, virial_over_kt, z_virial
 
 import numpy as np
 import scipy
@@ -21,13 +22,14 @@ SHOWN = 60  # runs in a panel
 
 def naive_error(run: Run, skip: float | None) -> float:
     """Standard error of Z by the virial, if samples had no memory."""
-    s = steps(run, skip)
-    rest = s.virial - s.time * np.sum(s.virial) / np.sum(s.time)
-    return float(scipy.stats.sem(rest) / np.mean(s.time) / (2 * run.count * temperature(run)))
+    amount, per = virial_over_kt(run, skip)
+    return float(scipy.stats.sem(amount - per * np.sum(amount) / np.sum(per)) / np.mean(per))
 
 
 def main() -> None:
     args = command_line(__doc__, "coverage.png", skip=None).parse_args()
+    for run in args.runs:
+        allow(run, "it has no equation of state", *FLUID)
     groups, rows = by_packing(args.runs), []
     figure, panels = plt.subplots(
         1, len(groups), squeeze=False, figsize=(max(5, 3.6 * len(groups)), 4.2)

@@ -11,7 +11,6 @@ symbols are left out of the fit: the box takes part (wall hits are more than 1 %
 disks), or some of the runs ended by time, with more energy left than `stop.energy_fraction`.
 """
 
-import hashlib
 from itertools import chain
 from typing import NamedTuple
 
@@ -58,15 +57,6 @@ def key_of(run: Run) -> tuple[float, ...]:
     ratios = run.mass[tip] / run.mass[lying], run.radius[tip] / run.radius[lying]
     values = ratios[0], run.speed(0)[tip], ratios[1], run.restitution
     return tuple(float(f"{value:.9g}") for value in values)
-
-
-def distinct(runs: list[Run]) -> list[Run]:
-    """The same run once: scans share points.  It ends with the same digits."""
-
-    def ending(run: Run) -> bytes:
-        return hashlib.blake2b(run.position[-1].tobytes()).digest()
-
-    return list({(key_of(run), run.seed, ending(run)): run for run in runs}.values())
 
 
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
@@ -223,7 +213,7 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict]]:
 
 def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
-    points = [point(*one) for one in grouped(distinct(args.runs), key_of)]
+    points = [point(*one) for one in grouped(args.runs, key_of)]
     scans = scanned(points)
     report(args, draw(args.runs, scans), *tables(scans), notes=unused(points, scans))
 

@@ -5,7 +5,8 @@
 By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
 (walls).  Means are taken in equilibrium: from where nothing drifts any more, or after --skip.
 Errors take the memory of the pressure into account; `samples` is how many independent ones the
-virial is worth.  Runs at equal packing fraction are combined.  Elastic runs without gravity.  Disks
+virial is worth.  Runs at equal packing fraction are combined.  Elastic gases without gravity; walls
+and kicks may heat them, all at one temperature.  kT is then its mean, and its error counts.  Disks
 between walls are denser away from them: the wall pressure belongs to the area open to the centres,
 and differs from the bulk by about 1/sqrt(N).  The curves are those of disks of one radius, and are
 left out for others.

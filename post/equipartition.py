@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from ricochet import Run
 from ricochet.drawing import caption, colours, plt
+from ricochet.nature import SETTLED, allow
 from ricochet.script import command_line, grouped, launch, measured, report
 from ricochet.statistics import Estimate, estimate, windows
 from ricochet.thermodynamics import lightest_and_heaviest, start_of_equilibrium
@@ -56,13 +57,18 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     return Approach(time, light, heavy, gap, thermalisation_time(time, gap, within))
 
 
+def late_mean(run: Run, name: str, skip: float | None) -> float:
+    """Mean of an observable in equilibrium."""
+    time, value = run.observable(name)
+    return float(value[time >= start_of_equilibrium(run, skip)].mean())
+
+
 def late_energy(runs: list[Run], which: int, skip: float | None) -> Estimate:
     """Mean over runs of K in equilibrium; 0 the lightest, 1 the heaviest."""
     means = []
     for run in runs:
         name = run.names[lightest_and_heaviest(run)[which]]
-        time, value = run.observable(f"{name}/kinetic_energy")
-        means.append(value[time >= start_of_equilibrium(run, skip)].mean())
+        means.append(late_mean(run, f"{name}/kinetic_energy", skip))
     return estimate(means)
 
 
@@ -100,10 +106,12 @@ def main() -> None:
     parser.add_argument("--within", type=float, default=0.1, help="relative difference [0.1]")
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
     args = parser.parse_args()
+    for run in args.runs:
+        allow(run, "its species share no energy by this law", *SETTLED)
     groups, rows, notes = grouped(args.runs, start_width), [], []
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):
-        energy = [run.observable("total_energy").value[0] / run.count for run in runs]
+        energy = [late_mean(run, "total_energy", args.skip) / run.count for run in runs]
         row = {"v0": v0, "runs": len(runs), "T_therm": found.thermalisation}
         row |= measured("energy", estimate(energy))
         row |= measured("K_light", late_energy(runs, 0, args.skip))

@@ -2,12 +2,13 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is that of the kinetic energy in equilibrium, which is found or begins after --skip.  Laws,
+kT is the mean of the kinetic energy in equilibrium, which is found or begins after --skip.  Laws,
 drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of
 the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
-fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), and a disk of species i is
-kept out of the area pi s_ij^2 about each other disk, which multiplies its density by exp(-sum_j pi
-s_ij^2 n_j(h)) to first order: a few per cent, near the floor.
+fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), unless walls or kicks give
+it; and a disk of species i is kept out of the area pi s_ij^2 about each other disk, which
+multiplies its density by exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near the
+floor.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -18,9 +19,10 @@ from typing import NamedTuple
 
 from ricochet import Run, RunError, thermodynamics
 from ricochet.drawing import bars, caption, colours, plt
+from ricochet.nature import allow
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, binned, estimate
+from ricochet.statistics import Estimate, SeriesMean, binned, estimate, series_mean
 
 import numpy as np
 import scipy
@@ -57,20 +59,33 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
     return -float(np.polyfit(middle[good], np.log(counts[good]), 1, w=np.sqrt(counts[good]))[0])
 
 
-def sharing(energy: np.ndarray, temperature: float, count: int) -> np.ndarray:
+def sharers(run: Run) -> float:
+    """How many disks share a fixed energy: infinitely many where a bath gives and takes it."""
+    return run.count if run.nature.keeps_energy else np.inf
+
+
+def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
     """Weight of a state of one disk, where `count` disks share a fixed energy; 1 at energy 0."""
+    if np.isinf(count):
+        return np.exp(-energy / temperature)
     return np.maximum(1 - energy / (2 * count * temperature), 0) ** (2 * count - 2)
 
 
 def crowded_heights(
-    height: np.ndarray, species: list[Samples], pull: float, temperature: float, width: float
+    height: np.ndarray,
+    species: list[Samples],
+    pull: float,
+    temperature: float,
+    width: float,
+    share: float,
 ) -> list[np.ndarray]:
     """Densities at the heights (H,), with the area that disks take from each other.
 
-    `width` is that of the box for centres.  A disk does not crowd itself.
+    `width` is that of the box for centres, `share` the number of `sharers`.  A disk does not crowd
+    itself.
     """
     numbers = [s.height.shape[1] for s in species]
-    ideal = [sharing(s.mass * pull * height, temperature, sum(numbers)) for s in species]
+    ideal = [sharing(s.mass * pull * height, temperature, share) for s in species]
     density = [normalised(height, weight) for weight in ideal]
     for _ in range(50):
         taken = [  # area per height, by the other disks from one of each species
@@ -101,20 +116,21 @@ def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, li
     """All heights that a disk can have, and the densities of `crowded_heights` there."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
-    return grid, crowded_heights(grid, species, abs(run.gravity[1]), kt, free[0])
+    return grid, crowded_heights(grid, species, abs(run.gravity[1]), kt, free[0], sharers(run))
 
 
-def table(run: Run, species: list[Samples], temperature: float) -> list[dict]:
+def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[dict]:
     """Fitted slopes over those of the exponential laws, and the same for the dashed laws."""
+    temperature = kt[0]
     grid, crowded = heights(run, species, temperature)
     rows = []
     for name, s, density in zip(run.names, species, crowded, strict=True):
         v_law, h_law = s.mass / (2 * temperature), s.mass * np.abs(run.gravity[1]) / temperature
         squares = np.linspace(0, 20 / v_law, 4001)
-        shared = sharing(0.5 * s.mass * squares, temperature, run.count)
-        row = {"species": name, "mass": s.mass, "kT": temperature}
-        row |= {"K": float(0.5 * s.mass * s.square.mean())}
-        row |= {"K_x": float(0.5 * s.mass * s.square_x.mean())}
+        shared = sharing(0.5 * s.mass * squares, temperature, sharers(run))
+        row = {"species": name, "mass": s.mass, "kT": temperature, "kT_error": kt[1]}
+        for part, energies in (("K", s.square), ("K_x", s.square_x)):
+            row |= measured(part, series_mean(0.5 * s.mass * energies.mean(axis=1)))
         for kind, other, law, values, reach, x, weight in (
             ("speed", "shared", v_law, s.square, SPEED_RANGE, squares, shared),
             ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density),
@@ -143,10 +159,10 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), sharex="row")
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
-    grid, crowded = heights(run, species, kt)
+    (grid, crowded), count = heights(run, species, kt), sharers(run)
     for k, (s, row, colour) in enumerate(zip(species, result, colours(len(species)), strict=True)):
         v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
-        shared = sharing(0.5 * s.mass * squares, kt, run.count) * v_law * (1 - 0.5 / run.count)
+        shared = sharing(0.5 * s.mass * squares, kt, count) * v_law * (1 - 0.5 / count)
         laws = (v_law * np.exp(-v_law * squares), normalised(grid, np.exp(-h_law * grid)))
         for axes, x, values, law, dashed, kind, other in zip(
             panels,
@@ -181,19 +197,21 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     for axes in panels[1]:
         axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
     when = f"t = {start:.4g} to {run.time[-1]:g}"
-    figure.suptitle(f"{caption([run])},  {when},  kT = {kt:.4f}")
+    figure.suptitle(f"{caption([run])},  {when},  kT = {kt:.4f} ± {result[0]['kT_error']:.2g}")
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
     (run,) = args.runs
+    known = "falling", "mixture", "thermal", "bathed", "stepped"
+    allow(run, "it follows no exponential laws", *known)
     start = thermodynamics.start_of_equilibrium(run, args.skip)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
-    result = table(run, species, thermodynamics.temperature(run, frames))
+    result = table(run, species, thermodynamics.temperature(run, args.skip))
     report(args, draw(run, species, result, run.time[frames[0]]), result)
 
 

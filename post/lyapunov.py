@@ -8,13 +8,14 @@ periodic sides too.  It grows as exp(lambda t) until it is as large as the billi
 is fitted to its logarithm for each pair, over a time that is the same for all: it ends when the
 first pair is --largest apart, and begins at the share --fit-from of that time (before, the
 separation turns into the direction that grows).  lambda is the mean of the slopes, its error their
-standard error.
+standard error.  A gas that cools has no such rate.
 """
 
 from typing import NamedTuple
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
+from ricochet.nature import TRAITS, allow
 from ricochet.script import command_line, launch, measured, report
 from ricochet.statistics import Estimate, estimate
 
@@ -83,6 +84,9 @@ def main() -> None:
     args = parser.parse_args()
     if len(args.runs) % 2:
         raise RunError(f"{len(args.runs)} runs: not pairs")
+    for run in args.runs:
+        fading = {"changed", "collapsed", *({"lossy"} if run.nature.cooling else ())}
+        allow(run, "it has no one rate of divergence", *TRAITS.keys() - fading)
     apart = [distance(*pair) for pair in zip(args.runs[::2], args.runs[1::2], strict=True)]
     frames = min(map(len, apart))
     apart = np.array([track[:frames] for track in apart])

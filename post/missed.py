@@ -27,7 +27,7 @@ from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, report
 from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import free_disks, kinds_of_disks, start_of_equilibrium
+from ricochet.thermodynamics import kinds_of_disks, start_of_equilibrium, temperature
 
 import numpy as np
 
@@ -65,9 +65,8 @@ def rate_and_temperature(run: Run, skip: float | None) -> tuple[float, float]:
     first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
     if first >= len(time) - 1:
         raise RunError(f"{run.path}: needs two samples of the observables in equilibrium")
-    energy = run.observable("all/kinetic_energy").value[first:]
-    kt = energy.mean() * run.count / free_disks(run)
-    return float((tau[-1] - tau[first]) / (time[-1] - time[first])), float(kt)
+    rate = (tau[-1] - tau[first]) / (time[-1] - time[first])
+    return float(rate), temperature(run, skip).mean
 
 
 def compare(runs: list[Run], skip: float | None) -> list[dict]:
@@ -84,7 +83,8 @@ def compare(runs: list[Run], skip: float | None) -> list[dict]:
         rates, temperatures = np.array([rate_and_temperature(run, skip) for run in pairs]).T
         share = estimate(1 - rates / [exact[run.seed] for run in pairs])
         kt = float(np.mean(temperatures))
-        row = {"dt": step, "runs": len(pairs), "kT": kt, "rate": float(estimate(rates).mean)}
+        row = {"dt": step, "runs": len(pairs), **measured("kT", estimate(temperatures))}
+        row |= measured("rate", estimate(rates))
         row |= measured("missed_percent", Estimate(*(100 * part for part in share)))
         rows.append(row | {"expected_percent": 100 * expected_share(pairs[0], step, kt)})
     return rows

@@ -5,76 +5,86 @@
 Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium: from
 where nothing drifts any more, or after --skip.  Errors take the memory of each quantity into
 account, `samples` is how many independent ones it is worth, and what speaks against an error is a
-warning.  All is scaled to the mean temperature of the runs.  Pressure: by the virial of the pair
-collisions, and by the impulses on each side (a little larger: centres keep a radius away from
-sides).  With an event log also w_ij, the collisions of a disk of species i with disks of species j
-per time, and the free paths: in a frame each disk is on one, as long as its speed times the time
-between its collisions before and after.  Frames meet long paths more often; therefore each counts 1
-over its time; errors are from the scatter of runs, or of one run's frames in blocks.  The line is
-for equal disks that meet without memory (Boltzmann, Enskog).  Of runs that lose energy in
-collisions and have no equilibrium only the free paths are found, in the frames after --skip, or
-else 15 collisions per disk.
+warning.  Runs that keep their kinetic energy have an exact kT, and are scaled to the mean of it;
+others, with walls or kicks of one temperature or disks that turn, have a kT with an error.
+Pressure: by the virial of the pair collisions, and by the impulses on each side (a little larger:
+centres keep a radius away from sides).  With an event log also w_ij, the collisions of a disk of
+species i with disks of species j per time, and the free paths: in a frame each disk is on one, as
+long as its speed times the time between its collisions before and after.  Frames meet long paths
+more often; therefore each counts 1 over its time; errors are from the scatter of runs, or of one
+run's frames in blocks.  The line is for equal disks that meet without memory (Boltzmann, Enskog).
+Kicked disks have no free paths.  Of runs without equilibrium, that lose energy or have walls of
+different temperature, only the free paths are found: in the frames after --skip, or else where
+nothing drifts, or 15 collisions per disk after the start of a gas that cools.
 """
 
 from ricochet import Run, RunError, statistics
 from ricochet import thermodynamics as td
 from ricochet.drawing import COLOURS, band, bars, caption, plt
-from ricochet.free_paths import BINS, mean_and_density, path_density
+from ricochet.free_paths import BINS, STRAIGHT, mean_and_density, path_density
+from ricochet.nature import allow
 from ricochet.script import command_line, launch, points, report
 from ricochet.statistics import FINE, Curve, Estimate, SeriesMean, estimate
 
 import numpy as np
 
 
-def check(runs: list[Run], cool: bool) -> None:
+def check(runs: list[Run]) -> None:
     """Refuse what is no gas in an empty box, and runs of different systems."""
     first = runs[0]
     for run in runs:
-        if cool and not td.has_log(run):
-            raise RunError(
-                f"{run.path}: is not elastic: it loses energy in collisions, and has free paths "
-                "only; those need output.event_log = .true."
-            )
-        if run.gravity.any() or run.obstacles or len(run.walls):
-            raise RunError(f"{run.path}: needs a gas without gravity, obstacles, walls")
+        allow(run, "it has no equilibrium, nor free paths", *td.FLUID, *STRAIGHT)
+        if not run.nature.in_equilibrium and not td.has_log(run):
+            needs = "it has free paths only, and those need output.event_log = .true."
+            allow(run, needs, *td.FLUID)
         if run.names != first.names or run.count != first.count:
             raise RunError(f"{run.path}: not the same system as {first.path}")
 
 
+def scales(runs: list[Run]) -> np.ndarray:
+    """Factors by which the kT of runs that keep theirs is brought to their mean."""
+    kept = all(run.nature.keeps_kinetic_energy for run in runs)
+    kts = np.array([td.kt_at_start(run) if kept else 1.0 for run in runs])
+    return kts.mean() / kts
+
+
 def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str, SeriesMean]:
-    """What has an error, at the mean temperature of the runs: hard disks only move faster."""
-    kt = float(np.mean([td.temperature(run) for run in runs]))
+    """What has an error, at one temperature of the runs: hard disks only move faster."""
+    kts = scales(runs)
     found = [td.rates(run, skip) for run in runs]
     means = {}
     for name in found[0]:
-        power = 1.0 if name.startswith("pressure") else 0.5
-        ratios = [(kt / td.temperature(run)) ** power for run in runs]
-        members = [one[name].scaled(ratio) for one, ratio in zip(found, ratios, strict=True)]
+        power = 1.0 if name.startswith("pressure") else 0.5 * (name != "kT")
+        members = [one[name].scaled(kt**power) for one, kt in zip(found, kts, strict=True)]
         means[name] = statistics.combined(members)
         notes += statistics.doubts(name, members)
     return means
 
 
 def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
-    """The mean pressure over the runs, at their mean kT, by the virial and by four walls."""
+    """The mean pressure over the runs, at one kT, by the virial and by four walls."""
     cuts = np.linspace(0, min(run.collisions_per_disk.time[-1] for run in runs), FINE + 1)
-    kts = np.array([[td.temperature(run)] for run in runs])
 
-    def growth(name: str, scale: np.ndarray | float) -> np.ndarray:
-        found = []
-        for run in runs:
-            time, value = run.observable(name)
-            total = np.sum(value.reshape(len(time), -1) * scale, axis=1)
-            found.append(np.diff(np.interp(cuts, time, total)) / np.diff(cuts))
-        return np.array(found) * np.mean(kts) / kts
+    def growth(*parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        lines = (np.interp(cuts, time, total) for time, total in parts)
+        return sum(np.diff(line) / np.diff(cuts) for line in lines)
+
+    def total(run: Run, name: str, scale: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+        time, value = run.observable(name)
+        return time, np.sum(value.reshape(len(time), -1) * scale, axis=1)
+
+    def ideal(run: Run) -> tuple[np.ndarray, np.ndarray]:
+        time, kt = td.kt_in_time(run)
+        carried = run.count / area * td.between(time, kt)[1]
+        return time, np.append(0, np.cumsum(carried))
 
     area, length = np.prod(runs[0].edges), runs[0].edges[[1, 1, 0, 0]]
-    ideal = runs[0].count * np.mean(kts) / area
-    ways = {"virial": ideal + growth("virial", 1 / (2 * area))}
+    ways = {"virial": [growth(ideal(run), total(run, "virial", 1 / (2 * area))) for run in runs]}
     if not runs[0].periodic.any():
-        ways["sides"] = growth("wall_impulse", 1 / (4 * length))
+        ways["sides"] = [growth(total(run, "wall_impulse", 1 / (4 * length))) for run in runs]
+    unit = scales(runs)[:, None]
     middle = (cuts[1:] + cuts[:-1]) / 2
-    return {way: Curve(middle, *estimate(values)) for way, values in ways.items()}
+    return {way: Curve(middle, *estimate(values * unit)) for way, values in ways.items()}
 
 
 def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:
@@ -108,37 +118,31 @@ def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) ->
 
 def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> list[dict]:
     """A row per quantity: exact ones first, then those with an error."""
-    momentum = np.mean([run.observable("momentum").value for run in runs], axis=(0, 1))
-    exact = {
-        "packing": td.packing(runs[0]),
-        "kT": float(np.mean([td.temperature(run) for run in runs])),
-        "momentum_x": float(momentum[0]),
-        "momentum_y": float(momentum[1]),
-        "equilibrium_from" if means else "from_time": start,
-    }
+    begin = "equilibrium_from" if means else "from_time"
+    exact = {"packing": td.packing(runs[0]), begin: start}
+    momentum = np.mean([td.drift(run) * run.mass.sum() for run in runs], axis=0)
+    axes = zip(("momentum_x", "momentum_y"), momentum, td.conserved(runs[0]), strict=True)
+    exact |= {name: float(value) for name, value, kept in axes if kept}
     rows = [(name, value, "exact", "") for name, value in exact.items()]
     rows += [("mean_free_path", path.mean, float(path.error), "")] if path else []
-    rows += [
-        (name, float(one.mean), float(one.error), round(one.samples, 1))
-        for name, one in means.items()
-    ]
+    for name, one in means.items():
+        known = (float(one.error), round(one.samples, 1)) if one.error != 0 else ("exact", "")
+        rows.append((name, float(one.mean), *known))
     return [dict(zip(("quantity", "mean", "error", "samples"), row, strict=True)) for row in rows]
 
 
 def main() -> None:
     args = command_line(__doc__, "rates.png", skip=None).parse_args()
     runs, notes = args.runs, []
-    cool = td.all_cool(runs)
-    check(runs, cool)
-    begin = td.after_start if cool else td.start_of_equilibrium
-    start = max(begin(run, args.skip) for run in runs)
-    paths = mean_and_density(runs, args.skip)
+    check(runs)
+    settled = td.all_settle(runs)
+    start = max(td.start_of_steady_state(run, args.skip) for run in runs)
+    kicked = any("bathed" in run.nature for run in runs)
+    paths = None if kicked else mean_and_density(runs, args.skip)
     means, curves = {}, {}
-    count = (not cool) + bool(paths)
+    count = settled + bool(paths)
     figure, panels = plt.subplots(1, count, squeeze=False, figsize=(2 + 4 * count, 4.5))
-    if cool:
-        notes.append("the gas loses energy, no equilibrium: kT is that of the start")
-    else:
+    if settled:
         means = over_all(runs, args.skip, notes)
         shown = pressures_in_time(runs)
         draw_pressure(panels[0, 0], shown, means["pressure_virial"], start)

@@ -51,7 +51,7 @@ def draw(rows: list[dict]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "scaling.png").parse_args()
+    args = command_line(__doc__, "scaling.png", repeated=True).parse_args()
     rows = table(args.runs)
     report(args, draw(rows), rows)
 

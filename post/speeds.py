@@ -26,7 +26,7 @@ from ricochet.script import command_line, grouped, late_frames, launch, report
 from ricochet.speeds import exact_law, independent_frames, reduced_speeds, relaxation
 from ricochet.statistics import Estimate, binned, estimate, hold_against
 from ricochet.theory import RELAXATION, maxwell_cdf, maxwell_pdf
-from ricochet.thermodynamics import after_start, all_cool, equal_disks, start_of_equilibrium
+from ricochet.thermodynamics import after_start, all_settle, equal_disks, start_of_equilibrium
 
 import numpy as np
 
@@ -136,7 +136,7 @@ def draw(runs: list[Run], groups: list, pools: list[Pool], cool: bool) -> plt.Fi
 
 def main() -> None:
     args = command_line(__doc__, "speeds.png", frames=None, skip=None, apart=5.0).parse_args()
-    cool, groups = all_cool(args.runs), grouped(args.runs, lambda run: run.count)
+    cool, groups = not all_settle(args.runs), grouped(args.runs, lambda run: run.count)
     pools = [pooled(members, args, cool) for _, members in groups]
     data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, []
     for (count, _), pool in zip(groups, pools, strict=True):

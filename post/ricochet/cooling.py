@@ -11,7 +11,7 @@ import numpy as np
 from . import hard_disks, theory
 from .reader import Run, RunError
 from .statistics import Estimate, estimate
-from .thermodynamics import equal_disks, free_disks, lightest_and_heaviest, packing, temperature
+from .thermodynamics import equal_disks, free_disks, kt_at_start, lightest_and_heaviest, packing
 
 Curves = dict[str, np.ndarray | Estimate]
 
@@ -63,7 +63,7 @@ def first_rate(run: Run) -> float:
     if not equal_disks(run):
         return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
-    kt = temperature(run)
+    kt = kt_at_start(run)
     return hard_disks.collision_rate(z, 2 * run.radius[0], free_disks(run), kt, run.mass[0])
 
 

@@ -3,16 +3,20 @@
 import numpy as np
 import scipy
 
+from .nature import allow
 from .reader import Run
 from .statistics import Estimate, estimate
-from .thermodynamics import after_start, has_log, loses_energy, start_of_equilibrium
+from .thermodynamics import has_log, start_of_steady_state
 
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # of the frames of a single run
+#: With which disks fly straight and at one speed, in all parts of the box alike.
+STRAIGHT = {"mixture", "unlike", "lossy", "rough", "turning", "thermal", "uneven", "sliding"}
 
 
 def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Lengths of the paths that the disks of all frames are on, and the weight of each."""
+    allow(run, "free paths are those of disks that fly freely in an empty box", *STRAIGHT)
     log = run.events
     disk = np.concatenate([log.i, log.j[log.j > 0]])
     time = np.concatenate([log.time, log.time[log.j > 0]])
@@ -24,8 +28,7 @@ def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndar
         after = np.searchsorted(own, run.time, side="right")
         inside = (after > 0) & (after < len(own))
         duration[inside, k] = own[after[inside]] - own[after[inside] - 1]
-    begin = after_start if loses_energy(run) else start_of_equilibrium
-    duration[run.time < begin(run, skip)] = np.nan
+    duration[run.time < start_of_steady_state(run, skip)] = np.nan
     known = duration > 0
     return (run.speed(slice(None)) * duration)[known], 1 / duration[known]
 

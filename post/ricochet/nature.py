@@ -40,6 +40,8 @@ TRAITS = {
 SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed", "thermal"}
 #: With which velocities do not settle to Maxwell's law.
 UNSETTLED = {*SOURCES, "uneven", "lossy"} - {"bathed", "thermal"}
+#: With which they do.
+SETTLED = TRAITS.keys() - UNSETTLED
 
 
 class Refused(RunError):
@@ -68,6 +70,11 @@ class Nature(frozenset):
     def keeps_energy(self) -> bool:
         """Whether the total energy is that of the start at any time."""
         return self.closed and "lossy" not in self
+
+    @property
+    def keeps_kinetic_energy(self) -> bool:
+        """Whether the energy of translation is that of the start at any time, and so is kT."""
+        return self.keeps_energy and not self & {"falling", "rough", "turning"}
 
     @property
     def in_equilibrium(self) -> bool:

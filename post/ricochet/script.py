@@ -5,6 +5,7 @@ Figures are drawn without a display, in the style of `style.mplstyle`.
 
 import argparse
 import csv
+import hashlib
 import re
 import sys
 import warnings
@@ -93,7 +94,26 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             word = unknown[0].split("=")[0]
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
+        if len(getattr(known, "runs", ())) > 1 and not known.repeated:
+            known.runs = distinct(known.runs)
         return known
+
+
+def distinct(runs: list[Run]) -> list[Run]:
+    """Each run once: one that ends as another, to the last digit, says nothing of its own."""
+    found: dict[bytes, Run] = {}
+    twins = []
+    for run in runs:
+        ending = hashlib.blake2b(run.time[-1:].tobytes())
+        for part in (run.position[-1], run.velocity[-1], run.mass, run.radius):
+            ending.update(part.tobytes())
+        if found.setdefault(ending.digest(), run) is not run:
+            twins.append((run, found[ending.digest()]))
+    for run, other in twins[:1]:
+        more = f", and {len(twins) - 1} more" if len(twins) > 1 else ""
+        words = f"{run.path} is the same run as {other.path}: left out{more}"
+        print(f"warning: {words}", file=sys.stderr)
+    return list(found.values())
 
 
 def joined(words: Iterable[str]) -> list[str]:
@@ -107,15 +127,18 @@ def joined(words: Iterable[str]) -> list[str]:
     return result
 
 
-def command_line(doc: str, output: str, one: bool = False, csv: bool = True, **defaults) -> Parser:
+def command_line(
+    doc: str, output: str, one: bool = False, csv: bool = True, repeated: bool = False, **defaults
+) -> Parser:
     """A parser whose help is the script's docstring and whose output has this default.
 
-    It opens `one` run or any number, as `runs`, and takes --csv if there are numbers to write, and
-    those of the shared `OPTIONS` that are named, with their defaults (None: no default).
+    It opens `one` run or any number, as `runs`, each once unless they may be `repeated`, and takes
+    --csv if there are numbers to write, and those of the shared `OPTIONS` that are named, with
+    their defaults (None: no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
-    parser.set_defaults(title=doc.splitlines()[0])
+    parser.set_defaults(title=doc.splitlines()[0], repeated=repeated)
     some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
     parser.add_argument("runs", type=read_run, metavar="RUN.h5", **some)
     place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}

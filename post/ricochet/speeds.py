@@ -5,7 +5,7 @@ import numpy as np
 from .reader import Run
 from .statistics import Estimate, Law, estimate, excess_kurtosis, series_mean
 from .theory import finite_n_cdf
-from .thermodynamics import conserved, loses_energy
+from .thermodynamics import conserved
 
 MEMORY = 5.0  # collisions per disk after which a speed is independent
 
@@ -29,17 +29,20 @@ def independent_frames(run: Run, frames: list[int]) -> int:
     return min(len(frames), 1 + int((tau[-1] - tau[0]) / MEMORY * (1 + 1e-9)))
 
 
-def relaxation(run: Run, until: float = 16) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of each frame up to `until` collisions per disk."""
+def relaxation(
+    run: Run, until: float = 16, frames: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Collisions per disk and a2 of each frame up to `until` collisions per disk, or the first."""
     tau = run.collisions_per_disk_at(run.time)
-    tau = tau[tau <= until]
+    tau = tau[tau <= until] if frames is None else tau[:frames]
     return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
 
 
 def exact_law(run: Run) -> Law | None:
     """The law of N disks that share a fixed kinetic energy, for runs that have one."""
     axes = conserved(run).sum()
-    if loses_energy(run) or run.gravity.any() or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
+    free = not run.nature.keeps_kinetic_energy
+    if free or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None
     return finite_n_cdf(run.count, bool(axes == 2))
 

@@ -6,7 +6,7 @@ A handful of lines of scipy each, and no library: those know periodic boxes, but
 import numpy as np
 import scipy
 
-from .files import RunError
+from .nature import TRAITS, allow
 from .reader import Run
 
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
@@ -15,8 +15,7 @@ MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
 
 def refuse_shear(run: Run) -> None:
     """The images here do not slide."""
-    if run.shear_rate != 0:
-        raise RunError(f"{run.path}: box.shear_rate is not 0; structure is found in boxes at rest")
+    allow(run, "structure is found in boxes at rest", *TRAITS.keys() - {"sheared"})
 
 
 def pair_correlation(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:

@@ -1,8 +1,9 @@
 """Pressure, collision rates and temperature of a run in equilibrium, with errors.
 
 Three independent ways to the pressure: the virial of the pair collisions, the collision rate (equal
-disks), the force on the sides.  Z = P / (n kT); elastic runs.  `skip` is what is left out at the
-start, in collisions per disk; None finds it.
+disks), the force on the sides.  Z = P / (n kT).  kT is exact where the kinetic energy is kept, else
+the mean of what is steady.  `skip` is what is left out at the start, in collisions per disk; None
+finds it.
 """
 
 from collections.abc import Sequence
@@ -11,36 +12,36 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
-from .reader import SIDES, Run, RunError, Species
+from .nature import SETTLED, allow
+from .reader import SIDES, Run, RunError, Series, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
-ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at all
+KICKED = {"noisy", "bathed", "active"}
+MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
+#: Beside equal smooth disks that keep their energy, those with a pressure of one phase in an empty
+#: box.
+FLUID = ("thermal", "bathed", "rough", "turning", "mixture")
 
 
 class Steps(NamedTuple):
     """What happened between one sample of the observables and the next, in equilibrium."""
 
     time: np.ndarray  # (T,) how long it was
+    kt: np.ndarray  # (T,) mean over that time
     collisions: np.ndarray  # (T,) of pairs
     virial: np.ndarray  # (T,)
     hits: np.ndarray  # (T,) of all sides
     impulse: np.ndarray  # (T, 4) by side
 
 
-def loses_energy(run: Run) -> bool:
-    """Whether disks or walls have taken energy in collisions: such a gas has no equilibrium."""
-    lost = run.observable("dissipated_energy").value[-1]
-    return bool(lost > ROUNDING * run.kinetic_energy([0, -1]).sum(axis=1).max())
-
-
-def all_cool(runs: Sequence[Run]) -> bool:
-    """Whether the runs lose energy: all of them, or none."""
-    cool = [loses_energy(run) for run in runs]
-    if any(cool) and not all(cool):
-        lossy, elastic = runs[cool.index(True)], runs[cool.index(False)]
-        raise RunError(f"{lossy.path}: loses energy, {elastic.path} does not: draw them apart")
-    return all(cool)
+def all_settle(runs: Sequence[Run]) -> bool:
+    """Whether the runs come to equilibrium: all of them, or none."""
+    settled = [run.nature.in_equilibrium for run in runs]
+    if any(settled) and not all(settled):
+        one, other = runs[settled.index(False)], runs[settled.index(True)]
+        raise RunError(f"{one.path}: has no equilibrium, {other.path} has: draw them apart")
+    return all(settled)
 
 
 def after_start(run: Run, skip: float | None = None) -> float:
@@ -60,26 +61,15 @@ def after_start(run: Run, skip: float | None = None) -> float:
     return float(np.interp(min(SPEEDS_FORGET, tau[-1] / 2), tau, time))
 
 
-def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
-    """The time from which the gas is in equilibrium: see `start_of_steady_state`.
-
-    Raises RunError if the run loses energy in collisions.
-    """
-    if loses_energy(run):
-        raise RunError(
-            f"{run.path}: is not elastic: it loses energy in collisions and has no equilibrium"
-        )
-    return start_of_steady_state(run, skip)
-
-
 def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     """The time after `skip` collisions per disk, or else that from which nothing drifts.
 
-    Looked at are the collision rate and the kinetic energy of each species, at the observables or,
-    if there are more of these, at the frames.  Speeds get `SPEEDS_FORGET`, as those series say
-    nothing of their distribution.  A run too short for all that counts from its middle.
+    Looked at are the collision rate and the energies of each species, where they can change, at the
+    observables or, if there are more of these, at the frames.  Speeds get `SPEEDS_FORGET`, as those
+    series say nothing of their distribution; a gas that cools gets no more.  A run too short for
+    all that counts from its middle.
     """
-    if skip is not None:
+    if skip is not None or run.nature.cooling:
         return after_start(run, skip)
     few = len(run.collisions_per_disk.time) < run.frames
     time = run.time if few else run.collisions_per_disk.time
@@ -87,14 +77,22 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
         return max(float(time[-1] / 2), after_start(run))
     apart = np.maximum(np.diff(time), 1e-9 * np.mean(np.diff(time)))  # two samples at one time
     series = [np.diff(run.collisions_per_disk_at(time)) / apart]
-    if len(run.names) > 1 or run.gravity.any() or not run.nature.keeps_energy:
+    if len(run.names) > 1 or not run.nature.keeps_kinetic_energy:
         if few:
             energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.frames)])
             series += [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
         else:
-            series += [run.observable(f"{name}/kinetic_energy").value[1:] for name in run.names]
+            kinds = ("kinetic_energy", "rotational_energy", "potential_energy")
+            known = {f"{name}/{kind}" for name in run.names for kind in kinds} & {*run.observables}
+            series += [run.observable(name).value[1:] for name in sorted(known)]
     first = max(equilibration(values) for values in series)
     return max(float(time[first]), after_start(run))
+
+
+def start_of_equilibrium(run: Run, skip: float | None = None) -> float:
+    """The same of a run that has an equilibrium; others are refused."""
+    allow(run, "it has no equilibrium", *SETTLED)
+    return start_of_steady_state(run, skip)
 
 
 def frames_from(
@@ -110,36 +108,29 @@ def frames_from(
     return chosen
 
 
-def later(run: Run, skip: float | None, cool: bool) -> slice:
-    """Frames in equilibrium, or after the start, without the last, which may be out of step."""
-    begin = after_start if cool else start_of_equilibrium
-    first = int(np.searchsorted(run.time, begin(run, skip)))
+def later(run: Run, skip: float | None = None) -> slice:
+    """Frames in the steady state, or of a gas that cools after the start.
+
+    Without the last, which may be out of step.
+    """
+    first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
     if run.frames - 1 - first < 2:
         raise RunError(f"{run.path}: needs more frames after the start")
     return slice(first, run.frames - 1)
 
 
-def steps(run: Run, skip: float | None = None) -> Steps:
-    """Differences of the observables that only grow, from the start of equilibrium on."""
-    time = run.collisions_per_disk.time
-    first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
-    if len(time) - first <= FEWEST:
-        raise RunError(
-            f"{run.path}: has {len(time) - first} samples of the observables in equilibrium, too "
-            "few for an error; set output.observables_every_time, or run longer"
-        )
-    sums = (
-        run.observable(name).value[first:]
-        for name in ("collisions", "virial", "wall_collisions", "wall_impulse")
-    )
-    collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
-    return Steps(np.diff(time[first:]), collisions, virial, hits.sum(axis=1), impulse)
+# --- temperature ---
 
 
 def conserved(run: Run) -> np.ndarray:
     """(2,) along which axes nothing ever changes the total momentum."""
-    empty = not run.obstacles and not len(run.walls)
-    return run.periodic & (run.gravity == 0) & empty
+    if run.obstacles or len(run.walls) or run.nature & {"sheared", "changed"}:
+        return np.zeros(2, dtype=bool)
+    if run.nature & KICKED and not run.parameter("drive", "keep_momentum", False):
+        return np.zeros(2, dtype=bool)
+    rubbing = run.nature & {"thermal", "rough", "turning"}  # sides change what is along them
+    whole = run.periodic & (run.periodic[::-1] | (not rubbing))
+    return whole & (run.gravity == 0)
 
 
 def free_disks(run: Run) -> float:
@@ -147,26 +138,57 @@ def free_disks(run: Run) -> float:
     return run.count - conserved(run).sum() / 2
 
 
-def drift(run: Run, frames: Sequence[int] = (0,)) -> np.ndarray:
-    """(F, 2) conserved velocity of the centre of mass, which is no heat; 0 along other axes."""
-    centre = np.average(run.velocity[list(frames)], axis=1, weights=run.mass)
+def drift(run: Run) -> np.ndarray:
+    """(2,) conserved velocity of the centre of mass, which is no heat; 0 along other axes."""
+    centre = np.average(run.velocity[0], axis=0, weights=run.mass)
     return np.where(conserved(run), centre, 0.0)
 
 
-def temperature(run: Run, frames: Sequence[int] = (0,)) -> float:
-    """kT, from the kinetic energy of some frames; of a gas without gravity any will do.
+def kt_of(run: Run, energy: np.ndarray) -> np.ndarray:
+    """kT, from the kinetic energy of all disks together.
 
     Where to divide by N and where by N - 1 is in docs/theory.md.
     """
-    energy = run.kinetic_energy(list(frames)).sum(axis=1)
-    heat = energy - 0.5 * run.mass.sum() * np.sum(drift(run, frames) ** 2, axis=1)
-    return float(np.mean(heat)) / free_disks(run)
+    return (energy - 0.5 * run.mass.sum() * np.sum(drift(run) ** 2)) / free_disks(run)
 
 
-def mean_energy(run: Run, mass: float) -> float:
+def kt_at_start(run: Run) -> float:
+    """The kT of the first frame."""
+    return float(kt_of(run, run.kinetic_energy(0).sum()))
+
+
+def kt_in_time(run: Run) -> Series:
+    """The kT at the observables, or at the frames if there are too few of those."""
+    time, energy = run.observable("all/kinetic_energy")
+    if len(time) >= min(run.frames, 2 * FEWEST):
+        return Series(time, kt_of(run, run.count * energy))
+    frames = np.array([run.kinetic_energy(k).sum() for k in range(run.frames)])
+    return Series(run.time, kt_of(run, frames))
+
+
+def temperature(run: Run, skip: float | None = None) -> SeriesMean:
+    """The kT of equilibrium: exact where the kinetic energy is kept, else its mean over time."""
+    if run.nature.keeps_kinetic_energy:
+        return SeriesMean(kt_at_start(run), 0.0, np.inf, 0.0)
+    start = start_of_equilibrium(run, skip)
+    time, kt = kt_in_time(run)
+    late = time >= start
+    return series_mean(*between(time[late], kt[late])[::-1])
+
+
+def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times from one sample to the next, and what the value adds up to in each of them."""
+    return np.diff(time), np.diff(time) * (value[1:] + value[:-1]) / 2
+
+
+def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     """What <K> of a disk of this mass is in equilibrium, without gravity."""
     bound = (run.count - free_disks(run)) * mass / run.mass.sum()
-    return temperature(run) * (1 - bound) + 0.5 * mass * float(np.sum(drift(run) ** 2))
+    moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
+    return temperature(run, skip).scaled(1 - bound, moving)
+
+
+# --- disks ---
 
 
 def packing(run: Run) -> float:
@@ -195,12 +217,53 @@ def lightest_and_heaviest(run: Run) -> tuple[int, int]:
     return int(np.argmin(masses)), int(np.argmax(masses))
 
 
-def mean_free_time(run: Run) -> float:
-    """1 / w, over the whole run."""
-    collisions = run.collisions_per_disk.value[-1]
-    if not collisions > 0:
+def mean_free_time(run: Run, start: float = 0.0) -> float:
+    """1 / w, from some time on."""
+    first, last = run.collisions_per_disk_at(np.array([start, run.time[-1]]))
+    if not last > first:
         raise RunError(f"{run.path}: has no collisions of two disks yet")
-    return run.time[-1] / collisions
+    return float((run.time[-1] - start) / (last - first))
+
+
+# --- pressure and rates ---
+
+
+def steps(run: Run, skip: float | None = None) -> Steps:
+    """Differences of the observables that only grow, from the start of equilibrium on."""
+    time = run.collisions_per_disk.time
+    first = int(np.searchsorted(time, start_of_equilibrium(run, skip)))
+    if len(time) - first <= FEWEST:
+        raise RunError(
+            f"{run.path}: has {len(time) - first} samples of the observables in equilibrium, too "
+            "few for an error; set output.observables_every_time, or run longer"
+        )
+    sums = (
+        run.observable(name).value[first:]
+        for name in ("collisions", "virial", "wall_collisions", "wall_impulse")
+    )
+    collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
+    time = time[first:]
+    if run.nature.keeps_kinetic_energy:
+        kt = np.full(len(time), kt_at_start(run))
+    else:
+        kt = kt_of(run, run.count * run.observable("all/kinetic_energy").value[first:])
+    mean = (kt[1:] + kt[:-1]) / 2
+    return Steps(np.diff(time), mean, collisions, virial, hits.sum(axis=1), impulse)
+
+
+def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """An amount, what it is to be divided by, and a factor: its mean per time over kT^power.
+
+    To first order, so that the error knows how the amount follows a kT that changes.
+    """
+    kt = float(np.average(s.kt, weights=s.time))
+    return amount, s.time * (1 + power * (s.kt / kt - 1)), kt**-power
+
+
+def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Series whose ratio of means is Z - 1, by the virial."""
+    amount, per, factor = over_kt((s := steps(run, skip)).virial, s, 1)
+    return factor / (2 * run.count) * amount, per
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
@@ -211,16 +274,17 @@ def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the virial of the pairs."""
-    s = steps(run, skip)
-    return series_mean(s.virial, s.time).scaled(1 / (2 * run.count * temperature(run)), 1.0)
+    return series_mean(*virial_over_kt(run, skip)).scaled(1.0, 1.0)
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the collision rate; equal masses."""
-    free = free_disks(run)
-    diameter, mass = 2 * run.radius[0], run.mass[0]
-    unit = hard_disks.collision_rate(2.0, diameter, free, temperature(run), mass)
-    return collision_rate(run, skip).scaled(1 / unit, 1.0)
+    s = steps(run, skip)
+    amount, per, factor = over_kt(s.collisions, s, 0.5)
+    turning = run.count / 2 if run.nature & {"rough", "turning"} else 0.0
+    share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
+    unit = hard_disks.collision_rate(2.0, 2 * run.radius[0], share, 1.0, run.mass[0])
+    return series_mean(amount, per).scaled(2 * factor / (run.count * unit), 1.0)
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
@@ -228,15 +292,14 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
-    return series_mean(work, s.time).scaled(1 / (2 * run.count * temperature(run)))
+    amount, per, factor = over_kt(work, s, 1)
+    return series_mean(amount, per).scaled(factor / (2 * run.count))
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """P / (n kT) by virial, rate, walls, where they apply."""
-    if run.gravity.any():
-        raise RunError(f"{run.path}: falls, it has no equation of state")
-    empty = not run.periodic.any() and not run.obstacles and not len(run.walls)
-    walled = empty and np.ptp(run.radius) == 0
+    allow(run, "it has no equation of state", *FLUID)
+    walled = not run.periodic.any() and np.ptp(run.radius) == 0
     ways = {"virial": z_virial} | ({"rate": z_rate} if equal_disks(run) else {})
     ways |= {"walls": z_wall} if walled else {}
     return {name: way(run, skip) for name, way in ways.items()}
@@ -244,9 +307,9 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """By the virial, and by the sides that are walls; a side feels force per length."""
-    area, kt = np.prod(run.edges), run.count * temperature(run)
-    found = {"pressure_virial": z_virial(run, skip).scaled(kt / area)}
     s = steps(run, skip)
+    inside = series_mean(run.count * s.kt * s.time + s.virial / 2, s.time)
+    found = {"pressure_virial": inside.scaled(1 / np.prod(run.edges))}
     for k, side in enumerate(SIDES):
         if not run.periodic[k // 2]:
             force = series_mean(s.impulse[:, k], s.time)
@@ -276,8 +339,9 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 
 
 def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
-    """Pressures and rates of collisions, by name."""
-    found = pressures(run, skip) | {"collisions_per_disk_and_time": collision_rate(run, skip)}
+    """The kT, pressures and rates of collisions, by name."""
+    found = {"kT": temperature(run, skip), **pressures(run, skip)}
+    found["collisions_per_disk_and_time"] = collision_rate(run, skip)
     if not run.periodic.all():
         s = steps(run, skip)
         found["side_hits_per_time"] = series_mean(s.hits, s.time)

@@ -20,6 +20,7 @@ import numpy as np
 
 from . import hard_disks
 from . import thermodynamics as td
+from .nature import Refused, allow
 from .reader import Events, Run, RunError, read_run
 from .statistics import Curve, SeriesMean, estimate, series_mean
 
@@ -48,15 +49,19 @@ def velocity_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
 
 
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-    """(T, N, 2) positions, continuous in time, and velocities, relative to the centre of mass."""
+    """(T, N, 2) positions, continuous in time, and velocities.
+
+    Relative to the centre of mass, where that moves as at the start.
+    """
+    kept = td.conserved(run)
     return tuple(
-        values - np.average(values, axis=1, weights=run.mass, keepdims=True)
+        values - kept * np.average(values, axis=1, weights=run.mass, keepdims=True)
         for values in (run.unwrapped(frames), run.velocity[frames])
     )
 
 
 def displacement(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
-    """Mean square displacement at lags in frames, relative to the centre of mass."""
+    """Mean square displacement at lags in frames."""
     x, _ = motion(run, frames)
     return np.array([2 * np.mean((x[k:] - x[: len(x) - k]) ** 2) for k in at])
 
@@ -73,7 +78,8 @@ def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
     Or an eighth of the shortest run.
     """
     run, shortest = runs[0], min(f.stop - f.start for f in frames)
-    sound = hard_disks.speed_of_sound(td.packing(run), td.temperature(run), run.mass.mean())
+    kt = td.temperature(run).mean
+    sound = hard_disks.speed_of_sound(td.packing(run), kt, run.mass.mean())
     crossing = float(run.edges.min()) / sound / (run.time[1] - run.time[0])
     return int(np.clip(crossing, 2, max(2, shortest // 8)))
 
@@ -102,13 +108,10 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 
 def check(run: Run) -> None:
     """Refuse all but the gases that the moments are for."""
-    alone = run.periodic.all() and not (run.gravity.any() or run.obstacles or len(run.walls))
-    driven = run.kicked or run.shear_rate != 0 or "angular_velocity" in run.elements
-    if not alone or driven or run.time_step or not td.equal_disks(run) or run.restitution != 1:
-        raise RunError(
-            f"{run.path}: transport takes equal elastic smooth disks in a periodic box, by events "
-            "and at rest: no gravity, walls, shear or kicks"
-        )
+    takes = "transport takes equal elastic smooth disks in a periodic box"
+    allow(run, takes)
+    if not run.periodic.all():
+        raise Refused(f"{run.path}: has walls; {takes}")
 
 
 def log(run: Run) -> Events:
@@ -173,7 +176,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     handed = handed_on(run, events.momentum_change, before, after)
     handed = np.cumsum(np.vstack([np.zeros(5), handed]), axis=0)
 
-    step = td.mean_free_time(run) / PER_FREE_TIME
+    step = td.mean_free_time(run, start) / PER_FREE_TIME
     time = np.arange(start, run.time[-1], step)
     total = handed[np.searchsorted(events.time, time, "right")]
     total += np.stack([np.interp(time, knots, part) for part in flown.T], axis=1)
@@ -232,16 +235,8 @@ def enskog(eta: float, diameter: float = 1.0, kt: float = 1.0, mass: float = 1.0
 
 
 def enskog_of(run: Run) -> dict[str, float]:
-    """The same of a run, in its units and at its temperature."""
-    return enskog(td.packing(run), 2 * run.radius[0], td.temperature(run), run.mass[0])
-
-
-def enskog_by_rate(run: Run) -> tuple[float, float]:
-    """Diffusion coefficient and kinematic viscosity of equal disks, with the Z of their rate."""
-    diameter, kt, mass = 2 * run.radius[0], td.temperature(run), run.mass[0]
-    unit = hard_disks.collision_rate(2.0, diameter, td.free_disks(run), kt, mass)
-    state = (1 + 1 / (td.mean_free_time(run) * unit), td.packing(run), diameter, kt, mass)
-    return hard_disks.enskog_diffusion(*state), hard_disks.enskog_viscosity(*state)
+    """The same of a run that keeps its kinetic energy, in its units and at its temperature."""
+    return enskog(td.packing(run), 2 * run.radius[0], td.kt_at_start(run), run.mass[0])
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
@@ -257,7 +252,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     for name in MOMENTS:
         members, slopes = [], []
         for run, (step, one) in zip(runs, each, strict=True):
-            kt = td.temperature(run)
+            kt = td.kt_at_start(run)
             unit = float(np.prod(run.edges)) * (kt**2 if name == "conductivity" else kt)
             unit = 1 / unit / enskog_of(run)[name]
             members.append(coefficient(one[name], step, lag).scaled(unit))
