@@ -43,7 +43,7 @@ def half_and_one(run: Run) -> list[float]:
     """The psi at w t = 1/2 and 1, interpolated between frames."""
     lags = np.arange(1, 6)
     t = lags * (run.time[1] - run.time[0]) / mean_free_time(run)
-    psi = velocity_memory(run, later(run, None, cool=False), lags)
+    psi = velocity_memory(run, later(run), lags)
     return list(np.exp(np.interp((0.5, 1.0), t, np.log(psi))))
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 from ricochet import Run
 from ricochet.statistics import Estimate, estimate, excess_kurtosis, hold_against
 from ricochet.theory import finite_n_cdf, maxwell_cdf
-from ricochet.thermodynamics import temperature
+from ricochet.thermodynamics import kt_at_start
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, middle, over
@@ -107,14 +107,14 @@ def wall_speeds(run: Run) -> tuple:
     """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
     log = run.events
     hit = log.j <= 0
-    return log.impulse[hit] / (2 * sqrt(2 * temperature(run))), maxwell_cdf
+    return log.impulse[hit] / (2 * sqrt(2 * kt_at_start(run))), maxwell_cdf
 
 
 def wall_energies(run: Run) -> np.ndarray:
     """K of a disk that hits a side, over kT; exact for fixed energy."""
     log = run.events
     hit = np.flatnonzero(log.j <= 0)
-    return run.kinetic_energy(slice(1, None))[hit, log.i[hit] - 1] / temperature(run)
+    return run.kinetic_energy(slice(1, None))[hit, log.i[hit] - 1] / kt_at_start(run)
 
 
 def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
@@ -126,7 +126,7 @@ def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
 def approach_speeds(run: Run) -> tuple:
     """g_n of pair collisions over sqrt(4 kT / m)."""
     log = run.events
-    return log.impulse[log.j > 0] / sqrt(4 * temperature(run)), maxwell_cdf
+    return log.impulse[log.j > 0] / sqrt(4 * kt_at_start(run)), maxwell_cdf
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
