@@ -19,6 +19,7 @@ from ricochet.statistics import combined
 from ricochet.thermodynamics import z_ways
 
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
@@ -75,8 +76,14 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     below.axhline(0, color="black", lw=1, zorder=0)
     largest = 3 * np.nanmax(np.abs(100 * (found["Z_virial"] / expected - 1)), initial=0.1)
     below.set(xlabel="packing fraction $\\eta$", ylabel="deviation (%)", ylim=(-largest, largest))
-    above.set(yscale="log", ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(eta)))
-    above.set(ylim=(0.9, None), title=caption(runs))
+    most = np.nanmax([found[f"Z_{name}"] for name in WAYS])  # of the data: curves go far beyond
+    above.set(ylabel="$Z = P\\,/\\,(n\\,kT)$", xlim=(0, 0.05 + max(eta)), title=caption(runs))
+    if most > 3:
+        above.semilogy()
+        above.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        above.yaxis.set_major_formatter("{x:g}")
+        above.yaxis.set_minor_formatter("")
+    above.set_ylim(0.9, 1.15 * most)
     above.legend()
     return figure
 
