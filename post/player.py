@@ -51,7 +51,7 @@ MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
 BINS = 40  # of the speed histogram
-FEWEST = 10  # disks of a species that has a histogram, samples of a plot
+FEWEST = 10  # disks of a species that has a histogram
 MOST_SAMPLES = 500  # of a plot
 MOST_EVENTS = 20000  # to come
 RESTING = 0.02  # of the disks at rest at the end: no gas
@@ -145,26 +145,20 @@ def coded_turns(
 
 def counted(
     run: Run, paths: Paths, frames: list[int], most: float
-) -> tuple[dict, dict[str, np.ndarray]]:
-    """Collisions per disk in each frame, with what, and the moments of all events in the film.
+) -> tuple[list[float], dict[str, np.ndarray]]:
+    """Collisions per disk in each frame, and the moments of all events in the film.
 
-    Those of "pairs" are known from the log.  Without one, or if it is longer than `most`, frames
-    tell how often each disk has collided with anything ("all", or "disks" if there is nothing
-    else), and no moments are known.
+    No moments without a log, or if it is longer than `most`.
     """
-    time = run.time[frames]
-    if paths.log is not None:
-        moments, pair = paths.log[0], paths.log[2] > 0
-        some = slice(*np.searchsorted(moments, time[[0, -1]], "right"))
-        if some.stop - some.start <= most:
-            means = 2 * np.searchsorted(moments[pair], time, "right") / run.count
-            known = {"pairs": moments[some][pair[some]], "others": moments[some][~pair[some]]}
-            return {"collisions": means.tolist(), "with": "pairs"}, known
-    hits = None if run.collisions is None else [float(run.collisions[f].mean()) for f in frames]
-    walled = bool(not run.periodic.all() or run.obstacles or len(run.walls))
-    return {"collisions": hits, "with": "all" if walled else "disks"}, dict.fromkeys(
-        ("pairs", "others"), np.zeros(0)
-    )
+    moments = dict.fromkeys(("pairs", "others"), np.zeros(0))
+    if paths.log is None:
+        return run.collisions_per_disk_at(run.time)[frames].tolist(), moments
+    time, pair = paths.log[0], paths.log[2] > 0
+    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
+    if some.stop - some.start <= most:
+        moments = {"pairs": time[some][pair[some]], "others": time[some][~pair[some]]}
+    before = np.searchsorted(time[pair], run.time[frames], "right")
+    return (2 * before / run.count).tolist(), moments
 
 
 def events_of(run: Run, paths: Paths, frames: list[int]) -> dict:
@@ -205,11 +199,11 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pressure(run: Run) -> dict | None:
-    """The pressure against time, of as many samples as a plot can show; None without any."""
+    """The pressure against time, of as many samples as a plot can show; None without a cadence."""
     with suppress(RunError):
         series = run.observable("pressure")
         some = np.linspace(0, len(series.time) - 1, min(len(series.time), MOST_SAMPLES)).astype(int)
-        if len(some) >= FEWEST and np.isfinite(series.value[some]).all():
+        if len(some) > 2 and np.isfinite(series.value[some]).all():
             value = list(map(significant, series.value[some]))
             return {"time": list(map(significant, series.time[some])), "value": value}
     return None
@@ -285,7 +279,7 @@ def film(
     most = 0.4 * room // TURN  # the rest of its half is for headings
     paths = Paths(run, most)
     turns, guesses = coded_turns(run, paths, frames)
-    counts_of, moments = counted(run, paths, frames, most / 2)
+    collisions, moments = counted(run, paths, frames, most / 2)
     blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
     blocks["mass"] = run.mass.astype("<f4").tobytes()
     # Where displacements count from, without jumps until the first frame of the film.
@@ -297,7 +291,7 @@ def film(
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {
         "time": run.time[frames].tolist(),
-        "counted": counts_of,
+        "collisions": collisions,
         "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
         "kicked": run.kicked,

@@ -147,7 +147,7 @@ function buildVariable(place, variable, name) {
     changed();
   });
   const unit = variable.unit ? make('small', { textContent: ` [${variable.unit}]` }) : '';
-  row.append(make('header', {}, make('label', { htmlFor: id }, name, unit), reset),
+  row.append(make('header', {}, make('label', { htmlFor: id }, ...name.split('_').flatMap((word, k) => k ? ['_', make('wbr'), word] : word), unit), reset),
     ...controls.map(({ input, slider }) => make('div', {}, ...(slider ? [slider] : []), input)),
     make('p', { id: id + '.help', textContent: words }));
   mark();

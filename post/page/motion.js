@@ -3,7 +3,7 @@
 // A gap is the time between two frames. In it a disk flies from one frame to the next, by way of its turns; each
 // flight is straight, or a parabola under gravity. A disk whose path is not known stands still until the next frame;
 // where many do, all stand: the frame is shown as it is.
-const moment = { time: 0, frame: 0, gap: 0, share: 0, known: true, shown: 0, hits: 0, kinetic: [], potential: [] };
+const moment = { time: 0, frame: 0, gap: 0, share: 0, known: true, shown: 0, kinetic: [], potential: [] };
 const MANY = 0.1;  // of the disks
 let X, Y, VX, VY;  // of all disks at the moment; inside the box along a periodic axis
 let UX, UY;        // the same places in units of the room, without jumps since the frame before
@@ -25,7 +25,6 @@ function move(time) {
   const gx = gX / width, gy = gY / height, start = 2 * gap * disks, end = 2 * next * disks;
   const gained = kinds.map(() => 0), fallen = kinds.map(() => 0);  // energy of each species since the frame before
   const known = moment.known = !film.guesses[gap], falls = gX !== 0 || gY !== 0;
-  let total = 0;
   moment.shown = film.time[gap] + u * h;
   for (let i = 0, turn = gapStart[gap], stop = gapStart[next], heading = headingsStart[gap]; i < disks; i++) {
     const kind = speciesOf[i], xa = positions[start + 2 * i] / grain, ya = positions[start + 2 * i + 1] / grain;
@@ -58,7 +57,6 @@ function move(time) {
     UX[i] = x;
     UY[i] = y;
     HITS[i] = hits;
-    total += hits;
     ANCHOR[i] = u0 === 0 ? gap : u1 === 1 ? next : -1;
     if (falls) {
       const work = gX * width * (x - xa) + gY * height * (y - ya);
@@ -70,7 +68,6 @@ function move(time) {
     X[i] = left + width * x;
     Y[i] = bottom + height * y;
   }
-  moment.hits = total;
   const { frame } = moment, between = known && frame === gap;
   moment.kinetic = kinds.map((kind, s) => film.kinetic[frame][s] + (between ? (gained[s] + fallen[s]) / kind.count : 0));
   moment.potential = film.potential && kinds.map((kind, s) => film.potential[frame][s] - (between ? fallen[s] / kind.count : 0));
@@ -96,11 +93,9 @@ function sidesAt(time) {
   });
 }
 
-// Collisions per disk: of two disks if the log tells, else those in frames and known turns; null where nothing tells.
+// Collisions per disk, of the frame if their moments are not known.
 function collisionsNow() {
-  const { collisions } = film.counted, { frame, gap, known } = moment;
-  if (film.counted.with === 'pairs') return collisions[0] + 2 * upTo(pairs, moment.shown) / disks;
-  return collisions && collisions[frame] + (known && frame === gap ? moment.hits / disks : 0);
+  return pairs.length ? film.collisions[0] + 2 * upTo(pairs, moment.shown) / disks : film.collisions[moment.frame];
 }
 
 // The next event of the log.

@@ -8,10 +8,10 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
 function tell() {
-  const { time, frame, gap } = moment, collisions = collisionsNow();
+  const { time, frame, gap } = moment;
   $('scrub').value = (time - first()) / (last() - first() || 1);
   $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · frame ${frame + 1}/${frames}`
-    + (disks > 1 && collisions !== null ? ` · ${short(+collisions.toPrecision(3))} ${film.counted.with === 'all' ? 'hits per disk (by disks and walls)' : 'collisions per disk'}` : '');
+    + (disks > 1 ? ` · ${short(+collisionsNow().toPrecision(3))} collisions per disk` : '');
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');

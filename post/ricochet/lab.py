@@ -410,17 +410,20 @@ class Lab:
         return {"about": about, "groups": groups, "settings": self.cadences(name, groups)}
 
     def cadences(self, name: str, groups: list[dict]) -> dict[str, str]:
-        """A cadence in time for each kind of sample that the input leaves at first and last."""
+        """The event log, and a cadence in time for samples that the input takes first and last."""
         sample = self.sample(name)
         if sample is None or sample.time[-1] <= 0:
             return {}
         given = {word for group in groups if group["kind"] == "output" for word in group["given"]}
         kinds = {word.split("_every_")[0] for word in given}
         step = f"{sample.time[-1] / FRAMES:.1g}"
+        wanted = {"event_log": ".true."} | {
+            word: step for word in self.table["output"] if word.endswith("_every_time")
+        }
         return {
-            f"output.{word}": step
-            for word in self.table["output"]
-            if word.endswith("_every_time") and word.split("_every_")[0] not in kinds
+            f"output.{word}": value
+            for word, value in wanted.items()
+            if word.split("_every_")[0] not in kinds
         }
 
     def sample(self, name: str) -> Run | None:

@@ -120,7 +120,7 @@ def test_every_input_has_a_form_and_runs(lab):
     wish(lab, page, "crater", lab.form("crater")["settings"])
     lab.page(page).newest.process.wait()
     assert module.FRAMES / 2 < lab.page(page).newest.opened().frames < 3 * module.FRAMES
-    assert lab.form("gravity")["settings"] == {}
+    assert lab.form("gravity")["settings"] == {"output.event_log": ".true."}
 
 
 @pytest.mark.parametrize(
