@@ -13,7 +13,16 @@ energy left than `stop.energy_fraction`.
 
 from ricochet import Run, crater
 from ricochet.crater import Crater, bed, displaced, projectile
-from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
+from ricochet.drawing import (
+    COLOURS,
+    LABELS,
+    WALL,
+    caption,
+    disk_collection,
+    draw_box,
+    plt,
+    scale_top,
+)
 from ricochet.script import command_line, launch, report
 
 import numpy as np
@@ -73,8 +82,7 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 def draw(run: Run, size: Crater) -> plt.Figure:
     """Before, after, collisions per disk, energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
-    moved, radius = run.displacement(-1), float(np.median(run.radius))
-    limits = (0, float(np.quantile(moved[displaced(run)], 0.9)) if size.displaced else radius)
+    moved, limits = run.displacement(-1), (0, scale_top(run, [run.frames - 1], "displacement"))
     draw_state(before, run, 0, moved, limits)
     draw_hull(before, run)
     draw_state(after, run, -1, moved, limits)

@@ -107,8 +107,11 @@ def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
 
 
 def scale_top(run: Run, frames: Sequence[int], colour: str) -> float:
-    """The upper end of a scale for a film, from some frames, without the few largest values."""
-    some = frames[:: max(1, len(frames) // 40)]
+    """The upper end of a scale for a film, without the few largest values.
+
+    From some frames, or from the last one: disks are displaced ever farther.
+    """
+    some = [] if colour == "displacement" else frames[:: max(1, len(frames) // 40)]
     values = values_of(run, sorted({*some, frames[-1]}), colour)
     moved = values[values > 0]
     return float(np.quantile(moved, 0.995)) if len(moved) else 1.0
