@@ -4,11 +4,13 @@
 
 Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
 equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start
-u is v itself.  Runs of the same N are combined.  Equilibrium is found, or begins after --skip; it
-takes the frames of --frames that are at least --apart collisions per disk from each other.
-A gas that loses energy in collisions has no equilibrium: its histogram is of the frames after
---skip, or else 15 collisions per disk, with the kT of each frame for itself; `kT_first` and
-`kT_last` say how far it has cooled meanwhile.
+u is v itself.  Runs of the same N are combined.  Equilibrium, or the steady state of a driven gas,
+is found, or begins after --skip; it takes the frames of --frames that are at least --apart
+collisions per disk from each other, and their mean kT.  In a sheared box speeds are relative to
+its flow.
+A gas that only loses energy has no steady state: its histogram is of the frames after --skip, or
+else 15 collisions per disk, with the kT of each frame for itself.  So is that of a gas whose sides
+move, or whose kT drifts; `kT_first` and `kT_last` say how far.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
 disks that share a fixed kinetic energy, which matters if they are few; none where that law is not
 known: with gravity, losses, one periodic axis of two, or two and unequal masses.  A disk forgets
@@ -17,16 +19,32 @@ collisions per disk.
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
-from argparse import Namespace
 from typing import NamedTuple
 
-from ricochet import Run
+from ricochet import Run, RunError
 from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
-from ricochet.script import command_line, grouped, late_frames, launch, report
-from ricochet.speeds import exact_law, independent_frames, reduced_speeds, relaxation
-from ricochet.statistics import Estimate, binned, estimate, hold_against
+from ricochet.nature import TRAITS, allow
+from ricochet.script import command_line, grouped, late_frames, launch, measured, report
+from ricochet.speeds import (
+    all_move,
+    exact_law,
+    independent_frames,
+    kt_of_frames,
+    reduced_speeds,
+    relaxation,
+)
+from ricochet.statistics import (
+    Estimate,
+    SeriesMean,
+    binned,
+    combined,
+    unsteady,
+    estimate,
+    hold_against,
+    series_mean,
+    to_error,
+)
 from ricochet.theory import RELAXATION, maxwell_cdf, maxwell_pdf
-from ricochet.thermodynamics import after_start, all_settle, equal_disks, start_of_equilibrium
 
 import numpy as np
 
@@ -40,22 +58,58 @@ class Pool(NamedTuple):
     row: dict  # the tests
 
 
-def pooled(runs: list[Run], args: Namespace, cool: bool) -> Pool:
-    """The late frames of all runs; of those that cool, each at its own temperature."""
-    begin = after_start if cool else start_of_equilibrium
-    picked = [(run, late_frames(run, args, begin)) for run in runs]
-    kts = [[run.kinetic_energy(f[k]).mean() for run, f in picked] for k in (0, -1)]
-    u = np.concatenate([reduced_speeds(*one, each=cool) for one in picked])
-    n = runs[0].count * sum(independent_frames(*one) for one in picked)
+class State(NamedTuple):
+    """What the late frames of all runs are, in words, and whether each has a kT for itself."""
+
+    late: str
+    way: str = "The way there"
+    each: bool = True
+
+
+COOLING = State("No equilibrium: each frame at its own kT")
+MOVING = State("Sides move: each frame at its own kT")
+UNSTEADY = State("No steady kT yet: each frame at its own")
+EQUILIBRIUM = State("Equilibrium, many frames", "The way to equilibrium", each=False)
+STEADY = State("Steady state, many frames", each=False)
+
+
+def state_of(run: Run) -> State:
+    """That of the late frames, if nothing drifts."""
+    known = set(TRAITS) - {"changed", "collapsed", "sliding"}
+    allow(run, "its speeds are of no single state; see fields.py", *known)
+    if run.nature.cooling or "moving" in run.nature:
+        return COOLING if run.nature.cooling else MOVING
+    return EQUILIBRIUM if run.nature.in_equilibrium else STEADY
+
+
+def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, list[float]]:
+    """The kT over these frames and those between; that of the first and of the last."""
+    tracks = [
+        kt_of_frames(run, slice(frames[0], frames[-1] + 1))
+        for run, frames in zip(runs, picked, strict=True)
+    ]
+    kt = combined([series_mean(track) for track in tracks])
+    if all(np.ptp(track) <= 1e-9 * np.max(track) for track in tracks):
+        kt = kt._replace(error=0.0, drift=0.0)  # constant, however few there are
+    return kt, [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
+
+
+def pooled(runs: list[Run], picked: list[list[int]], state: State, kts: tuple) -> Pool:
+    """The late frames of all runs."""
+    own = zip(runs, picked, strict=True)
+    u = np.concatenate([reduced_speeds(*one, each=state.each) for one in own])
+    n = runs[0].count * sum(map(independent_frames, runs, picked))
     maxwell, law = hold_against(u, maxwell_cdf, independent=n), exact_law(runs[0])
     exact = hold_against(u, law, independent=n) if law else None
     row = {
         "N": runs[0].count,
         "runs": len(runs),
+        "frames": sum(map(len, picked)),
         "speeds": len(u),
         "independent": n,
-        "kT_first": float(np.mean(kts[0])),
-        "kT_last": float(np.mean(kts[1])),
+        **(measured("kT", kts[0]) if state is not COOLING else {}),
+        "kT_first": kts[1][0],
+        "kT_last": kts[1][1],
         "mean_u": float(np.mean(u)),
         "kurtosis": float(np.mean(u**4)),
         "KS_D": maxwell.ks,
@@ -81,21 +135,26 @@ def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -
     axes.legend()
 
 
-def draw_relaxation(axes: plt.Axes, groups: list, cool: bool) -> None:
+def draw_relaxation(axes: plt.Axes, groups: list) -> None:
     """a2 against collisions per disk, mean and standard error over the runs."""
-    equal = not cool
+    equal = True
     for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]
         common = min(len(tau) for tau, _ in tracks)
+        if common == 0:
+            equal = False
+            continue
         tau = np.mean([track[:common] for track, _ in tracks], axis=0)
         a2 = estimate([track[:common] for _, track in tracks])
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
         noise_band(axes, count * len(runs), colour)
-        equal = equal and all(map(equal_disks, runs)) and max(a[0] for _, a in tracks) < -0.4
+        closed = all(run.nature <= {"obstructed", "turning"} for run in runs)
+        equal = equal and closed and max(a[0] for _, a in tracks) < -0.4
     if equal:
         dilute_limit(axes, RELAXATION)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
+    axes.fill_between([], [], color="0.85", label="95 % of Maxwell's gases")
     axes.set(xlabel="collisions per disk", ylabel="$a_2$ (0: Maxwell)")
     axes.legend()
 
@@ -106,45 +165,67 @@ def cooling(row: dict) -> str:
     return f"kT {goes} from {row['kT_first']:.4g} to {row['kT_last']:.4g}"
 
 
-def label_of(row: dict, cool: bool) -> str:
-    """The tests in words."""
+def label_of(row: dict, state: State) -> str:
+    """The temperature and the tests in words."""
     size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
     words = f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
-    words += f"\n{cooling(row)}" if cool else ""
-    words += f"\nKS D = {row['KS_D']:.4f}, p-value {row['KS_p']:.2g}"
-    return words + ("" if exact is None else f",\nof the law at fixed energy {exact:.2g}")
+    steady = state in (STEADY, MOVING)
+    words += f"\nkT = {' ± '.join(to_error(row['kT'], row['kT_error']))}" if steady else ""
+    words += f"\n{cooling(row)}" if state in (COOLING, UNSTEADY) else ""
+    words += f"\nKS test: {chance(row['KS_p'])} for Maxwell"
+    return words + ("" if exact is None else f",\n{chance(exact)} for N disks of fixed energy")
 
 
-def draw(runs: list[Run], groups: list, pools: list[Pool], cool: bool) -> plt.Figure:
-    """Four panels: start, last frame, equilibrium, relaxation."""
+def chance(p: float) -> str:
+    """A probability in words, never as 0 or 1."""
+    return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
+
+
+def draw(runs: list[Run], groups: list, pools: list[Pool], state: State) -> plt.Figure:
+    """Four panels: start, last frame, late frames, relaxation."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):
-        height = binned(reduced_speeds(largest, [frame]), BINS)
-        draw_histogram(axes, [height], [f"{when}, N = {largest.count}"])
-    draw_histogram(late, [pool.density for pool in pools], [label_of(p.row, cool) for p in pools])
-    late.set_ylim(0, 1.1 + (0.6 if cool else 0.4) * len(groups))
-    draw_relaxation(way, groups, cool)
+        if all_move(largest, frame):
+            height = binned(reduced_speeds(largest, [frame]), BINS)
+            draw_histogram(axes, [height], [f"{when}, N = {largest.count}"])
+        else:
+            axes.set_axis_off()
+            axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
+    draw_histogram(late, [pool.density for pool in pools], [label_of(p.row, state) for p in pools])
+    late.set_ylim(0, 1.1 + (0.6 if state.each else 0.4) * len(groups))
+    draw_relaxation(way, groups)
     first.set_title("Start")
     last.set_title("One frame at the end")
-    equilibrium = "No equilibrium: each frame at its own kT" if cool else "Equilibrium, many frames"
-    late.set_title(equilibrium)
-    way.set_title("The way there" if cool else "The way to equilibrium")
+    late.set_title(state.late)
+    way.set_title(state.way)
     figure.suptitle(caption(runs))
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "speeds.png", frames=None, skip=None, apart=5.0).parse_args()
-    cool, groups = not all_settle(args.runs), grouped(args.runs, lambda run: run.count)
-    pools = [pooled(members, args, cool) for _, members in groups]
+    state, *others = map(state_of, args.runs)
+    if any(other != state for other in others):
+        odd = args.runs[1 + [other != state for other in others].index(True)]
+        raise RunError(f"{odd.path}: is not of the kind of {args.runs[0].path}: draw them apart")
+    groups = grouped(args.runs, lambda run: run.count)
+    picked = [[late_frames(run, args) for run in members] for _, members in groups]
+    found = [temperature(runs, own) for (_, runs), own in zip(groups, picked, strict=True)]
+    if state in (EQUILIBRIUM, STEADY) and any(unsteady(kt) for kt, _ in found):
+        state = UNSTEADY
+    pools = [
+        pooled(runs, own, state, kts)
+        for (_, runs), own, kts in zip(groups, picked, found, strict=True)
+    ]
     data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, []
     for (count, _), pool in zip(groups, pools, strict=True):
         data[f"density_N{count}"], data[f"density_error_N{count}"] = pool.density
-        if cool:
-            notes.append(f"N = {count}: loses energy, no equilibrium; {cooling(pool.row)}")
+        if state in (COOLING, UNSTEADY):
+            why = "loses energy, no equilibrium" if state is COOLING else "has no steady kT yet"
+            notes.append(f"N = {count}: {why}; {cooling(pool.row)}")
     data["maxwell"] = np.diff(maxwell_cdf(BINS)) / np.diff(BINS)
-    figure = draw(args.runs, groups, pools, cool)
+    figure = draw(args.runs, groups, pools, state)
     report(args, figure, [pool.row for pool in pools], data=data, notes=notes)
 
 

@@ -22,7 +22,7 @@ from .files import did_you_mean, destination
 from .nature import Refused
 from .reader import Run, RunError, read_run
 from .statistics import Curve, Estimate, SeriesMean, combined, doubts
-from .thermodynamics import frames_from, packing, start_of_equilibrium
+from .thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
 
 matplotlib.use("Agg")
 plt.style.use(STYLE)
@@ -96,6 +96,9 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         if len(getattr(known, "runs", ())) > 1 and not known.repeated:
             known.runs = distinct(known.runs)
+        results = [known.output, getattr(known, "csv", None)]
+        if None not in results and results[0].resolve() == results[1].resolve():
+            self.error(f"{known.csv} is the name of the figure, too: choose another for --csv")
         return known
 
 
@@ -138,7 +141,7 @@ def command_line(
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
-    parser.set_defaults(title=doc.splitlines()[0], repeated=repeated)
+    parser.set_defaults(title=doc.splitlines()[0], repeated=repeated, notes=[])
     some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
     parser.add_argument("runs", type=read_run, metavar="RUN.h5", **some)
     place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}
@@ -166,14 +169,27 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
     return [frames[k] for k in np.linspace(0, len(frames) - 1, count).round().astype(int)]
 
 
-def late_frames(
-    run: Run,
-    args: argparse.Namespace,
-    begin: Callable[[Run, float | None], float] = start_of_equilibrium,
-) -> list[int]:
-    """Of --frames those from `begin` on, --apart; the last of them if none is that late."""
-    frames = chosen_frames(run, args.frames, None)
-    return frames_from(run, begin(run, args.skip), args.apart, frames) or frames[-1:]
+def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
+    """Of --frames those of the steady state, --apart; the last of them if none is that late.
+
+    The notes of `args` say if these are fewer than were asked for, or early.
+    """
+    frames, start = chosen_frames(run, args.frames, None), start_of_steady_state(run, args.skip)
+    used = frames_from(run, start, args.apart, frames)
+    says = f"{run.path.name}: "
+    if not used:
+        used = [max(frames)]
+        args.notes.append(
+            f"{says}none of the frames is from t = {start:.4g} on; takes the last one"
+        )
+    elif args.frames is not None and len(used) < len(frames):
+        some = f"takes {len(used)} of {len(frames)} frames, from t = {start:.4g} on and "
+        args.notes.append(f"{says}{some}{args.apart:g} collisions per disk apart")
+    tau = run.collisions_per_disk_at(run.time)[used[0]]
+    if args.skip is None and tau < SPEEDS_FORGET * (1 - 1e-9):
+        early = f"begins {tau:.3g} collisions per disk after the start, which speeds remember for "
+        args.notes.append(f"{says}{early}{SPEEDS_FORGET:g}; run longer")
+    return used
 
 
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
@@ -223,13 +239,15 @@ def report(
     `notes` say what speaks against the numbers, and so does a run that did not end as it should: on
     stderr, and on the figure.
     """
-    print("\n\n".join(text_of(table) for table in tables if table), flush=True)
-    notes = [*(run.shortcoming for run in args.runs if run.shortcoming), *notes]
+    if any(tables):
+        print("\n\n".join(text_of(table) for table in tables if table), flush=True)
+    notes = [*(run.shortcoming for run in args.runs if run.shortcoming), *args.notes, *notes]
     for note in [*notes, *without_error(tables)]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
         warn(figure, notes)
         save(figure, args.output, args.runs, args.title)
+        print(f"figure: {args.output}")
     if "csv" in args and args.csv:
         write_csv(args.csv, tables[0] if data is None else data)
 

@@ -2,25 +2,51 @@
 
 import numpy as np
 
+from .nature import Refused
 from .reader import Run
 from .statistics import Estimate, Law, estimate, excess_kurtosis, series_mean
 from .theory import finite_n_cdf
-from .thermodynamics import conserved
+from .thermodynamics import conserved, drift, free_disks
 
 MEMORY = 5.0  # collisions per disk after which a speed is independent
+
+
+def thermal_energy(run: Run, frames: slice | list[int]) -> np.ndarray:
+    """(F, N) m v^2 / 2, v relative to the flow of a sheared box and to what never changes."""
+    velocity = run.velocity[frames]
+    if run.shear_rate:
+        velocity[..., 0] -= run.shear_rate * run.position[frames][..., 1]
+        velocity -= np.average(velocity, axis=1, weights=run.mass)[:, None]
+    else:
+        velocity -= drift(run)
+    return 0.5 * run.mass * np.sum(velocity**2, axis=-1)
+
+
+def kt_of_frames(run: Run, frames: slice | list[int]) -> np.ndarray:
+    """(F,) kT, of the momenta that are free."""
+    free = run.count - 1 if run.shear_rate else free_disks(run)
+    return thermal_energy(run, frames).sum(axis=1) / free
 
 
 def reduced_speeds(run: Run, frames: list[int], each: bool = False) -> np.ndarray:
     """(F * N,) speeds of these frames, each species by its own thermal speed.
 
-    That is the one of all these frames, or of `each` for itself.
+    That is the one of all these frames, or of `each` for itself.  Refuses disks at rest.
     """
-    energy = np.array([run.kinetic_energy(k) for k in frames])
+    energy = thermal_energy(run, frames)
     for kind in run.by_species:
         own = energy[:, kind.disks]
         kt = np.mean(own, axis=1 if each else None, keepdims=True)
-        energy[:, kind.disks] /= np.where(kt > 0, kt, 1)
+        if not kt.all():
+            raise Refused(f"{run.path}: '{kind.name}' is at rest (kT = 0), it has no thermal speed")
+        energy[:, kind.disks] /= kt
     return np.sqrt(energy).ravel()
+
+
+def all_move(run: Run, frame: int) -> bool:
+    """Whether each species has speeds in a frame."""
+    energy = run.kinetic_energy(frame)
+    return all(energy[kind.disks].any() for kind in run.by_species)
 
 
 def independent_frames(run: Run, frames: list[int]) -> int:
@@ -32,19 +58,23 @@ def independent_frames(run: Run, frames: list[int]) -> int:
 def relaxation(
     run: Run, until: float = 16, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Collisions per disk and a2 of each frame up to `until` collisions per disk, or the first."""
+    """Collisions per disk and a2 of each frame up to `until` collisions per disk, or the first.
+
+    Frames with disks at rest have none: they are left out, or refused among the first.
+    """
     tau = run.collisions_per_disk_at(run.time)
-    tau = tau[tau <= until] if frames is None else tau[:frames]
-    return tau, np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in range(len(tau))])
+    until_then = (k for k in np.flatnonzero(tau <= until) if all_move(run, k))
+    chosen = list(until_then if frames is None else range(min(frames, run.frames)))
+    return tau[chosen], np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in chosen])
 
 
 def exact_law(run: Run) -> Law | None:
     """The law of N disks that share a fixed kinetic energy, for runs that have one."""
-    axes = conserved(run).sum()
-    free = not run.nature.keeps_kinetic_energy
+    axes = int(conserved(run).sum())
+    free = not run.nature.keeps_kinetic_energy or run.count < 2 + axes / 2
     if free or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None
-    return finite_n_cdf(run.count, bool(axes == 2))
+    return finite_n_cdf(run.count, axes == 2)
 
 
 def means(runs: list[Run], frames: list[list[int]], name: str) -> tuple[Estimate, Estimate]:

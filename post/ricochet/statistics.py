@@ -185,6 +185,16 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
     return float(scipy.stats.chi2.sf(np.sum(((mean - mean.mean()) / error) ** 2), len(mean) - 1))
 
 
+def drifts(mean: SeriesMean) -> bool:
+    """Whether its halves differ by more than chance explains."""
+    return bool(2 * scipy.stats.norm.sf(abs(mean.drift)) < UNLIKELY)
+
+
+def unsteady(mean: SeriesMean) -> bool:
+    """Whether it drifts, or remembers so much that nobody can tell."""
+    return drifts(mean) or (mean.error > 0 and mean.samples < FEW)
+
+
 def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
     """Why the mean over these runs should not be trusted, in sentences; none if it may be."""
     found, whole = [], combined(means)
@@ -198,7 +208,7 @@ def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
         )
     elif whole.samples < FEW:
         found.append(f"{name}: worth only {whole.samples:.1f} independent samples; run longer")
-    if 2 * scipy.stats.norm.sf(abs(whole.drift)) < UNLIKELY:
+    if drifts(whole):
         more = "above" if whole.drift > 0 else "below"
         found.append(
             f"{name}: still drifts, the second half is {abs(whole.drift):.1f} errors {more} the "

@@ -133,10 +133,46 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monke
     falls = "kT falls from 0.2362 to 0.06767"  # exp(-0.75) and exp(-2) halves
     printed, said = capsys.readouterr()
     assert falls in words_on(figures[1]) and falls in said and said.count("\n") == 1
-    header, row = (line.split() for line in printed.splitlines())
-    tests = dict(zip(header, row, strict=True))
+    tests = cells(printed)
     assert float(tests["KS_p"]) > 0.001 and float(tests["kT_last"]) == 0.0676676
-    assert "cool.h5: has no equilibrium" in refusal(capsys, "speeds", calm, cool)
+    assert "cool.h5: is not of the kind" in refusal(capsys, "speeds", calm, cool)
+
+
+def cells(printed):
+    """The row of a printed table by column."""
+    header, row, figure = (line.split() for line in printed.splitlines())
+    assert figure[0] == "figure:"
+    return dict(zip(header, row, strict=True))
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.02])
+def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, monkeypatch, drift):
+    """With kT 0.5 beside a flow that has ten times that, or with one that drifts."""
+    figures = []
+    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
+    sides = {"periodic": (True, True), "observable_time": np.arange(121.0)}
+    box = {"box": {"shear_rate": 10.0}, "contact": {"restitution": 0.9}}
+    path = gas(tmp_path / "a.h5", rng, count=1000, frames=121, parameters=box, **sides)
+    with h5py.File(made_to_cool(path, -drift), "r+") as file:
+        velocity, y = (file[f"particles/disks/{name}/value"] for name in ("velocity", "position"))
+        velocity[...] += 10 * y[..., 1:] * [1, 0]
+    draw("speeds", path, "-o", tmp_path / "a.png", "--skip", 20)
+    printed, said = capsys.readouterr()
+    row, words = cells(printed), words_on(figures[0])
+    if drift:
+        assert "No steady kT yet" in words and "has no steady kT yet; kT goes from" in said
+    else:
+        assert float(row["kT"]) == pytest.approx(0.5, rel=0.01) and said == ""
+        assert "Steady state" in words and "energy" not in words
+
+
+def test_speeds_of_disks_at_rest_or_on_sliding_walls_are_refused(tmp_path, rng, capsys):
+    slides = {"parameters": {"side/top": {"speed": 1.0}}, "names": ("disk",)}
+    said = refusal(capsys, "speeds", gas(tmp_path / "a.h5", rng, **slides), code=1)
+    assert "a.h5: has surfaces that slide;" in said
+    x = np.zeros((3, 2, 2))
+    still = write_run(tmp_path / "b.h5", x, x, observables={"collisions": [0, 0, 0]})
+    assert "'disk' is at rest (kT = 0)" in refusal(capsys, "speeds", still, code=1)
 
 
 def words_on(figure):
