@@ -93,24 +93,18 @@ function drawGround() {
     }
     ground.strokeStyle = ink.wall;
     ground.lineWidth = 1.5 * page.dots;
-    ground.beginPath();
     for (const [[a, b], [c, d]] of film.walls) copies([Math.min(a, c), Math.max(a, c)], [Math.min(b, d), Math.max(b, d)], (dx, dy) => {
-      ground.moveTo(across(a + dx), up(b + dy));
-      ground.lineTo(across(c + dx), up(d + dy));
+      ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     });
-    ground.stroke();
   });
   // The sides, dashed where they are periodic.
   ground.strokeStyle = ink.wall;
   ground.lineWidth = 1.5 * page.dots;
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
-    for (const [axis, ends] of [[0, [left, top, left, bottom]], [0, [right, top, right, bottom]], [1, [left, top, right, top]], [1, [left, bottom, right, bottom]]]) {
+    for (const [axis, from, to] of [[0, [left, top], [left, bottom]], [0, [right, top], [right, bottom]], [1, [left, top], [right, top]], [1, [left, bottom], [right, bottom]]]) {
       ground.setLineDash(film.periodic[axis] ? [6 * page.dots, 5 * page.dots] : []);
-      ground.beginPath();
-      ground.moveTo(ends[0], ends[1]);
-      ground.lineTo(ends[2], ends[3]);
-      ground.stroke();
+      ground.stroke(new Path2D(`M${from}L${to}`));
     }
   });
   ground.setLineDash([]);
