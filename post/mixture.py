@@ -22,6 +22,9 @@ from ricochet.thermodynamics import kinds_of_disks, mean_energy
 import numpy as np
 
 
+BINS = 60  # of a histogram
+
+
 def pooled(runs: list[Run], frames: list[list[int]], name: str) -> np.ndarray:
     """All speeds of a species in these frames."""
     each = zip(runs, frames, strict=True)
@@ -48,6 +51,14 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
     return rows
 
 
+def speed_bins(start: np.ndarray, top: float) -> np.ndarray:
+    """Some 60 bins up to `top`; if disks start at one speed, a bin is centred on it."""
+    speed, width = float(np.mean(start)), top / BINS
+    if 0 < speed < top and np.ptp(start) < 1e-9 * speed:
+        width = speed / max(1, round(speed / width))
+    return np.maximum(0, (np.arange(int(top / width) + 3) - 0.5) * width)
+
+
 def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Figure:
     """One row per species: start and equilibrium."""
     names = runs[0].names
@@ -55,9 +66,10 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         len(names), 2, sharex=True, squeeze=False, figsize=(10, 3.2 * len(names))
     )
     top = max(np.quantile(pooled(runs, frames, name), 0.9995) for name in names)
-    bins, v = (np.arange(61) - 0.5) * top / 60, np.linspace(0, top, 301)
+    v = np.linspace(0, top, 301)
     for k, (kind, found, row) in enumerate(zip(runs[0].by_species, result, panels, strict=True)):
         colour, sides = COLOURS[k % len(COLOURS)], ([[0]] * len(runs), frames)
+        bins = speed_bins(pooled(runs, sides[0], kind.name), top)
         thermal = np.sqrt(2 * found["K_theory"] / kind.mass)
         label = f"Maxwell: KS D = {found['KS_D']:.4f}, p = {found['KS_p']:.2g}"
         law = maxwell_pdf(v / thermal) / thermal
