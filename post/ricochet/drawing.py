@@ -15,7 +15,8 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
 from .files import destination, did_you_mean
-from .reader import Run, RunError
+from .nature import known, rows_of
+from .reader import SIDES, Run, RunError
 from .statistics import Estimate, kurtosis_noise
 from .structure import bond_order
 
@@ -143,7 +144,7 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> list:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
 
     Sides that move are drawn where they are at this time [their own places], what lies beyond them
-    grey; `move_sides` moves what is returned.
+    grey; `move_sides` moves what is returned.  Walls that heat or slide say so.
     """
     low, high = run.room
     styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
@@ -174,7 +175,36 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> list:
     axes.tick_params(length=3)
     axes.label_outer()
     axes.spines[:].set_visible(False)
+    name_walls(axes, run)
     return [sides, inside]
+
+
+def name_walls(axes: plt.Axes, run: Run) -> None:
+    """Along each side and wall its temperature, and how fast and where to it slides."""
+    (x0, y0), (x1, y1) = run.room
+    sides = [run.parameters.get("side", {}).get(name, {}) for name in SIDES]
+    shown = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
+    shown += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
+    shown = [*zip(sides, shown, strict=True)]
+    walls = rows_of(run.parameters.get("wall", {}))
+    shown += [(own, (*ends, 1)) for own, ends in zip(walls, run.walls, strict=False)]
+    for own, (start, end, side) in shown:
+        speed = own.get("speed", 0.0)
+        words = [f"kT = {own['temperature']:g}"] if known(own.get("temperature")) else []
+        words += [f"{'→' if speed > 0 else '←'} {abs(speed):g}"] if speed else []
+        way = np.subtract(end, start)
+        along = way / np.linalg.norm(way)
+        axes.annotate(
+            ",  ".join(words),
+            start + 0.7 * way,  # beside the names of the axes
+            xytext=9 * side * np.array([-along[1], along[0]]),
+            textcoords="offset points",
+            rotation=np.degrees(np.arctan2(along[1], along[0])),
+            ha="center",
+            va="center",
+            size=9,
+            color="firebrick",
+        )
 
 
 def move_sides(drawn: list, run: Run, time: float | None) -> None:
