@@ -11,18 +11,9 @@ takes part (wall hits are more than 1 % of the number of disks), or if the run e
 energy left than `stop.energy_fraction`.
 """
 
-from ricochet import Run, crater
+from ricochet import Run, crater, drawing
 from ricochet.crater import Crater, bed, displaced, projectile
-from ricochet.drawing import (
-    COLOURS,
-    LABELS,
-    WALL,
-    caption,
-    disk_collection,
-    draw_box,
-    plt,
-    scale_top,
-)
+from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, report
 
 import numpy as np
@@ -82,7 +73,10 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 def draw(run: Run, size: Crater) -> plt.Figure:
     """Before, after, collisions per disk, energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
-    moved, limits = run.displacement(-1), (0, scale_top(run, [run.frames - 1], "displacement"))
+    moved, limits = (
+        run.displacement(-1),
+        (0, drawing.scale_top(run, [run.frames - 1], "displacement")),
+    )
     draw_state(before, run, 0, moved, limits)
     draw_hull(before, run)
     draw_state(after, run, -1, moved, limits)

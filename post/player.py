@@ -143,36 +143,31 @@ def coded_turns(
     return blocks, guesses
 
 
-def counted(
+def told_by_log(
     run: Run, paths: Paths, frames: list[int], most: float
-) -> tuple[list[float], dict[str, np.ndarray]]:
-    """Collisions per disk in each frame, and the moments of all events in the film.
+) -> tuple[dict, dict[str, np.ndarray]]:
+    """Collisions per disk in each frame, and the events of few disks; the moments of all events.
 
-    No moments without a log, or if it is longer than `most`.
+    No events and moments without a log, no moments if it is longer than `most`.
     """
-    moments = dict.fromkeys(("pairs", "others"), np.zeros(0))
+    facts, moments = {"events": None}, dict.fromkeys(("pairs", "others"), np.zeros(0))
     if paths.log is None:
-        return run.collisions_per_disk_at(run.time)[frames].tolist(), moments
-    time, pair = paths.log[0], paths.log[2] > 0
-    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
-    if some.stop - some.start <= most:
-        moments = {"pairs": time[some][pair[some]], "others": time[some][~pair[some]]}
-    before = np.searchsorted(time[pair], run.time[frames], "right")
-    return (2 * before / run.count).tolist(), moments
-
-
-def events_of(run: Run, paths: Paths, frames: list[int]) -> dict:
-    """The log of few disks, and what its partners below 0 are called."""
-    sides = [f"the {side} side" for side in SIDES]
-    obstacles = [f"obstacle {k + 1}" for k in range(len(run.obstacles))]
-    surfaces = sides + obstacles + [f"wall {k + 1}" for k in range(len(run.walls))]
-    if paths.log is None or run.count > FEW_DISKS:
-        return {"events": None}
+        facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
+        return facts, moments
     time, i, j = paths.log[:3]
+    before = np.searchsorted(time[j > 0], run.time[frames], "right")
+    facts["collisions"] = (2 * before / run.count).tolist()
     some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
-    some = slice(some.start, min(some.stop, some.start + MOST_EVENTS))
-    parts = {"time": time[some], "i": i[some] - 1, "j": j[some] - 1}
-    return {"events": {name: own.tolist() for name, own in parts.items()}, "surfaces": surfaces}
+    time, i, j = time[some], i[some], j[some]
+    if len(time) <= most:
+        moments = {"pairs": time[j > 0], "others": time[j <= 0]}
+    if run.count <= FEW_DISKS:
+        parts = {"time": time, "i": i - 1, "j": j - 1}
+        facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
+        facts["surfaces"] = [f"the {side} side" for side in SIDES]  # what j < 0 is called
+        facts["surfaces"] += [f"obstacle {k + 1}" for k in range(len(run.obstacles))]
+        facts["surfaces"] += [f"wall {k + 1}" for k in range(len(run.walls))]
+    return facts, moments
 
 
 def species(run: Run) -> list[dict]:
@@ -279,7 +274,7 @@ def film(
     most = 0.4 * room // TURN  # the rest of its half is for headings
     paths = Paths(run, most)
     turns, guesses = coded_turns(run, paths, frames)
-    collisions, moments = counted(run, paths, frames, most / 2)
+    told, moments = told_by_log(run, paths, frames, most / 2)
     blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
     blocks["mass"] = run.mass.astype("<f4").tobytes()
     # Where displacements count from, without jumps until the first frame of the film.
@@ -291,7 +286,6 @@ def film(
     blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
     facts = {
         "time": run.time[frames].tolist(),
-        "collisions": collisions,
         "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
         "kicked": run.kicked,
@@ -316,7 +310,7 @@ def film(
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
         "logged": has_log(run),
-        **events_of(run, paths, frames),
+        **told,
     }
     return facts, blocks
 

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, starmap
-from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from .reader import Run
 
 CLOSE = 1e-3  # radii between where a path leads and where the disk is
 MOST_AT_ONCE = 200000  # disks of the frames that are read together
+NO_LOG = (np.zeros(0), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros(0, int))
 
 
 class State(NamedTuple):
@@ -44,41 +44,10 @@ class Turns:
     guessed: np.ndarray  # (N,) bool: disks whose paths are not known
 
 
-def unknown(guessed: np.ndarray) -> Turns:
-    """No turns: these disks, (N,) bool, have some that nobody knows."""
-    return Turns(np.zeros(0, int), np.zeros(0), np.zeros((0, 2)), np.zeros(0), guessed)
-
-
-@dataclass
-class Flight:
-    """A disk on its way: where it was last known to be, and its collisions so far.
-
-    A collision is its time, x, y, and the kinetic energy that it gives the disk.
-    """
-
-    mass: float
-    time: float
-    x: float
-    y: float
-    vx: float
-    vy: float
-    turns: list[tuple[float, float, float, float]]
-
-    def fly(self, time: float, gx: float, gy: float) -> None:
-        """On to a later time."""
-        t = time - self.time
-        self.x += t * (self.vx + 0.5 * t * gx)
-        self.y += t * (self.vy + 0.5 * t * gy)
-        self.vx += t * gx
-        self.vy += t * gy
-        self.time = time
-
-    def turn(self, dvx: float, dvy: float) -> None:
-        """Collide, here and now, with this change of velocity."""
-        gain = self.mass * (dvx * (self.vx + 0.5 * dvx) + dvy * (self.vy + 0.5 * dvy))
-        self.vx += dvx
-        self.vy += dvy
-        self.turns.append((self.time, self.x, self.y, gain))
+def running(values: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """(M, 2) sums up to each of the values (M, 2), which begin anew at the indices `first`."""
+    sums = np.cumsum(values, axis=0)
+    return sums - np.repeat(sums[first] - values[first], np.diff(first, append=len(sums)), axis=0)
 
 
 class Paths:
@@ -120,51 +89,44 @@ class Paths:
 
     def between(self, a: State, b: State) -> Turns:
         """The turns between two frames."""
-        if self.run.kicked:
-            return unknown(np.ones(self.run.count, bool))
         h, g = b.time - a.time, self.run.gravity
         end = b.position + (b.image - a.image) * self.run.edges
-        free = self.near(a.position + h * (a.velocity + 0.5 * h * g), end)
-        flights = self.replay(a, b)
-        guessed, found = ~free, []
-        for k, flight in sorted(flights.items()):
-            turns = flight.turns
-            flight.fly(b.time, *g.tolist())
-            gap = hypot(flight.x - end[k][0], flight.y - end[k][1])
-            guessed[k] = gap > CLOSE * self.run.radius[k]
-            if not guessed[k]:
-                found += [(k, *turn) for turn in turns]
-        self.most -= len(found)
-        disk, time, x, y, gain = np.array(found).reshape(-1, 5).T
-        return Turns(disk.astype(int), time, np.column_stack([x, y]), gain, guessed)
+        guessed = ~self.arrives(slice(None), a.position + h * (a.velocity + 0.5 * h * g), end)
+        disk, time, kick = self.hits(a, b)
+        first = np.flatnonzero(np.diff(disk, prepend=-1))
+        last = np.append(first[1:], len(disk))[: len(first)] - 1
+        t, flight = time - a.time, np.diff(time, prepend=a.time)
+        flight[first] = t[first]
+        after = a.velocity[disk] + running(kick, first)  # without what gravity adds
+        before, t = after - kick, t[:, None]
+        place = a.position[disk] + running(before * flight[:, None], first) + 0.5 * t**2 * g
+        gain = self.run.mass[disk] * np.sum(kick * (before + t * g + 0.5 * kick), axis=1)
+        goal = place[last] + (h - t[last]) * (after[last] + 0.5 * (h + t[last]) * g)
+        guessed[disk[last]] = ~self.arrives(disk[last], goal, end[disk[last]])
+        guessed |= self.run.kicked
+        known = ~guessed[disk]
+        self.most -= known.sum()
+        return Turns(disk[known], time[known], place[known], gain[known], guessed)
 
-    def near(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """(N,) whether places agree, by the sizes of their disks."""
-        return np.linalg.norm(one - other, axis=1) <= CLOSE * self.run.radius
+    def arrives(self, disk: np.ndarray | slice, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """(M,) whether places of these disks agree, by their sizes."""
+        return np.linalg.norm(one - other, axis=1) <= CLOSE * self.run.radius[disk]
 
-    def replay(self, a: State, b: State) -> dict[int, Flight]:
-        """The flights of all disks that collide between two frames, by the event log, if any."""
-        if self.log is None:
-            return {}
-        run, (time, i, j, changes, total) = self.run, self.log
+    def hits(self, a: State, b: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the log has between two frames, disk by disk: which (M,), when, change of velocity.
+
+        Nothing if it is more than what there is room for.
+        """
+        time, i, j, change, total = self.log or NO_LOG
         if a.hits is None:
             span = slice(*np.searchsorted(time, [a.time, b.time], "right"))
         else:  # which events a frame has seen is clear even if several have the same time
             span = slice(*np.searchsorted(total, [a.hits.sum(), b.hits.sum()], "right"))
-        if np.sum(1 + (j[span] > 0)) > self.most:
-            return {}
-        flights = {
-            k: Flight(
-                float(run.mass[k]), a.time, *a.position[k].tolist(), *a.velocity[k].tolist(), []
-            )
-            for k in {*(i[span] - 1).tolist(), *(j[span][j[span] > 0] - 1).tolist()}
-        }
-        gravity = run.gravity.tolist()
-        parts = (part[span].tolist() for part in (time, i, j, changes))
-        for at, one, other, change in zip(*parts, strict=True):
-            for disk, sign in ((one, 1), (other, -1)):
-                if disk > 0:
-                    flight = flights[disk - 1]
-                    flight.fly(at, *gravity)
-                    flight.turn(*(sign * part / flight.mass for part in change))
-        return flights
+        pair = np.flatnonzero(j[span] > 0)
+        some = slice(0) if len(i[span]) + len(pair) > self.most else slice(None)
+        event = np.concatenate([np.arange(len(i[span])), pair])[some]
+        disk = np.concatenate([i[span], j[span][pair]])[some] - 1
+        signs = np.where(np.arange(len(disk)) < len(i[span]), 1, -1)
+        order = np.lexsort((event, disk))
+        disk, event, signs = disk[order], event[order], signs[order, None]
+        return disk, time[span][event], signs * change[span][event] / self.run.mass[disk, None]
