@@ -205,7 +205,7 @@ function layEnergyOut() {
       pen.beginPath();
       for (let gap = 0; gap < frames - 1; gap++) {
         if (known === !!film.guesses[gap]) continue;
-        pen.moveTo(...place(at(gap)));
+        if (!gap || known === !!film.guesses[gap - 1]) pen.moveTo(...place(at(gap)));  // else dashes go on
         between[gap]?.forEach(row => pen.lineTo(...place(row)));
         pen.lineTo(...place(at(gap + 1)));
       }
