@@ -289,6 +289,7 @@ def film(
         "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
         "kicked": run.kicked,
+        "settles": run.nature.in_equilibrium,
         "gravity": run.gravity.tolist(),
         "lower": run.room[0].tolist(),
         "edges": (run.room[1] - run.room[0]).tolist(),

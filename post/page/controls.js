@@ -31,7 +31,8 @@ function prepareFilm() {
   $('speeds').hidden = !counted.length;
   $('pressures').hidden = !film.pressure;
   $('sofar').hidden = film.speeds.rest;
-  if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed. Curves: Maxwell’s law at the mean kinetic energy of the species.';
+  if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed.'
+    + (film.settles ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
   $('guess').hidden = !film.guesses.some(count => count);
   $('event').hidden = !(pairs.length + others.length);
 }

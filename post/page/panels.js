@@ -151,7 +151,7 @@ function drawHistogram(frame) {
   }
   pen.globalAlpha = 1;
   pen.lineWidth = 2;
-  for (const s of counted) {
+  for (const s of film.settles ? counted : []) {
     const b = kinds[s].mass / energies[s];
     if (!isFinite(b)) continue;
     pen.strokeStyle = css(speciesColour(kinds[s]));
