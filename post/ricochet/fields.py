@@ -1,19 +1,32 @@
 """Fields of a run in its steady state, in the cells of a grid, and the profiles between two walls.
 
-What the fields are is in fields.py.
+What the fields are is in fields.py.  Their errors are those of the jackknife, which leaves out one
+block of time after the other, of all runs; a block lasts until what it began with is forgotten.  It
+also takes off a bias: a temperature relative to a flow that was found from the same n values is too
+small by 1 / n.  Blocks of unequal weight as in Busing, Meijer and van der Leeden, Stat. Comput. 9,
+3 (1999).  C cells, G blocks.
 """
 
+from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from . import hard_disks
+from .drawing import periods
 from .reader import Run, RunError
-from .statistics import Estimate, estimate
-from .thermodynamics import after_start, equal_disks
+from .statistics import Estimate, memory, student
+from .thermodynamics import after_start, free_disks
 
-BLOCKS = 10
+MOST_BLOCKS = 16  # of a run
+FEWEST_BLOCKS = 3  # of all runs, for an error
+LONG = 1.5  # memories in a block
+POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
+SIDES = (("left", "right"), ("bottom", "top"))
+LAWFUL = {"thermal", "uneven", "sliding"}  # what a gas between two walls may be to have a theory
+Cells = tuple[int, int]
 
 
 class Fluxes(NamedTuple):
@@ -24,84 +37,295 @@ class Fluxes(NamedTuple):
     energy: float
 
 
+class Block(NamedTuple):
+    """A part of the steady state of a run, until the next one begins."""
+
+    run: Run
+    frames: list[int]
+    end: float
+
+    @property
+    def start(self) -> float:
+        """The time of its first frame."""
+        return float(self.run.time[self.frames[0]])
+
+
+class Members(NamedTuple):
+    """Pseudo-values of the jackknife (G, ...), as if each block had been measured alone."""
+
+    values: np.ndarray
+    share: np.ndarray  # of the sample that lies in the block
+
+    def mean(self) -> np.ndarray:
+        """NaN of what fewer than two blocks have seen."""
+        seen = self.share > 0
+        mean = np.sum(self.share * np.where(seen, self.values, 0), axis=0)
+        return np.where(seen.sum(axis=0) > 1, mean, np.nan)
+
+    def rests(self) -> np.ndarray:
+        """(G, ...) whose squares have the sum of (standard error)^2."""
+        seen = self.share > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(self.share / (1 - self.share) / seen.sum(axis=0))
+            return np.where(seen, root * (self.values - self.mean()), 0)
+
+    def estimate(self, kinship: np.ndarray | float = 0.0) -> Estimate:
+        """Mean and error; `kinship` is twice the sum of products of neighbours over the squares."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.sqrt(np.sum(self.rests() ** 2, axis=0))
+            samples = 1 / np.sum(self.share**2, axis=0)
+            wider = np.sqrt((1 + kinship) / (1 - kinship / (len(self.values) - 1)))
+        return Estimate(self.mean(), wider * student(samples) * error)
+
+
+def jackknife(
+    of: Callable[[np.ndarray], np.ndarray], sums: np.ndarray, weights: np.ndarray
+) -> Members:
+    """What `of` makes of sums over all blocks, from the sums of each (G, ...) and its weight."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = sums.sum(axis=0)
+        rest = np.stack([of(total - one) for one in sums])
+        share = np.broadcast_to(weights / weights.sum(axis=0), rest.shape)
+        return Members(rest + (of(total) - rest) / share, share)
+
+
+# --- blocks of time ---
+
+
 def steady_frames(run: Run, skip: float | None) -> list[int]:
     """Frames after `skip` collisions per disk, else those of the second half."""
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)
     frames = np.flatnonzero(run.time >= start).tolist()
-    if len(frames) < 2:
-        raise RunError(f"{run.path}: has {len(frames)} frames in the steady state; it takes two")
+    if len(frames) < FEWEST_BLOCKS:
+        few = f"has {len(frames)} frames in the steady state; it takes {FEWEST_BLOCKS}"
+        raise RunError(f"{run.path}: {few}")
     return frames
 
 
-def fields(run: Run, frames: list[int], cells: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Means over some frames in each cell of a grid, by name, (nx * ny,) each; NaN if empty."""
-    size = np.array(cells)
-    place = np.floor((run.position[frames] - run.lower) / run.edges * size).astype(int)
-    place = np.clip(place, 0, size - 1)
-    cell = (place[..., 0] + size[0] * place[..., 1]).ravel()
-    v = run.velocity[frames].reshape(-1, 2)
-    mass = np.tile(run.mass, len(frames))
+def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
+    """How many frames count as one for what lasts longest.
 
-    def total(weight: np.ndarray | None = None) -> np.ndarray:
-        return np.bincount(cell, weight, minlength=size.prod())
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        number, u = total(), np.stack([total(mass * part) for part in v.T]) / total(mass)
-        c = v - u.T[cell]
-        square = mass * np.sum(c**2, axis=1) / 2
-        found = {"flow_x": u[0], "flow_y": u[1], "temperature": total(square) / number}
-        if "angular_velocity" in run.elements:
-            turning = run.inertia * run.angular_velocity[frames] ** 2
-            found["rotational_temperature"] = total(turning.ravel()) / number
-    area = len(frames) * run.edges.prod() / size.prod()
-    products = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
-    stress = {f"stress_{ab}": mass * c[:, a] * c[:, b] for ab, (a, b) in products.items()}
-    heat = {"heat_x": square * c[:, 0], "heat_y": square * c[:, 1]}
-    carried = {name: total(values) / area for name, values in (stress | heat).items()}
-    return {"density": number / area, **found, **carried}
-
-
-def estimates(runs: list[Run], skip: float | None, cells: tuple[int, int]) -> dict[str, Estimate]:
-    """Means and errors over blocks of time of all runs; NaN in cells that are mostly empty."""
-    blocks = [
-        fields(run, list(part), cells)
-        for run in runs
-        for frames in [steady_frames(run, skip)]
-        for part in np.array_split(frames, min(BLOCKS, len(frames)))
-    ]
-    found = {}
-    for name in blocks[0]:
-        cells_in_time = np.array([block[name] for block in blocks]).T
-        known = (cell[~np.isnan(cell)] for cell in cells_in_time)  # the blocks with disks in it
-        means = [estimate(one) if len(one) > 1 else (np.nan, np.nan) for one in known]
-        found[name] = Estimate(*np.transpose(means))
+    Looked at are mass, momentum and energy: in all, and their longest waves across the cells.
+    """
+    place, v = (run.position[frames] - run.lower) / run.edges, run.velocity[frames]
+    v[..., 0] -= run.shear_rate * run.edges[1] * (place[..., 1] - 0.5)
+    waves, found = [np.ones(place.shape[:2])], 1.0
+    for axis in np.flatnonzero(np.array(cells) > 1):
+        angle = np.pi * (1 + run.periodic[axis]) * place[..., axis]
+        waves += [np.cos(angle), np.sin(angle)][: 1 + run.periodic[axis]]
+    for wave in waves:
+        for amount in (1.0, v[..., 0], v[..., 1], np.sum(v**2, axis=-1)):
+            parts = run.mass * amount * wave
+            series = parts.sum(axis=1)
+            if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # else it is kept
+                found = max(found, memory(series))
     return found
 
 
-def growth(run: Run, name: str, start: float) -> np.ndarray:
-    """How much a sum over collisions has grown per time since `start`."""
-    time, value = run.observable(name)
-    first = int(np.searchsorted(time, start))
-    if first > len(time) - 2:
-        raise RunError(f"{run.path}: too few observables in the steady state")
-    return (value[-1] - value[first]) / (time[-1] - time[first])
+def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[Block], float]:
+    """Blocks of the steady state of all runs, and the most that neighbours know of each other.
+
+    See `kinship`: as much as means over parts of a series that forgets as exp(-t).  NaN if the
+    blocks are too few to have an error.
+    """
+    steady = [steady_frames(run, skip) for run in runs]
+    both = list(zip(runs, steady, strict=True))
+    length = np.array([len(f) / longest_memory(run, f, cells) for run, f in both])
+    counts = np.clip((length / LONG).astype(int), 1, MOST_BLOCKS)
+    blocks, size = [], int(counts.sum())
+    for (run, frames), count in zip(both, counts, strict=True):
+        parts = np.array_split(frames, count if size >= FEWEST_BLOCKS else FEWEST_BLOCKS)
+        ends = [*(part[0] for part in parts[1:]), frames[-1]]
+        blocks += [Block(run, list(p), run.time[end]) for p, end in zip(parts, ends, strict=True)]
+    if size < FEWEST_BLOCKS:
+        return blocks, np.nan
+    t = 2 * length / counts  # in times in which the series falls by 1 / e
+    alike = np.expm1(-t) ** 2 / (t + np.expm1(-t))
+    return blocks, float(np.sum(alike * (counts - 1)) / size)
 
 
-def fluxes(run: Run, axis: int, start: float) -> Fluxes:
-    """From what both walls have received."""
-    names = (("left", "right"), ("bottom", "top"))[axis]
+def kinship(members: Members, blocks: list[Block], most: float) -> np.ndarray:
+    """(F,) twice the products of neighbours in time over the squares, of fields (G, F, C).
+
+    From 0 to `most`, in all cells together: few blocks of one cell say little of that.
+    """
+    size, same = len(blocks), [a.run is b.run for a, b in pairwise(blocks)]
+    rest = np.nan_to_num(members.rests())
+    square = np.maximum(np.sum(rest**2, axis=(0, 2)), np.finfo(float).tiny)
+    product = np.sum((rest[1:] * rest[:-1])[same], axis=(0, 2)) / square
+    unbiased = product * (size - 1) / size + sum(same) / size**2  # the mean is their own
+    return np.clip(2 * unbiased, 0, most) + 0 * most
+
+
+# --- cells ---
+
+
+def reach(run: Run, cells: Cells, axis: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where along an axis, between walls, the centres of disks can be: from, to, in each cell."""
+    gap = 0 if run.periodic[axis] else radius
+    sides = np.linspace(0, run.edges[axis], cells[axis] + 1)
+    sides = run.lower[axis] + sides.clip(gap, run.edges[axis] - gap)
+    return sides[:-1], sides[1:]
+
+
+def places(run: Run, cells: Cells) -> np.ndarray:
+    """(C, 2) middles of the parts of the cells that centres can reach."""
+    ranges = (np.mean(reach(run, cells, k, run.radius.min()), axis=0) for k in (0, 1))
+    return np.stack([part.ravel() for part in np.meshgrid(*ranges)], axis=1)
+
+
+def accessible(run: Run, cells: Cells, radius: float) -> np.ndarray:
+    """(C,) area where the centre of a disk can be; beside circles and walls to 0.5 % of a cell."""
+    spans, inner = [], []
+    step = np.sqrt(run.edges.prod() / POINTS)
+    for k in (0, 1):
+        start, end = reach(run, cells, k, radius)
+        fine = np.arange(0.5, run.edges[k] / cells[k] / step + 0.5)
+        spans.append(end - start)
+        inner.append(start[:, None] + np.outer(end - start, fine / len(fine)))
+    area = np.outer(spans[1], spans[0])
+    if not run.obstacles and not len(run.walls):
+        return area.ravel()
+    x, y = np.broadcast_arrays(inner[0][None, :, None, :], inner[1][:, None, :, None])
+    points, free = np.stack([x, y], axis=-1), np.ones(x.shape, dtype=bool)
+    for shift in periods(run):
+        for circle in run.obstacles:
+            away = np.linalg.norm(points - circle.centre - shift, axis=-1)
+            if not circle.inside:
+                free &= away > circle.radius + radius
+            elif not shift.any():
+                free &= away < circle.radius - radius
+        for start, end in run.walls + shift:
+            along = np.clip((points - start) @ (end - start) / np.sum((end - start) ** 2), 0, 1)
+            near = start + along[..., None] * (end - start)
+            free &= np.linalg.norm(points - near, axis=-1) > radius
+    return (area * free.mean(axis=(2, 3))).ravel()
+
+
+# --- fields ---
+
+
+def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
+    """(12, C) over the disks of some frames in each cell, frame by frame but for the first.
+
+    Frames, disks, disks per area, and of m, m v, m v v (xx, xy, yy), m v^2 v / 2 and I omega^2.
+    In a sheared box v is that relative to the profile.
+    """
+    run, frames, _ = block
+    place = run.position[frames].reshape(-1, 2) - run.lower
+    cell = np.clip((place / run.edges * cells).astype(int), 0, np.array(cells) - 1) @ (1, cells[0])
+    mass, count = np.tile(run.mass, len(frames)), int(np.prod(cells))
+    x, y = run.velocity[frames].reshape(-1, 2).T
+    x = x - run.shear_rate * (place[:, 1] - run.edges[1] / 2)
+    square = mass * (x**2 + y**2) / 2
+    dense = 1 / np.array(areas)[np.tile(run.species - 1, len(frames)), cell]
+    carried = [mass * x, mass * y, mass * x * x, mass * x * y, mass * y * y, square * x, square * y]
+    turning = 0 * mass
+    if "angular_velocity" in run.elements:
+        turning = (run.inertia * run.angular_velocity[frames] ** 2).ravel()
+    each = [None, dense, mass, *carried, turning]
+    rows = [np.bincount(cell, values, minlength=count) for values in each]
+    return np.stack([np.full(count, float(len(frames))), *rows])
+
+
+NAMES = (
+    *("density", "flow_x", "flow_y", "temperature", "rotational_temperature"),
+    *("stress_xx", "stress_xy", "stress_yy", "heat_x", "heat_y"),
+)
+BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in NAMES])
+
+
+def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
+    """(10, C) what `sums` say of the fields; NaN where there are no disks.
+
+    A flow that changes by g h across a cell is no heat: it is m (g h)^2 / 12 of m v v.
+    """
+    frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
+    u, v, density = mx / mass, my / mass, dense / frames
+    heat_x = qx - u * (xx + yy) / 2 - u * xx - v * xy + u * (u**2 + v**2) * mass
+    heat_y = qy - v * (xx + yy) / 2 - u * xy - v * yy + v * (u**2 + v**2) * mass
+    stress = [xx - mass * u * u, xy - mass * u * v, yy - mass * v * v]
+    for axis in np.flatnonzero(np.array(cells) > 1):
+        start, end = reach(run, cells, axis, run.radius.min())
+        shape = (-1, 1) if axis else (1, -1)
+        slopes = (
+            np.gradient(w.reshape(cells[::-1]), (start + end) / 2, axis=1 - axis) for w in (u, v)
+        )
+        du, dv = (np.nan_to_num(slope * (end - start).reshape(shape)).ravel() for slope in slopes)
+        stress = [
+            s - mass * one / 12 for s, one in zip(stress, (du * du, du * dv, dv * dv), strict=True)
+        ]
+    kt = (stress[0] + stress[2]) / 2 / n
+    u = u + run.shear_rate * (places(run, cells)[:, 1] - run.lower[1] - run.edges[1] / 2)
+    carried = [density * one / n for one in (*stress, heat_x, heat_y)]
+    return np.stack([density, u, v, kt, turning / n, *carried])
+
+
+class Fields(NamedTuple):
+    """What runs of one input say."""
+
+    found: dict[str, Estimate]  # (C,) by name
+    values: dict[str, np.ndarray]  # (G, C) as if each block had been measured alone
+    disks: np.ndarray  # (C,) counted in each cell
+    blocks: list[Block]
+    kinship: dict[str, float]  # of the blocks, by name; NaN without errors
+
+
+def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
+    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk."""
+    blocks, most = blocks_of(runs, skip, cells)
+    run = runs[0]
+    areas = [accessible(run, cells, kind.radius) for kind in run.by_species]
+    parts = np.stack([sums(block, cells, areas) for block in blocks])
+    weights = parts[:, np.where(BY_FRAMES, 0, 1)]
+    values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
+    # All disks share what the conserved motion of them all does not have (docs/theory.md).
+    values[:, NAMES.index("temperature")] *= run.count / free_disks(run)
+    members = Members(values, share)
+    near = kinship(members, blocks, most)
+    mean, error = members.estimate(near[:, None])
+    turns = "angular_velocity" in run.elements
+    names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}
+    return Fields(
+        {name: Estimate(mean[k], error[k]) for name, k in names.items()},
+        {name: values[:, k] for name, k in names.items()},
+        parts[:, 1].sum(axis=0),
+        blocks,
+        dict(zip(NAMES, near, strict=True)),
+    )
+
+
+# --- profiles between two walls ---
+
+
+def gained(block: Block, name: str) -> np.ndarray:
+    """How much a sum over collisions has grown in a block."""
+    time, value = block.run.observable(name)
+    if len(time) < 2:
+        raise RunError(f"{block.run.path}: too few observables in the steady state")
+    ends = (block.start, block.end)
+    return np.array([np.interp(ends, time, part) @ (-1, 1) for part in np.atleast_2d(value.T)])
+
+
+def fluxes(blocks: list[Block], axis: int) -> Members:
+    """(G, 3) `Fluxes` from what both walls have received."""
+    run, (near, far) = blocks[0].run, SIDES[axis]
     length = 2 * run.edges[1 - axis]
-    near, far = (growth(run, f"sides/{name}/impulse", start) for name in names)
-    gained = [growth(run, f"sides/{name}/energy", start) for name in names]
-    momentum = (far - near) / length
-    return Fluxes(momentum[axis], momentum[1 - axis], (gained[0] - gained[1]) / length)
+    parts = []
+    for block in blocks:
+        impulse = gained(block, f"sides/{far}/impulse") - gained(block, f"sides/{near}/impulse")
+        energy = gained(block, f"sides/{near}/energy") - gained(block, f"sides/{far}/energy")
+        parts.append([impulse[axis], impulse[1 - axis], *energy, block.end - block.start])
+    sums = np.array(parts)
+    return jackknife(lambda total: total[:3] / total[3] / length, sums, sums[:, 3:])
 
 
 def expected(run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]):
     """(C, 3) flow along the walls, kT and n at the places x, from those in the middle on.
 
     Pressure is the same everywhere; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear /
-    viscosity.
+    viscosity.  Raises ValueError if a gas of these fluxes would have to be colder than 0, or denser
+    than disks can be.
     """
     diameter, mass = 2 * run.radius[0], run.mass[0]
     per_disk = np.pi * diameter**2 / 4
@@ -137,35 +361,46 @@ def expected(run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[flo
 
 
 def has_theory(runs: list[Run], axis: int) -> bool:
-    """Whether there are two walls and between them nothing but equal disks, smooth and elastic."""
+    """Whether there are two walls and between them a gas that Enskog's theory is for."""
     return all(
-        not run.periodic[axis]
-        and run.periodic[1 - axis]
-        and equal_disks(run)
-        and run.restitution == 1
-        and "angular_velocity" not in run.elements
-        and not run.gravity.any()
-        and not run.obstacles
-        and not len(run.walls)
-        for run in runs
+        not run.periodic[axis] and run.periodic[1 - axis] and run.nature <= LAWFUL for run in runs
     )
 
 
-def prediction(runs: list[Run], axis: int, skip: float | None, x: np.ndarray, found: dict):
-    """What `expected` says of runs of one input, with the fluxes and the middle of all of them.
+def prediction(
+    measured: Fields, axis: int, x: np.ndarray
+) -> tuple[dict[str, Estimate] | None, Fluxes]:
+    """What `expected` says at x, by name, and the fluxes that say it; both with errors.
 
-    None if a gas of these fluxes would have to be colder than 0, or denser than disks can be.
-    Raises RunError if there are no disks in the middle.
+    None if there is no such gas.  Raises RunError if there are no disks in the middle.
     """
-    starts = [run.time[steady_frames(run, skip)[0]] for run in runs]
-    measured = [fluxes(run, axis, t) for run, t in zip(runs, starts, strict=True)]
-    flux = Fluxes(*np.mean(measured, axis=0))
-    along, half = f"flow_{'yx'[axis]}", len(x) // 2
-    cells = slice(half - 1, half + 1 + len(x) % 2)
-    middle = tuple(float(np.mean(found[name].mean[cells])) for name in (along, "temperature"))
+    run, size = measured.blocks[0].run, len(measured.disks)
+    cells = slice(size // 2 - 1, size // 2 + 1 + size % 2)
+    names = (f"flow_{'yx'[axis]}", "temperature")
+    weight = measured.disks[cells] / measured.disks[cells].sum()
+    middle = np.stack([measured.values[name][:, cells] @ weight for name in names], axis=1)
     if not np.all(np.isfinite(middle)):
-        raise RunError(f"{runs[0].path}: too few disks in the middle; take fewer --cells")
+        raise RunError(f"{run.path}: too few disks in the middle; take fewer --cells")
+    flux = fluxes(measured.blocks, axis)
+    share = flux.share[:, :1]
+    given = Members(np.hstack([flux.values, middle]), np.tile(share, 5))
+    near = [measured.kinship[name] for name in names]
+    mean, error = given.estimate(np.array([0 * near[0]] * 3 + near))
+    rest = given.rests()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.sqrt(np.sum(rest**2, axis=0))
+        together = np.nan_to_num(rest.T @ rest / np.outer(size, size))
+
+    def law(values: np.ndarray) -> np.ndarray:
+        return expected(run, axis, x, Fluxes(*values[:3]), tuple(values[3:]))
+
+    found = Fluxes(*map(Estimate, mean[:3], error[:3]))
+    steps = np.diag(np.where(error > 0, error, 0))
     try:
-        return expected(runs[0], axis, x, flux, middle), flux
-    except ValueError:  # of the search for the density
-        return None, flux
+        rows, slopes = law(mean), np.array([law(mean + e) - law(mean - e) for e in steps]) / 2
+    except ValueError:
+        return None, found
+    bands = np.sqrt(np.einsum("kcf,kl,lcf->cf", slopes, together, slopes).clip(0))
+    bands += 0 * near[0]
+    columns = zip(("flow", "temperature", "density"), rows.T, bands.T, strict=True)
+    return {name: Estimate(*both) for name, *both in columns}, found

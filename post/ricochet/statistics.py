@@ -15,14 +15,14 @@ Law = Callable[[np.ndarray], np.ndarray]
 
 
 class Estimate(NamedTuple):
-    """A mean with its standard error."""
+    """A mean with its error, half the 68 % interval."""
 
     mean: np.ndarray | float
     error: np.ndarray | float
 
 
 class Curve(NamedTuple):
-    """Points with the standard errors of y; (P,) each."""
+    """Points with the errors of y; (P,) each."""
 
     x: np.ndarray
     y: np.ndarray
@@ -70,20 +70,27 @@ def hold_against(
     )
 
 
+ONE_SIGMA = float(scipy.stats.norm.cdf(1))
+
+
+def student(samples: np.ndarray | float) -> np.ndarray | float:
+    """Half the 68 % interval of a mean over its standard error, both from so many samples."""
+    return scipy.stats.t.ppf(ONE_SIGMA, np.maximum(1.0, np.subtract(samples, 1.0)))
+
+
 def estimate(values: np.ndarray, axis: int = 0) -> Estimate:
-    """Mean and standard error over independent members; a single member has no error (NaN)."""
+    """Mean and error over independent members; a single member has no error (NaN)."""
     values = np.asarray(values, dtype=float)
-    mean = values.mean(axis=axis)
-    if values.shape[axis] < 2:
+    mean, count = values.mean(axis=axis), values.shape[axis]
+    if count < 2:
         return Estimate(mean, np.full_like(mean, np.nan))
-    return Estimate(mean, values.std(axis=axis, ddof=1) / np.sqrt(values.shape[axis]))
+    return Estimate(mean, student(count) * values.std(axis=axis, ddof=1) / np.sqrt(count))
 
 
 # --- series in time ---
 
 FINE, COARSE = 64, 16  # cells of a series: in their means fast noise fades, and slow modes show
 FEWEST = 8  # samples from which an error can be had
-ONE_SIGMA = float(scipy.stats.norm.cdf(1))
 
 
 class SeriesMean(NamedTuple):
@@ -144,7 +151,7 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
     early, late = (half.mean() for half in np.array_split(rest, 2))
     samples = min(float(len(rest)), float(np.var(rest)) / error**2)
-    interval = error * float(scipy.stats.t.ppf(ONE_SIGMA, max(1.0, free - 1)))
+    interval = error * float(student(free))
     return SeriesMean(mean, interval, samples, float(late - early) / (2 * error))
 
 
@@ -169,7 +176,7 @@ def combined(means: Sequence[SeriesMean]) -> SeriesMean:
     mean, error, samples, drift = np.array(means).T
     size, own = samples.sum(), np.sqrt(np.sum(error**2)) / runs
     if scatter_p(means) < UNLIKELY:
-        size, own = runs, scipy.stats.sem(mean) * scipy.stats.t.ppf(ONE_SIGMA, runs - 1)
+        size, own = runs, estimate(mean).error
     return SeriesMean(mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs)))
 
 

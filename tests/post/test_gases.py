@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import binom
 
 import correlations
 import driven
@@ -422,20 +423,94 @@ def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, script
 SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
 &side name = 'left' temperature = 2 / &side name = 'right' temperature = 2 speed = {speed} /
 &species count = 40 radius = 0.5 temperature = 2 /
-&stop time = 100 / &output frames_every_time = 1 observables_every_time = 1 /
+&stop time = 1600 / &output frames_every_time = 4 observables_every_time = 4 /
 """
 
 
 def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
     """Two disks in the left half that move together, two in the right half that part."""
-    position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 4)
-    velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 0.0], [-1.0, 0.0]]] * 4)
-    run = written(tmp_path / "a.h5", position, velocity)
-    found = fields.fields(run, [0, 1, 2, 3], (2, 1))
+    position = np.array([[[0.1, 0.2], [0.2, 0.8], [0.7, 0.2], [0.8, 0.8]]] * 8)
+    velocity = np.array([[[1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [-1.0, 2.0]]] * 8)
+    run = written(tmp_path / "a.h5", position, velocity, periodic=PERIODIC, radius=0.1)
+    found = {name: one.mean for name, one in fields.fields([run], None, (2, 1)).found.items()}
     assert found["density"] == pytest.approx(4)
-    assert found["flow_x"] == pytest.approx(1) and found["flow_y"] == pytest.approx([2, 0])
-    assert found["temperature"] == pytest.approx([0, 2]) == found["stress_xx"] / 8
+    assert found["flow_x"] == pytest.approx(1) and found["flow_y"] == pytest.approx(2)
+    assert 3 / 4 * found["temperature"] == pytest.approx([0, 2]) == found["stress_xx"] / 8
     assert found["stress_yy"] == pytest.approx(0) and found["heat_x"] == pytest.approx(0)
+
+
+@pytest.mark.parametrize(
+    ("cells", "shear"), [((16, 12), 0.0), ((16, 12), 0.5), ((4, 1), 0.0), ((1, 4), 0.5)]
+)
+def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, cells, shear):
+    """A gas between walls whose velocities and places are drawn: kT = 2, even where it can be.
+
+    The flow, of equal disks and of the few in a cell, is no heat, and takes none.
+    """
+    place = rng.uniform(0.1, [3.9, 2.9], (300, 60, 2))
+    v = rng.normal(size=place.shape) + shear * np.stack([place[..., 1], 0 * place[..., 1]], axis=-1)
+    v *= np.sqrt(2)
+    run = written(tmp_path / "a.h5", place, v, radius=0.1, edges=(4, 3))
+    own = fields.fields([run], None, cells)
+    even = {"density": 60 / (3.8 * 2.8), "temperature": 2, "flow_y": 0}
+    held = []
+    for name, truth in even.items():
+        mean, error = own.found[name]
+        held.append(np.abs(mean - truth) < error)
+        off = (np.average(mean, weights=own.disks) - truth) * np.sqrt(own.disks.sum())
+        assert abs(off) < 4 * max(2, truth / 2) or name == "density"
+    assert np.mean(held) == pytest.approx(0.68, abs=5 * 0.47 / np.sqrt(np.size(held)))
+
+
+def test_the_area_that_centres_can_reach(tmp_path):
+    """Not the strip of a radius at a wall, nor the disks around a circle and a straight wall."""
+    one = np.full((2, 1, 2), 0.5)
+    parts = {"radius": 0.1, "edges": (4, 2), "obstacles": [((1.0, 1.0), 0.4, 0)]}
+    parts |= {"walls": [((3.0, 1.0), (3.4, 1.0))], "periodic": (True, False)}
+    run = written(tmp_path / "a.h5", one, 0 * one, **parts)
+    area = fields.accessible(run, (2, 1), 0.1)
+    stadium = 0.4 * 0.2 + np.pi * 0.1**2
+    assert area == pytest.approx([3.6 - np.pi * 0.5**2, 3.6 - stadium], rel=2e-3)
+
+
+GASES = {  # input, cells, and the kT that is known
+    "still": ("""&box upper = 40, 20 / &stop time = 200 /
+        &species count = 400 radius = 0.5 temperature = 1 /""", (8, 12),
+        lambda run: td.temperature(run).mean),
+    "falling": ("""&box upper = 20, 60 gravity = 0, -0.1 boundary = 'periodic', 'wall' /
+        &side name = 'bottom' temperature = 2 / &stop time = 800 /
+        &species count = 200 radius = 0.5 temperature = 2 /""", (1, 20), lambda run: 2.0),
+    "sheared": ("""&box upper = 80, 40 shear_rate = 0.1 boundary = 'periodic', 'periodic' /
+        &contact restitution = 0.8 / &stop time = 400 /
+        &species count = 200 radius = 0.5 temperature = 1 /""", (5, 3),
+        lambda run: np.mean(run.observable("all/temperature").value[-51:])),
+    "couette": ("couette.nml", (1, 20), None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("gas", "seeds"),
+    [*((name, 4) for name in ("still", "falling", "sheared"))]
+    + [pytest.param(name, 30, marks=pytest.mark.check) for name in GASES],
+)
+def test_fields_of_gases_have_the_temperature_that_is_known(simulated, gas, seeds):
+    """Of many seeds, the errors of a run hold the mean of all of them as often as they say."""
+    text, cells, truth = GASES[gas]
+    output = "&output frames_every_time = 4 observables_every_time = 4 /"
+    system = ROOT / "input" / text if text.endswith("nml") else f"{text}\n{output}\n"
+    runs = [simulated(system, f"run.seed={k + 1}", name=f"{gas}{k}") for k in range(seeds)]
+    own = [fields.fields([run], None, cells) for run in runs]
+    if truth is not None:
+        pairs = [(one.found["temperature"].mean, one.disks) for one in own]
+        known = [np.isfinite(kt) for kt, _ in pairs]
+        kt = [np.average(k[ok], weights=n[ok]) for (k, n), ok in zip(pairs, known, strict=True)]
+        off = statistics.estimate(np.array(kt) / [truth(run) for run in runs])
+        assert off.mean == pytest.approx(1, abs=4 * off.error)
+    low, high = binom.interval(0.999, seeds, 2 * statistics.ONE_SIGMA - 1)
+    for name in own[0].found if seeds > 4 else ():
+        mean, error = np.moveaxis([one.found[name] for one in own], 1, 0)
+        held = np.where(np.isfinite(error), np.abs(mean - np.nanmean(mean, 0)) < error, np.nan)
+        assert low / seeds <= np.nanmean(held) <= high / seeds, name
 
 
 def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
@@ -459,11 +534,12 @@ def test_a_profile_and_a_map_are_drawn_with_their_numbers(simulated, tmp_path, c
     path = simulated(SHEARED.format(speed=3)).path
     rows = drawn(tmp_path, "fields", path, "--cells", "5")
     found = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
-    assert found["x"] == pytest.approx([2, 6, 10, 14, 18])
-    assert np.mean(found["density"]) == pytest.approx(0.2)
+    assert found["x"] == pytest.approx([2.25, 6, 10, 14, 17.75]), "middles of where centres are"
+    assert np.average(found["density"], weights=[3.5, 4, 4, 4, 3.5]) == pytest.approx(40 / 190)
     assert (found["density_error"] > 0).all() and found["flow_y"][-1] > found["flow_y"][0]
     assert np.isfinite(found["flow_expected"]).all()
     assert len(drawn(tmp_path, "fields", path, "--grid", "4,2")) == 8
-    early = simulated(ROOT / "input/fourier.nml", "stop.time=20", name="early").path
+    soon = ("stop.time=20", "output.frames_every_time=2", "output.observables_every_time=2")
+    early = simulated(ROOT / "input/fourier.nml", *soon, name="early").path
     assert "flow_expected" not in drawn(tmp_path, "fields", early)[0]
     assert "warning: no gas has these fluxes" in capsys.readouterr().err

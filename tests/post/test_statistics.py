@@ -69,10 +69,14 @@ def test_errors_of_a_histogram_are_its_scatter(rng, copies):
     assert np.sqrt(error2) == pytest.approx(scatter, rel=0.05)
 
 
-def test_estimate_has_the_error_of_the_mean():
-    mean, error = statistics.estimate([1.0, 2.0, 3.0, 4.0])
-    assert (mean, error) == (2.5, pytest.approx(np.sqrt(5 / 3 / 4)))
+@pytest.mark.parametrize("members", [2, 3, 4, 30])
+def test_68_of_100_estimates_hold_the_mean_however_few_the_members(rng, members):
+    """And of many the error is the standard error; of one there is none."""
+    mean, error = statistics.estimate(rng.normal(3, 2, (20000, members)), axis=1)
+    assert np.mean(np.abs(mean - 3) < error) == pytest.approx(0.6827, abs=0.015)
+    assert np.sqrt(np.mean(error**2)) > 2 / np.sqrt(members)
     assert np.isnan(statistics.estimate([1.0]).error)
+    assert statistics.student(1e9) == pytest.approx(1)
 
 
 def test_power_law_is_found_with_its_error(rng):
