@@ -4,7 +4,7 @@
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for name in sinai lorentz container; do
-  runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 "$@"
+  runs/ensemble.sh "input/$name.nml" -d "$data/$name" --seeds 1 --set output.event_log=.true. "$@"
 done
 
 # Sinai's disk from 64 places in 64 directions, each twice, 1e-12 apart; until they are far apart.
