@@ -38,7 +38,8 @@ from ricochet.statistics import (
     SeriesMean,
     binned,
     combined,
-    unsteady,
+    drifts,
+    grows,
     estimate,
     hold_against,
     series_mean,
@@ -82,8 +83,8 @@ def state_of(run: Run) -> State:
     return EQUILIBRIUM if run.nature.in_equilibrium else STEADY
 
 
-def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, list[float]]:
-    """The kT over these frames and those between; that of the first and of the last."""
+def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, list[float], bool]:
+    """The kT over these frames and those between, of the first and the last, whether it drifts."""
     tracks = [
         kt_of_frames(run, slice(frames[0], frames[-1] + 1))
         for run, frames in zip(runs, picked, strict=True)
@@ -91,7 +92,8 @@ def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, l
     kt = combined([series_mean(track) for track in tracks])
     if all(np.ptp(track) <= 1e-9 * np.max(track) for track in tracks):
         kt = kt._replace(error=0.0, drift=0.0)  # constant, however few there are
-    return kt, [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
+    ends = [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
+    return kt, ends, drifts(kt) or any(map(grows, tracks))
 
 
 def pooled(runs: list[Run], picked: list[list[int]], state: State, kts: tuple) -> Pool:
@@ -212,7 +214,7 @@ def main() -> None:
     groups = grouped(args.runs, lambda run: run.count)
     picked = [[late_frames(run, args) for run in members] for _, members in groups]
     found = [temperature(runs, own) for (_, runs), own in zip(groups, picked, strict=True)]
-    if state in (EQUILIBRIUM, STEADY) and any(unsteady(kt) for kt, _ in found):
+    if state in (EQUILIBRIUM, STEADY) and any(drift for *_, drift in found):
         state = UNSTEADY
     pools = [
         pooled(runs, own, state, kts)

@@ -197,9 +197,14 @@ def drifts(mean: SeriesMean) -> bool:
     return bool(2 * scipy.stats.norm.sf(abs(mean.drift)) < UNLIKELY)
 
 
-def unsteady(mean: SeriesMean) -> bool:
-    """Whether it drifts, or remembers so much that nobody can tell."""
-    return drifts(mean) or (mean.error > 0 and mean.samples < FEW)
+def grows(series: np.ndarray) -> bool:
+    """Whether most of how a series (T,) varies is a straight line: it grows or falls all the time.
+
+    That looks like a long memory to `series_mean`, whose error then hides the drift.
+    """
+    if len(series) < FEWEST or np.ptp(series) <= 1e-9 * np.max(np.abs(series)):
+        return False
+    return bool(np.corrcoef(np.arange(len(series)), series)[0, 1] ** 2 > 0.75)
 
 
 def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
