@@ -11,7 +11,7 @@ curves, against collisions per disk in the same units, against time in those of 
 from itertools import chain, cycle
 
 from ricochet import Run
-from ricochet.cooling import Curves, energies
+from ricochet.cooling import SMOOTH, Curves, energies
 from ricochet.drawing import band, caption, colours, dilute_limit, plt
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
 from ricochet.statistics import Estimate
@@ -32,8 +32,11 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
         if "ratio" in found:
             tau, ratio = found["collisions_per_disk"], found["ratio"]
             band(axes, tau, *ratio, color=colour, label=f"ξ = {xi:g}")
-    kinds = sorted((kind.mass, kind.disks.sum()) for kind in groups[0][1][0].by_species)
-    if len(kinds) == 2 and kinds[1] == (4 * kinds[0][0], kinds[0][1]):
+    runs = [run for _, own in groups for run in own]
+    kinds = sorted((kind.mass, kind.disks.sum()) for kind in runs[0].by_species)
+    alone = all(run.nature <= {*SMOOTH, "obstructed"} for run in runs)
+    equal_speeds = all(abs(found["ratio"].mean[0] - 4) < 1e-6 for found in results)
+    if alone and equal_speeds and len(kinds) == 2 and kinds[1] == (4 * kinds[0][0], kinds[0][1]):
         dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")
     axes.axhline(1, color="0.6", lw=0.8, zorder=0)
     last = max(found["collisions_per_disk"][-1] for found in results)
@@ -57,7 +60,8 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
         left.plot([], [], color=colour, label=f"ξ = {xi:g}")
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
-    left.set(yscale="log", xlabel="time (reduced units)")
+    low, high = left.get_ylim()  # of an elastic gas of one kind they would enclose rounding alone
+    left.set(yscale="log", xlabel="time (reduced units)", ylim=(min(low, 0.9), max(high, 1.1)))
     left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
     right.set(xlabel="collisions per disk")
     for axes in (left, right):

@@ -6,9 +6,11 @@
 The projectile is the species of that name, or else the only disk that moves at the start; the
 others are the bed.  Sizes: `hit`, bed disks that collided with anything; `displaced`, bed disks
 now further than one radius from their first position; `width` and `depth`, the extent of the first
-positions of the displaced ones, from the rim of the bed downwards.  A crater is marked if the box
-takes part (wall hits are more than 1 % of the number of disks), or if the run ended with more
-energy left than `stop.energy_fraction`.
+positions of the displaced ones, from the rim of the bed downwards; `hole_width` and `hole_depth`,
+the extent of the hole, where more than half of the bed's packing is gone, smoothed over a few
+disks.  A bed that moves without a projectile, as under gravity, is refused.  A crater is marked if
+the box takes part (wall hits are more than 1 % of the number of disks), or if the run ended with
+more energy left than `stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing
@@ -41,13 +43,12 @@ def draw_hull(axes: plt.Axes, run: Run) -> None:
         axes.legend(loc="upper left")
 
 
-def draw_cavity(axes: plt.Axes, run: Run) -> None:
-    """The outline of the hole: where the packing is half of what it was."""
-    before, after = crater.packing_field(run, 0), crater.packing_field(run, -1)
-    level = 0.5 * np.quantile(before[2][before[2] > 0.05], 0.5)
-    axes.contour(*after, levels=[level], colors=[COLOURS[1]], linewidths=1.2, zorder=4)
-    axes.plot([], [], color=COLOURS[1], lw=1.2, label="half of the first packing")
-    axes.legend(loc="upper left")
+def draw_hole(axes: plt.Axes, run: Run) -> None:
+    """The outline of the hole."""
+    outline = crater.hole(run)
+    if len(outline):
+        axes.plot(*outline.T, color=COLOURS[1], lw=1.4, zorder=4, label="hole: less than half as dense")
+        axes.legend(loc="upper left")
 
 
 def draw_energy(axes: plt.Axes, run: Run) -> None:
@@ -80,7 +81,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     draw_state(before, run, 0, moved, limits)
     draw_hull(before, run)
     draw_state(after, run, -1, moved, limits)
-    draw_cavity(after, run)
+    draw_hole(after, run)
     below = {"location": "bottom", "pad": 0.02}
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
     label = f"{LABELS['displacement']} at the end"
@@ -92,15 +93,16 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     hits.set_title("collisions of each disk, drawn at its first position")
     scale = plt.cm.ScalarMappable(plt.Normalize(0, top), "viridis")
     bar = figure.colorbar(scale, ax=hits, shrink=0.8, aspect=30, label="collisions", **below)
-    ticks = np.array([0, *(10**k for k in range(int(top)))])
-    bar.set_ticks(np.log10(1.0 + ticks), labels=ticks)
+    ticks = np.array([0, *(10**k for k in range(0, int(top), 1 + int(top) // 5))])
+    bar.set_ticks(np.log10(1.0 + ticks), labels=[f"{tick:g}" for tick in ticks])
     draw_energy(energy, run)
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
     figure.suptitle(
         f"{caption([run])},  projectile: mass {run.mass[tip] / run.mass[lying]:.4g} m, radius "
         f"{run.radius[tip] / run.radius[lying]:.4g} r, speed {run.speed(0)[tip]:.4g}\n"
-        f"crater: {size.hit} disks hit, {size.displaced} displaced by more than r, width "
-        f"{size.width:.3f}, depth {size.depth:.3f}"
+        f"hole: width {size.hole_width:.3f}, depth {size.hole_depth:.3f};  {size.hit} disks hit;  "
+        f"{size.displaced} displaced by more than r, from a width {size.width:.3f}, depth "
+        f"{size.depth:.3f}"
     )
     return figure
 

@@ -12,16 +12,17 @@ floor, between halves with a hole above the floor: the shares that last (after E
 mean diameter.
 
 A curve for each run, of means over a sixtieth of the time; a colour for each input and species.
-Printed: the mean over the second half of the time, of `share` in the fuller half of the box, its
-error over runs of one input, and its ratio to the theory.  Pictures: the end of the first run of
-each input, or of a single input its start and its end; the smallest disks are drawn larger.
+Printed: the mean over the second half of the time, its error, and its ratio to the theory; of
+`share` in the half of the box that is the fuller one at another time.  Pictures: the end of the
+first run of each input, or of a single input its start and its end; the smallest disks are drawn
+larger.
 """
 
 from ricochet import Run, RunError, drawing
 from ricochet.drawing import plt
 from ricochet.driven import cluster, demon_law, fuller, height, noise_law, share, temperature
-from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, estimate, windows
+from ricochet.script import command_line, launch, measured, over_runs, report
+from ricochet.statistics import Estimate, grows, series_mean, windows
 
 import numpy as np
 
@@ -31,10 +32,10 @@ HEIGHT = 4.5  # of a picture in inches
 SMALLEST = 2.2  # points across that a disk is drawn with at least
 #: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
-    "temperature": ("kT (reduced units)", temperature, noise_law, float),
+    "temperature": ("kT (reduced units)", temperature, noise_law, np.asarray),
     "share": ("share of the disks in the left half", share, demon_law, fuller),
-    "height": ("mean height (reduced units)", height, lambda run: None, float),
-    "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, float),
+    "height": ("mean height (reduced units)", height, lambda run: None, np.asarray),
+    "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, np.asarray),
 }
 
 
@@ -103,23 +104,28 @@ def main() -> None:
         if run.frames < 2 or not run.time[-1] > run.time[0]:
             raise RunError(f"{run.path}: has one frame; it takes two")
     label, curves_of, law_of, compared = QUANTITIES[args.show]
-    groups, tracks, rows = by_input(args.runs), {}, []
+    groups, tracks, rows, notes = by_input(args.runs), {}, [], []
     for name, runs in groups.items():
         for run in runs:
             for species, curve in curves_of(run).items():
                 tracks.setdefault((name, species), []).append(curve)
     expected = {name: law_of(runs[0]) for name, runs in groups.items()}
     for (name, species), curves in tracks.items():
-        late = [value[time >= (time[0] + time[-1]) / 2] for time, value in curves]
-        late, law = estimate([compared(float(np.mean(half))) for half in late]), expected[name]
+        late = [compared(value[time >= (time[0] + time[-1]) / 2]) for time, value in curves]
+        about = ", ".join(filter(None, (args.show, name, species)))
         row = {"input": name or None, "species": species or None, "runs": len(curves)}
-        row |= {**measured("late", late), "theory": law}
-        rows.append(row | measured("ratio", law and Estimate(late.mean / law, late.error / law)))
+        row |= over_runs("late", [series_mean(half) for half in late], notes, about)
+        notes += [f"{about}: grows or falls all the time, 'late' is not what lasts"] * any(
+            map(grows, late)
+        )
+        law, mean, error = expected[name], row["late"], row["late_error"]
+        row |= {"theory": law} | measured("ratio", law and Estimate(mean / law, error / law))
+        rows.append(row)
     laws = {
         name: set() if law is None else {law, 1 - law} if compared is fuller else {law}
         for name, law in expected.items()
     }
-    report(args, draw(groups, tracks, laws, label), rows)
+    report(args, draw(groups, tracks, laws, label), rows, notes=notes)
 
 
 if __name__ == "__main__":

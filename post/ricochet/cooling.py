@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import hard_disks, theory
-from .reader import Run, RunError
+from .nature import SOURCES, TRAITS, Refused, allow
+from .reader import Run
 from .statistics import Estimate, estimate
 from .thermodynamics import equal_disks, free_disks, kt_at_start, lightest_and_heaviest, packing
 
@@ -17,6 +18,7 @@ Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
 SLOW = 0.9  # of Haff's law, below which a gas is no longer homogeneous
+SMOOTH = ("lossy", "mixture", "turning")  # what a gas may be that cools by Haff's law
 SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so close to its limit
 
 
@@ -34,9 +36,9 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     temperatures, heaviest to lightest species; `energy_...` against `time`.
     """
     names = ("all", *runs[0].names)
-    energy = [
-        np.array([run.observable(f"{name}/kinetic_energy").value for name in names]) for run in runs
-    ]
+    for run in runs:
+        allow(run, "it does not cool by itself", *(TRAITS.keys() - SOURCES - {"collapsed"}))
+    energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
     first = np.mean([tracks[0, 0] for tracks in energy])
     left = [tracks / tracks[0, 0] for tracks in energy]
     time, tau = zip(*(run.collisions_per_disk for run in runs), strict=True)
@@ -53,13 +55,23 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     return found
 
 
+def moving_energy(run: Run, name: str = "all") -> np.ndarray:
+    """(T,) kinetic energy per disk at the observables, of disks that moved at the start."""
+    energy = run.observable(f"{name}/kinetic_energy").value
+    if name == "all" and not energy[0] > 0:
+        raise Refused(f"{run.path}: starts with disks at rest; there is nothing to cool")
+    return energy
+
+
 # --- Haff's law ---
 
 
 def first_rate(run: Run) -> float:
     """w0: collisions per disk and time at the start, by the equation of state, or as counted."""
-    if not run.periodic.all() or np.isnan(run.restitution):
-        raise RunError(f"{run.path}: Haff's law is for a periodic box, and one restitution")
+    allow(run, "Haff's law is for smooth disks that only cool", *SMOOTH)
+    if not run.periodic.all() or "lossy" not in run.nature:
+        state = "has walls" if "lossy" in run.nature else "does not cool"
+        raise Refused(f"{run.path}: {state}; Haff's law is for disks that cool in a periodic box")
     if not equal_disks(run):
         return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
@@ -77,8 +89,9 @@ def counted_rate(run: Run) -> float:
 
 def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """w0 t, collisions per disk, K / K0 at the observables."""
-    time, energy = run.observable("all/kinetic_energy")
-    return time * first_rate(run), run.collisions_per_disk.value, energy / energy[0]
+    time, tau = run.collisions_per_disk
+    energy = moving_energy(run)
+    return time * first_rate(run), tau, energy / energy[0]
 
 
 def haff(
@@ -124,12 +137,15 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float) -> float:
 
 def rough_law(run: Run) -> tuple[float, float, float]:
     """xi, beta, q of a run that the laws of rough disks are for."""
-    beta = float(run.parameter("contact", "tangential_restitution", -1.0))
-    walls = not run.periodic.all() or run.obstacles or len(run.walls)
-    if beta <= -1 or walls or not equal_disks(run) or not np.isfinite(run.restitution):
-        raise RunError(f"{run.path}: the laws are for equal rough disks in a periodic box")
+    law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
+    allow(run, law, "lossy", "rough", "turning")
+    if "rough" not in run.nature or not run.periodic.all():
+        raise Refused(
+            f"{run.path}: has {'walls' if 'rough' in run.nature else 'smooth disks'}; {law}"
+        )
     if run.parameter("contact", "friction") is not None:
-        raise RunError(f"{run.path}: the laws know no Coulomb limit; leave out contact.friction")
+        raise Refused(f"{run.path}: has a Coulomb limit; {law}")
+    beta = float(run.parameter("contact", "tangential_restitution"))
     return run.restitution, beta, float(run.parameter("contact", "inertia", 0.5))
 
 

@@ -6,25 +6,31 @@ others are the bed.
 
 from typing import NamedTuple
 
+import contourpy
 import numpy as np
 import scipy
 
+from .nature import allow
 from .reader import Run, RunError
 
 
 class Crater(NamedTuple):
-    """The size of a crater by four definitions, and how the run ended."""
+    """The size of a crater by several definitions, and how the run ended."""
 
     hit: int
     displaced: int
-    width: float
+    width: float  # of the first places of the displaced disks
     depth: float
+    hole_width: float
+    hole_depth: float
     energy_left: float  # over the energy at the start
     time: float
     collisions: int
     wall_collisions: int
 
 
+#: What a run may be in which nothing but a projectile moves a bed.
+QUIET = ("lossy", "rough", "turning", "unlike", "mixture", "obstructed", "stepped")
 FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
 
 
@@ -69,9 +75,11 @@ def displaced(run: Run, frame: int = -1) -> np.ndarray:
 
 def crater(run: Run) -> Crater:
     """The sizes of the crater in the last frame."""
+    law = "a crater is what a projectile does to a bed that lies still without it"
+    allow(run, law, *QUIET)
     if run.collisions is None:
         raise RunError(f"{run.path}: has no collisions per disk")
-    moved, lying = displaced(run), bed(run)
+    moved, lying, outline = displaced(run), bed(run), hole(run)
     start = run.position[0]
     rim = np.max((start[:, 1] + run.radius)[lying])
     bottom = np.min((start[:, 1] - run.radius)[moved], initial=rim)
@@ -80,11 +88,33 @@ def crater(run: Run) -> Crater:
         displaced=int(moved.sum()),
         width=float(np.ptp(start[moved, 0])) if moved.any() else 0.0,
         depth=float(rim - bottom),
+        hole_width=float(np.ptp(outline[:, 0])) if len(outline) else 0.0,
+        hole_depth=float(np.ptp(outline[:, 1])) if len(outline) else 0.0,
         energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
         time=float(run.time[-1]),
         collisions=int(run.observable("collisions").value[-1]),
         wall_collisions=int(run.observable("wall_collisions").value[-1].sum()),
     )
+
+
+def hole(run: Run) -> np.ndarray:
+    """(P, 2) outline of the hole, the largest place where half of the bed's packing is gone.
+
+    Empty where there is none.
+    """
+    x, y, before = packing_field(run, 0)
+    *_, after = packing_field(run, -1)
+    half = 0.5 * np.median(before[before > 0.05])
+    gone = np.pad(np.minimum(before - half, half - after), 1, constant_values=-half)
+    x, y = (np.concatenate([[2 * u[0] - u[1]], u, [2 * u[-1] - u[-2]]]) for u in (x, y))
+    lines = contourpy.contour_generator(x, y, gone).lines(0.0)
+    return max(lines, key=area, default=np.empty((0, 2)))
+
+
+def area(ring: np.ndarray) -> float:
+    """Of a closed line (P, 2)."""
+    x, y = ring.T
+    return abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))) / 2
 
 
 def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, ...]:

@@ -5,7 +5,7 @@ import numpy as np
 from . import hard_disks, theory
 from .reader import Run
 from .structure import largest_cluster
-from .thermodynamics import equal_disks, packing
+from .thermodynamics import packing
 
 GAP = 0.1  # of a cluster, in mean diameters
 Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, '' for all of them
@@ -19,11 +19,8 @@ def temperature(run: Run) -> Curves:
 def noise_law(run: Run) -> float | None:
     """The temperature at which noise and collisions balance."""
     drive = run.parameters.get("drive", {})
-    alone = run.periodic.all() and not run.obstacles and not run.shear_rate
-    smooth = "angular_velocity" not in run.elements and run.restitution < 1
-    if not (alone and smooth and equal_disks(run)) or drive.get("species"):
-        return None
-    if drive.get("kind") != "noise":
+    known = {"noisy", "lossy"} <= run.nature <= {"noisy", "lossy", "turning"}
+    if not known or not run.periodic.all() or drive.get("species"):
         return None
     gas = packing(run), 2 * run.radius[0], run.mass[0]
     return hard_disks.noise_temperature(float(drive["strength"]), run.restitution, *gas)
@@ -35,9 +32,17 @@ def share(run: Run) -> Curves:
     return {"": (run.time, np.mean(run.position[:][..., 0] < middle, axis=1))}
 
 
-def fuller(mean: float) -> float:
-    """The share in the half that has more."""
-    return max(mean, 1 - mean)
+def fuller(share: np.ndarray) -> np.ndarray:
+    """Shares (T,) of one half as those of the half that had more of the disks.
+
+    The first third of the time tells which half that was in the last third, and the last in the
+    first, for the half that is called fuller by its own disks has more than 1/2 even of none but
+    chance.  The middle lets the thirds forget each other.
+    """
+    third = max(1, len(share) // 3)
+    ends = share[:third], share[-third:]
+    signs = [np.sign(end.mean() - 0.5) for end in ends]
+    return 0.5 + np.concatenate([signs[1] * (ends[0] - 0.5), signs[0] * (ends[1] - 0.5)])
 
 
 def demon_law(run: Run) -> float | None:
@@ -47,8 +52,10 @@ def demon_law(run: Run) -> float | None:
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
     heights = [w[:, 1].max() for w in parting if np.isclose(w[:, 1].min(), run.lower[1])]
     across, down = run.gravity
-    alike = equal_disks(run) and np.isfinite(run.restitution)
+    alike = run.nature <= {"moving", "falling", "lossy", "obstructed", "turning"}
     if floor.get("motion") != "sawtooth" or not heights or across != 0 or not alike:
+        return None
+    if run.obstacles or run.restitution == 1 or run.parameter("contact", "wall_restitution") != 1:
         return None
     hole, diameter = float(heights[0] - run.lower[1]), 2 * run.radius[0]
     layers = run.count * diameter / (run.edges[0] / 2 - diameter)

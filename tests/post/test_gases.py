@@ -19,7 +19,7 @@ from ricochet import cooling as cool
 from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
-from ricochet.driven import demon_law, noise_law
+from ricochet.driven import demon_law, fuller, noise_law
 from synthetic_run import ROOT, run_script, write_run, written
 from validation.estimators import force, hit_rate
 
@@ -248,6 +248,38 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
     drawn(tmp_path, "haff", two.path)
 
 
+HAFF = "smooth disks that only cool"
+
+
+@pytest.mark.parametrize(
+    ("script", "unlike", "words"),
+    [
+        ("haff", {"contact": {"restitution": 0.9, "tangential_restitution": 0.0}}, HAFF),
+        ("haff", {"box": {"shear_rate": 1.0}}, HAFF),
+        ("haff", {"drive": {"kind": "noise", "strength": 1.0}}, HAFF),
+        ("haff", {"side/top": {"temperature": 1.0}}, HAFF),
+        ("haff", {"contact": {"restitution": 1.0}}, "does not cool"),
+        ("haff", {"walled": True}, "has walls"),
+        ("haff", {"speed": 0.0}, "at rest"),
+        ("rough", {}, "has smooth disks"),
+        ("cooling", {"side/top": {"temperature": 1.0}}, "does not cool by itself"),
+        ("cooling", {"speed": 0.0}, "at rest"),
+        ("crater", {"box": {"gravity": [0.0, -1.0]}}, "lies still"),
+    ],
+)
+def test_runs_that_a_law_is_not_for_are_refused(tmp_path, capsys, script, unlike, words):
+    """A gas that cools in a periodic box, and what is different about it."""
+    speed, walled = unlike.pop("speed", 1.0), unlike.pop("walled", False)
+    groups = {"contact": {"restitution": 0.9}, **unlike}
+    v, time = speed * np.ones((2, 4, 2)), np.array([0.0, 1.0])
+    energy = {f"{name}/kinetic_energy": speed**2 * np.array([1.0, 0.9]) for name in ("all", "disk")}
+    more = {"observables": {"collisions": [0, 4], **energy}, "periodic": (not walled, True)}
+    path = write_run(tmp_path / "a.h5", 0 * v, v, time=time, parameters=groups, **more)
+    assert run_script(script, path, "-o", tmp_path / "a.png") == 1
+    said = capsys.readouterr().err
+    assert words in said and said.startswith(f"{script}.py: {path}: ") and said.count("\n") == 1
+
+
 def test_rough_gases_are_drawn(simulated, tmp_path):
     text = """&box upper = 60, 60 boundary = 'periodic', 'periodic' /
     &species count = 100 radius = 0.5 temperature = 1 /
@@ -272,8 +304,20 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     assert found == [["a", "b"], ["c"], ["d"], ["e"]]
     assert list(groups)[1] == "ξ = 0.9, bottom velocity = 0.2, drive strength = 1"
     expected = theory.demon_share(0.3 / 0.01, 9 * 0.04 / 0.46, 0.9)
-    assert demon_law(runs[0]) == pytest.approx(expected)
     assert noise_law(runs[0]) is None, "walls take part"
+    assert demon_law(runs[0]) is None, "noise takes part"
+    quiet = "\n".join(line for line in text.splitlines() if "drive" not in line)
+    assert demon_law(simulated(quiet + "&stop time = 1 /")) == pytest.approx(expected)
+
+
+def test_an_even_gas_has_no_fuller_half(rng):
+    """Nor one that remembers; where more than half stay in one half it is told."""
+    noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(2000, 300)))
+    even = np.array([fuller(0.5 + one).mean() for one in noise])
+    assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(2000))
+    assert fuller(0.1 + 0.1 * noise[0]).mean() == pytest.approx(0.9, abs=0.02)
+    assert not any(map(statistics.grows, noise[:100])), "a memory is no drift"
+    assert all(statistics.grows(one + np.linspace(0, 1, 300)) for one in noise[:100])
 
 
 # --- transport ---

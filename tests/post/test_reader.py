@@ -232,8 +232,9 @@ RUNNING = [
     ),
     (
         [BULK + "&contact tangential_restitution = 0.5 restitution = 0.9 /\n" + OUTPUT.format("")],
-        {"rough": (), "haff": ()},
+        {"rough": ()},
     ),
+    ([BULK + "&contact restitution = 0.9 /\n" + OUTPUT.format("")], {"haff": ()}),
     (
         [PAIR.format(x) + LONGER for x in (0.3, 0.300001)],
         {"lyapunov": ("--largest", "0.1")},

@@ -5,6 +5,7 @@ from math import acos, pi, sin, sqrt
 import numpy as np
 
 from ricochet import Run
+from ricochet.driven import fuller, share
 from ricochet.theory import demon_share
 
 from .case import AT_LEAST, AT_MOST, Case, Member, relative, sigmas, within
@@ -106,11 +107,10 @@ def chambers(velocity: float) -> tuple[Member, ...]:
     )  # fmt: skip
 
 
-def fuller(run: Run) -> float:
-    """Mean share of the half that has more of them in the second half of the time."""
-    late = run.position[run.frames // 2 :][..., 0] < 20
-    share = float(late.mean())
-    return max(share, 1 - share)
+def fuller_share(run: Run) -> float:
+    """Mean share of the half that has more of them, in the second half of the time."""
+    _, left = share(run)[""]
+    return float(fuller(left[run.frames // 2 :]).mean())
 
 
 CASES = [
@@ -140,7 +140,7 @@ CASES = [
     *[
         Case(
             "P15-13", f"Maxwell's demon, floor with {velocity:g} of the threshold: fuller share",
-            chambers(velocity * THRESHOLD), over(fuller),
+            chambers(velocity * THRESHOLD), over(fuller_share),
             demon_share(HOLE / (velocity * THRESHOLD) ** 2, LAYERS, XI), within(0.05),
             "after Eggers 1999",
         )
