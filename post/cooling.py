@@ -60,8 +60,9 @@ def draw(runs: list[Run], groups: list, results: list[Curves]) -> plt.Figure:
         left.plot([], [], color=colour, label=f"ξ = {xi:g}")
     for name, style in styles:
         right.plot([], [], color="0.3", ls=style, label=name)
+    left.set(yscale="log", xlabel="time (reduced units)")
     low, high = left.get_ylim()  # of an elastic gas of one kind they would enclose rounding alone
-    left.set(yscale="log", xlabel="time (reduced units)", ylim=(min(low, 0.9), max(high, 1.1)))
+    left.set_ylim(min(low, 0.9), max(high, 1.1))
     left.set_ylabel("$\\langle K \\rangle\\,/\\,\\langle K \\rangle_{all,\\,t=0}$")
     right.set(xlabel="collisions per disk")
     for axes in (left, right):

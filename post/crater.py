@@ -47,7 +47,9 @@ def draw_hole(axes: plt.Axes, run: Run) -> None:
     """The outline of the hole."""
     outline = crater.hole(run)
     if len(outline):
-        axes.plot(*outline.T, color=COLOURS[1], lw=1.4, zorder=4, label="hole: less than half as dense")
+        axes.plot(
+            *outline.T, color=COLOURS[1], lw=1.4, zorder=4, label="hole: less than half as dense"
+        )
         axes.legend(loc="upper left")
 
 

@@ -3,14 +3,19 @@
     python post/energy.py runs/gravity/events.h5 runs/gravity/steps_*.h5 -o energy.png
 
 Above: mean kinetic and potential energy per disk of each species in the first run.  Below: the
-largest relative change of the total energy so far in each run.  The axis of time is logarithmic,
-for most happens at first.  Prints, for each run and relative to the energy
-at the start: the drift, that is the change over the whole run along a fitted line; the spread,
-the standard deviation from that line; and the largest change.
+largest relative change so far, in each run, of what is to be kept: the total energy, and where
+energy comes and goes total + dissipated - heat - work - drive.  The axis of time is logarithmic,
+for most happens at first; linear where something drives the disks.  Prints, for each run and
+relative to the total energy at the start, or the largest if that is 0: the drift, that is the
+change over the whole run along a fitted line; the spread, the standard deviation from that line;
+and the largest change.
 """
+
+from collections.abc import Callable
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, caption, colours, plt
+from ricochet.nature import Refused
 from ricochet.script import command_line, launch, report
 
 import numpy as np
@@ -24,17 +29,34 @@ def method(run: Run) -> str:
     return f"time steps, Δt = {run.time_step:g}" if run.time_step else "event driven"
 
 
-def total_change(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Time and E / E(0) - 1 of the total energy."""
-    time, energy = run.observable("total_energy")
+def balance(run: Run) -> tuple[np.ndarray, str]:
+    """What is to be kept, at the observables, and in words, with the terms that are not 0."""
+    energy, words = run.observable("total_energy").value, "total"
+    size = 1e-9 * np.abs(energy).max()
+    for sign, term in ((1, "dissipated_energy"), (-1, "heat"), (-1, "work"), (-1, "drive_energy")):
+        value = run.observable(term).value if term in run.observables else 0.0
+        if np.abs(value).max() > size:
+            energy = energy + sign * value
+            words += f" {'+-'[sign < 0]} {term.removesuffix('_energy')}"
+    return energy, words
+
+
+def change(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Time and the relative change of what is to be kept."""
+    time, total = run.observable("total_energy")
     if len(time) < 2:
         raise RunError(f"{run.path}: has one sample of the energies so far; nothing has changed")
-    return time, energy / energy[0] - 1
+    if not np.any(total):
+        raise Refused(f"{run.path}: all disks are at rest, there is no energy")
+    energy, _ = balance(run)
+    return time, (energy - energy[0]) / (abs(total[0]) or np.abs(total).max())
 
 
-def means_of_windows(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def means_of_windows(
+    time: np.ndarray, value: np.ndarray, spaced: Callable = np.geomspace
+) -> tuple[np.ndarray, np.ndarray]:
     """Means of a series over windows of time that grow by a factor, at their mean times."""
-    cuts = np.geomspace(time[0], time[-1], WINDOWS + 1)[1:-1]
+    cuts = spaced(time[0], time[-1], WINDOWS + 1)[1:-1]
     parts = np.searchsorted(cuts, time)
     number = np.bincount(parts)
     some = number > 0
@@ -51,7 +73,8 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         colour = COLOURS[run.names.index(name) % len(COLOURS)]
         time, value = (series[1:] for series in run.observable(f"{name}/{kind}_energy"))
         axes.plot(time, value, color=colour, lw=0.5, alpha=0.15)
-        means = means_of_windows(time, value)
+        spaced = np.linspace if run.nature.driven else np.geomspace
+        means = means_of_windows(time, value, spaced)
         axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}")
     axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
@@ -63,16 +86,21 @@ def draw(runs: list[Run]) -> plt.Figure:
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(9, 7.5))
     draw_species(top, runs[0])
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
-        time, change = total_change(run)
-        largest = np.maximum(np.maximum.accumulate(np.abs(change)), EPSILON / 2)
-        bottom.loglog(time[1:], largest[1:], color=colour, lw=1.4, label=method(run))
+        time, lost = change(run)
+        largest = np.maximum(np.maximum.accumulate(np.abs(lost)), EPSILON / 2)
+        label = f"{method(run)}: {balance(run)[1]}"
+        bottom.semilogy(time[1:], largest[1:], color=colour, lw=1.4, label=label)
+    if not any(run.nature.driven for run in runs):
+        bottom.set_xscale("log")
     bottom.set(
         xlabel="time (reduced units)",
-        ylabel="largest $|E(t)/E(0) - 1|$ so far",
+        ylabel="largest change so far, over E(0)",
         xlim=(min(run.observable("total_energy").time[1] for run in runs), None),
         ylim=(EPSILON / 4, 10 * bottom.get_ylim()[1]),
     )
-    bottom.legend(ncols=2, loc="upper right")
+    bottom.legend(
+        ncols=1 + (len(runs) > 2), loc="upper right", title="change of"
+    )
     return figure
 
 
@@ -80,13 +108,13 @@ def main() -> None:
     args = command_line(__doc__, "energy.png").parse_args()
     rows = []
     for run in args.runs:
-        time, change = total_change(run)
-        line = np.polynomial.Polynomial.fit(time, change, 1)
-        row = {"run": run.path.name, "method": method(run)}
+        time, lost = change(run)
+        line = np.polynomial.Polynomial.fit(time, lost, 1)
+        row = {"run": run.path.name, "method": method(run), "of": balance(run)[1]}
         row |= {"total_energy": float(run.observable("total_energy").value[0])}
         row |= {"drift": float(line(time[-1]) - line(time[0]))}
-        row |= {"spread": float(np.std(change - line(time)))}
-        rows.append(row | {"largest_change": float(np.abs(change).max())})
+        row |= {"spread": float(np.std(lost - line(time)))}
+        rows.append(row | {"largest_change": float(np.abs(lost).max())})
     report(args, draw(args.runs), rows)
 
 
