@@ -5,6 +5,7 @@ import pytest
 
 import player
 from ricochet import read_run
+from ricochet.drawing import draw_box, move_sides, plt
 from ricochet.reader import SIDES
 from synthetic_run import maxwell_velocities, run_script, write_run, written
 from whole_runs import wait_for
@@ -40,7 +41,7 @@ def filmed(run, frames, traced=()):
 
 def test_speeds_energies_and_pressure_are_those_of_the_run(tmp_path, rng):
     pressure = np.linspace(1, 2, 1000)
-    for count in (1000, 2):
+    for count in (1000, 3, 2):
         observables = {"collisions": np.zeros(count), "pressure": pressure[:count]}
         times = {"observables": observables, "observable_time": np.arange(count)}
         run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, **times))
@@ -48,8 +49,8 @@ def test_speeds_energies_and_pressure_are_those_of_the_run(tmp_path, rng):
         shown = facts["pressure"]
         assert (shown is None) == (count == 2), "too few samples"
         if shown:
-            assert len(shown["time"]) == 500 and shown["time"][-1] == 999
-            expected = np.interp(shown["time"], range(count), pressure)
+            assert len(shown["time"]) == min(count, 500) and shown["time"][-1] == count - 1
+            expected = np.interp(shown["time"], range(count), pressure[:count])
             np.testing.assert_allclose(shown["value"], expected, rtol=1e-6)
     assert facts["kinetic"][1][1] == pytest.approx(run.kinetic_energy(20)[30:].mean(), rel=1e-6)
     assert facts["potential"] is None and not facts["speeds"]["rest"]
@@ -395,6 +396,14 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     axis, rim = -events.j[hits] // 2, run.radius[events.i[hits] - 1] * (-1) ** -events.j[hits]
     touched = place[hits + 1, events.i[hits] - 1, axis] - rim
     np.testing.assert_allclose(touched, sides[hits + 1, -events.j[hits]], atol=1e-9)
+    axes = plt.figure().add_subplot()
+    drawn = draw_box(axes, run, run.time[-1])
+    for k in (-1, len(lower) // 2):
+        move_sides(drawn, run, run.time[k])
+        segments = np.array(drawn[0].get_segments())
+        assert np.all(segments.min((0, 1)) == lower[k]) and np.all(segments.max((0, 1)) == upper[k])
+    assert np.array_equal(np.transpose([axes.get_xlim(), axes.get_ylim()]), run.room)
+    plt.close()
     browser, some = playing(run.path), rng.uniform(*run.time[[0, -1]], 50)
     act = "return arguments[0].map(t => { show(t); return [sidesAt(moment.shown), nextEvent()]; })"
     drawn, told = zip(*browser.run(act, some.tolist()), strict=True)
@@ -423,6 +432,10 @@ def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(sim
     said = browser.run("return $('guess').textContent")
     assert "shows frames as they are" in said and "output.event_log" in said
     assert "Dots: frames." in browser.run("return $('guide').textContent")
+    before = browser.run("return moment.time")
+    browser.press("n")  # nothing is told of what comes next
+    told = "return [moment.time, $('event').hidden, $('coming').hidden]"
+    assert browser.run(told) == [before, True, True]
 
 
 def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, tmp_path):

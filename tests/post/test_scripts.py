@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 import cost
+import crater as crater_figure
 import crater_scan
+import equation_of_state
 import equipartition
 import gravity
 import lyapunov
 import missed
 import mixture
+import player
 import scaling
 import scattering
 import trajectory
@@ -340,6 +343,22 @@ def test_crater_sizes(tmp_path, names):
     x, y, field = crater.packing_field(run, 0)
     area = field.sum() * (x[1] - x[0]) * (y[1] - y[0])
     assert area == pytest.approx(80 * np.pi * 0.02**2, rel=1e-6)
+
+
+def test_figures_and_films_have_scales_and_limits_of_their_data(tmp_path, rng):
+    run = read_run(impact(tmp_path / "a.h5"))
+    figure = crater_figure.draw(run, crater.crater(run))
+    (bar,) = [axes for axes in figure.axes if axes.get_xlabel().startswith("displacement")]
+    film, _ = player.film(run, [0, 1], "displacement", [])
+    assert bar.get_xlim()[1] == pytest.approx(film["scales"]["displacement"][1])
+    runs = [read_run(gas(tmp_path / "b.h5", rng, count=2))]
+    for eta, z in ((0.05, 1.1), (0.6, 6.5)):
+        ways = {
+            f"Z_{name}{part}": z for name in ("virial", "rate", "walls") for part in ("", "_error")
+        }
+        figure = equation_of_state.draw([{"packing": eta, "Z_reference": z, **ways}], runs)
+        assert z < figure.axes[0].get_ylim()[1] < 1.3 * z
+    plt.close("all")
 
 
 @pytest.mark.parametrize(
