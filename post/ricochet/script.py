@@ -96,7 +96,7 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         if len(getattr(known, "runs", ())) > 1 and not known.repeated:
             known.runs = distinct(known.runs)
-        results = [known.output, getattr(known, "csv", None)]
+        results = [getattr(known, name, None) for name in ("output", "csv")]
         if None not in results and results[0].resolve() == results[1].resolve():
             self.error(f"{known.csv} is the name of the figure, too: choose another for --csv")
         return known
