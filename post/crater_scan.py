@@ -6,9 +6,10 @@ The four parameters are read from each run.  Runs that differ in one of them mak
 it; there is a curve for every combination of the other three, and a panel for every parameter that
 varies so.  A run without such a partner is named, in print and on the figure.  Points: means over
 the runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
-restitution, the fraction of normal energy lost in a collision); the exponents are printed.  Open
-symbols are left out of the fit: the box takes part (wall hits are more than 1 % of the number of
-disks), or some of the runs ended by time, with more energy left than `stop.energy_fraction`.
+restitution, the fraction of normal energy lost in a collision); the exponents are printed, with
+chi^2 per degree of freedom, and a fit that misses its points says so.  Open symbols are left out of
+the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
+runs ended by time, with more energy left than `stop.energy_fraction`.
 """
 
 from itertools import chain
@@ -31,7 +32,8 @@ AXES = {
 }
 SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # fitted against
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
-EXTENTS = {"width": "width", "depth": "depth"}
+EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
+ALL = SIZES | EXTENTS
 
 
 class Point(NamedTuple):
@@ -62,7 +64,7 @@ def key_of(run: Run) -> tuple[float, ...]:
 def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     """The mean over runs."""
     craters = [crater(run) for run in runs]
-    sizes = {name: estimate([getattr(c, name) for c in craters]) for name in SIZES | EXTENTS}
+    sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
         np.array([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
     )
@@ -99,6 +101,23 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
     ]
 
 
+def missed(scans: Scans) -> list[str]:
+    """The fits that miss their points."""
+    return [
+        f"{size} against {axis}: misses its points, chi^2 per degree of freedom is {fit.chi2:.2g}"
+        for axis, scan in scans.items()
+        for curve in scan
+        for size in ALL
+        for fit in [fit_of(axis, curve, size)]
+        if fit and fit.misses(fewest(curve))
+    ]
+
+
+def fewest(curve: list[Point]) -> int:
+    """Runs of a point that is fitted."""
+    return min(p.runs for p in curve if p.free)
+
+
 def listed(values: dict[str, float]) -> str:
     """Parameters in words."""
     return ",  ".join(f"{name} {value:g}" for name, value in values.items())
@@ -116,12 +135,13 @@ def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
     return fit_power_law(x, *np.array([p.sizes[name] for p in free]).reshape(-1, 2).T)
 
 
-def power(axis: str, fit: PowerLaw | None) -> str:
+def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
     """The law of a fit, for a legend."""
     if not fit:
         return ""
     exponent = "\\pm".join(to_error(fit.exponent, fit.exponent_error))
-    return f", $\\propto {SYMBOLS[axis]}^{{{exponent}}}$"
+    missed = f", $\\chi^2$/dof {fit.chi2:.2g}" if fit.misses(fewest(curve)) else ""
+    return f", $\\propto {SYMBOLS[axis]}^{{{exponent}}}${missed}"
 
 
 def draw_size(
@@ -147,7 +167,7 @@ def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, 
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
         for (name, title), colour, marker in zip(names.items(), own, "os", strict=True):
             fit = fit_of(axis, curve, name)
-            label = "" if varying else title + power(axis, fit)
+            label = "" if varying else title + power(axis, curve, fit)
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
             draw_size(axes, axis, curve, name, fit, **style)
         if varying:
@@ -187,7 +207,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     figure.suptitle(
         f"N = {count},  {number} run{'s' * (number != '1')} per point,"
         f"  ended at {100 * fraction:g} % of the energy"
-        + (" (open: the box takes part, or ended by time)" * any(not p.free for p in points))
+        + ("\n(open: the box takes part, or ended by time)" * any(not p.free for p in points))
     )
     return figure
 
@@ -203,11 +223,12 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict]]:
             row |= {"energy_left": float(p.energy_left)}
             row |= {"wall_collisions": float(p.wall_collisions)}
             rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
-        for size in SIZES | EXTENTS:
+        for size in ALL:
             if fit := fit_of(axis, curve, size):
                 row = {"scan": axis, **curve[0].values, axis: None, "size": size}
-                exponent = Estimate(fit.exponent, fit.exponent_error)
-                fits.append(row | measured("exponent", exponent))
+                row |= {"of": "1 - xi^2" if axis == "restitution" else axis}
+                row |= measured("exponent", Estimate(fit.exponent, fit.exponent_error))
+                fits.append(row | {"chi2/dof": fit.chi2})
     return rows, fits
 
 
@@ -215,7 +236,9 @@ def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
     points = [point(*one) for one in grouped(args.runs, key_of)]
     scans = scanned(points)
-    report(args, draw(args.runs, scans), *tables(scans), notes=unused(points, scans))
+    report(
+        args, draw(args.runs, scans), *tables(scans), notes=[*unused(points, scans), *missed(scans)]
+    )
 
 
 if __name__ == "__main__":

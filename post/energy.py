@@ -98,9 +98,7 @@ def draw(runs: list[Run]) -> plt.Figure:
         xlim=(min(run.observable("total_energy").time[1] for run in runs), None),
         ylim=(EPSILON / 4, 10 * bottom.get_ylim()[1]),
     )
-    bottom.legend(
-        ncols=1 + (len(runs) > 2), loc="upper right", title="change of"
-    )
+    bottom.legend(ncols=1 + (len(runs) > 2), loc="upper right", title="change of")
     return figure
 
 

@@ -45,6 +45,16 @@ class PowerLaw(NamedTuple):
     factor: float
     exponent: float
     exponent_error: float
+    chi2: float = float("nan")  # per degree of freedom, of the points about it
+    free: int = 0  # degrees of freedom
+
+    def misses(self, runs: int) -> bool:
+        """Whether points are farther off than errors over so many runs explain (Welch 1951)."""
+        if self.free < 1 or runs < 4:  # too few for an error of the error
+            return False
+        own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
+        ratio = own / (1 + 2 / (runs - 1))
+        return bool(scipy.stats.f.sf(ratio, self.free, few) < UNLIKELY)
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         return self.factor * np.asarray(x, dtype=float) ** self.exponent
@@ -283,6 +293,7 @@ def fit_power_law(x: np.ndarray, y: np.ndarray, y_error: np.ndarray) -> PowerLaw
         return None
     log_x, log_y, weight = np.log(x[good]), np.log(y[good]), y[good] / y_error[good]
     line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
-    chi2 = np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / max(1, good.sum() - 2)
+    free = int(good.sum()) - 2
+    chi2 = float(np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / free)
     error = np.sqrt(covariance[0, 0] * max(1.0, chi2))
-    return PowerLaw(float(np.exp(line[1])), float(line[0]), error)
+    return PowerLaw(float(np.exp(line[1])), float(line[0]), error, chi2, free)

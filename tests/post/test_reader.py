@@ -372,6 +372,7 @@ def test_results_are_written_into_files_of_ones_own(
         ("snapshot run.h5 --cuont 3", "did you mean --count?"),
         ("snapshot run.h5 --colour=sped", "did you mean speed?"),
         ("haff run.h5 --out a.png", "unknown argument --out; did you mean --output?"),
+        ("haff run.h5 -o a.png --csv ./a.png", "a.png is the name of the figure, too"),
         ("snapshot rum.h5", "no such file; did you mean run.h5?"),
         ("snapshot run.h5 --frames 0,a", "'0,a' is not a list"),
         ("snapshot run.h5 --frames ::0", "'::0' is not a list"),

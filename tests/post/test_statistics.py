@@ -91,6 +91,18 @@ def test_power_law_is_found_with_its_error(rng):
     assert statistics.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
 
 
+@pytest.mark.parametrize("runs", [4, 8])
+def test_a_fit_says_that_it_misses_its_points_as_seldom_as_it_should(rng, runs):
+    x, missed = np.linspace(1, 30, 10), np.zeros((2, 1000), int)
+    for k in range(1000):
+        for bent in (0, 1):
+            y = x**0.7 * (1 + 0.4 * bent * np.sin(x / 3))
+            own = statistics.estimate(y * (1 + 0.05 * rng.normal(size=(runs, 10))))
+            missed[bent, k] = statistics.fit_power_law(x, *own).misses(runs)
+    assert missed[0].sum() < 20, "by chance 0.5 %"
+    assert missed[1].mean() > (0.5 if runs == 4 else 0.99)
+
+
 def test_errors_are_written_with_two_digits():
     assert statistics.to_error(0.0000123, 0.00031) == ("0.00001", "0.00031")
     assert statistics.to_error(-1e-9, 0.2) == ("0.00", "0.20")
