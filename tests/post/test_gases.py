@@ -311,11 +311,11 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
 
 
 def test_energy_is_kept_as_its_balance_says(simulated, tmp_path):
-    path = simulated("""&side name = 'left' temperature = 2 / &contact restitution = 0.9 /
+    text = """&side name = 'left' temperature = 2 / &contact restitution = 0.9 /
     &side name = 'right' motion = 'sine' amplitude = 0.2 period = 1 /
     &species count = 50 radius = 0.02 temperature = 1 / &stop time = 3 /
-    &drive kind = 'noise' strength = 1 interval = 0.1 / &output observables_every_time = 0.1 /""").path
-    (row,) = drawn(tmp_path, "energy", path)
+    &drive kind = 'noise' strength = 1 interval = 0.1 / &output observables_every_time = 0.1 /"""
+    (row,) = drawn(tmp_path, "energy", simulated(text).path)
     assert row["of"] == "total + dissipated - heat - work - drive"
     assert float(row["largest_change"]) < 1e-12
 
