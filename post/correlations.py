@@ -34,7 +34,7 @@ from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, p
 from ricochet.nature import allow
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 from ricochet.speeds import relaxation
-from ricochet.statistics import Curve, SeriesMean, combined, estimate, series_mean
+from ricochet.statistics import Curve, Estimate, SeriesMean, combined, estimate, series_mean
 from ricochet.structure import bond_correlation, bond_order, pair_correlation, structure_factor
 from ricochet.theory import RELAXATION
 from ricochet.thermodynamics import FLUID, all_settle, equal_disks, later, mean_free_time
@@ -173,7 +173,8 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
             else:
                 row |= measured(name, None)
         row["D_enskog"] = None if runs[0].nature else float(transport.enskog_of(runs[0])["D"])
-        rows.append(row | {"g_first_bin": float(found.curves["g"].y[0])})
+        _, *first = found.curves["g"]
+        rows.append(row | measured("g_first_bin", Estimate(*first), 0))
     return rows, notes
 
 

@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
     args = parser.parse_args()
     for run in args.runs:
-        allow(run, "its species share no energy by this law", *SETTLED)
+        allow(run, "its species do not come to one temperature", *SETTLED)
     groups, rows, notes = grouped(args.runs, start_width), [], []
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):

@@ -100,7 +100,7 @@ def main() -> None:
     for run in runs:
         if run.names != runs[0].names or len(run.names) < 2:
             raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
-        allow(run, "its species share no energy by this law", *SETTLED - {"falling"})
+        allow(run, "its species do not come to one temperature", *SETTLED)
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames, args.skip)
     report(args, draw(runs, frames, result), result)

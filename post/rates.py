@@ -33,7 +33,7 @@ def check(runs: list[Run]) -> None:
     """Refuse what is no gas in an empty box, and runs of different systems."""
     first = runs[0]
     for run in runs:
-        allow(run, "it has no equilibrium, nor free paths", *td.FLUID, *STRAIGHT)
+        allow(run, "rates are those of a gas in an empty box", *td.FLUID, *STRAIGHT)
         if not run.nature.in_equilibrium and not td.has_log(run):
             needs = "it has free paths only, and those need output.event_log = .true."
             allow(run, needs, *td.FLUID)

@@ -4,7 +4,10 @@ Runs that are made, whose answer is known, and small runs of the program, on whi
 """
 
 import csv
+import os
 import warnings
+from contextlib import nullcontext
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -20,6 +23,7 @@ from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
 from ricochet.driven import demon_law, fuller, noise_law
+from ricochet.nature import Refused
 from synthetic_run import ROOT, run_script, write_run, written
 from validation.estimators import force, hit_rate
 
@@ -121,6 +125,124 @@ def test_melting_has_a_curve_for_each_number_of_disks(tmp_path):
     assert row["P"] == pytest.approx((100 * kt + 300 / 2) * 0.02**2 / kt, rel=1e-5)
     axes = melting.draw([row, {**row, "N": 400}], [run]).axes[0]
     assert {"N = 100", "N = 400"} < set(axes.get_legend_handles_labels()[1])
+
+
+# --- gases of mixed features ---
+
+#: With the variables of each.
+KICKS = {
+    "brownian": "temperature = {}",
+    "andersen": "temperature = {} fraction = 0.3",
+    "noise": "strength = 0.1",
+    "active": "speed = 0.1 rotational_diffusion = 0.1 temperature = {}",
+}
+
+
+class DrawnGas(NamedTuple):
+    """A gas that is heated, kicked, rough, ... as it comes, and what is known of it."""
+
+    text: str
+    plain: str  # the same disks with one mass, smooth and elastic, left alone: of the same Z
+    settles: bool  # comes to equilibrium
+    fluid: bool  # and has one pressure everywhere
+    rough: bool
+    kept: np.ndarray  # (2,) axes along which the momentum is kept, if nothing heats
+    kt: float | None  # of what heats
+
+
+def drawn_gas(rng) -> DrawnGas:
+    """Two species, a box of any kind, and whatever else goes with it."""
+    maybe = lambda share: bool(rng.random() < share)  # noqa: E731
+    sides, count = rng.choice(["wall", "periodic"], 2), rng.integers(12, 30, 2)
+    radius, mass = np.array([1.0, rng.choice([1.0, 1.5])]), rng.choice([1.0, 3.0, 10.0], 2)
+    area = np.sum(count * np.pi * radius**2) / rng.uniform(0.08, 0.3)
+    box = np.sqrt(area * np.array([1, 1 / rng.uniform(1, 1.6)]))
+    start, bath = rng.uniform(0.3, 4, 2)
+    free_time = np.sqrt(area / count.sum() / bath)
+    xi, beta = 1 - 0.1 * maybe(0.1), rng.choice([-1, 1, 0.3], p=[0.6, 0.35, 0.05])
+    groups, baths, driven, heated = [], [], False, maybe(0.4)
+    for names, kind in zip((("left", "right"), ("bottom", "top")), sides, strict=True):
+        for name in names if kind == "wall" else ():
+            if heated and maybe(0.8):
+                baths.append(bath * (1 + maybe(0.05)))
+                groups.append(f"&side name = '{name}' temperature = {baths[-1]} /")
+            elif maybe(0.03):
+                driven = True
+                groups.append(f"&side name = '{name}' motion = 'sine' amplitude = 0.1 period = 1 /")
+    kind = rng.choice([*KICKS, "none"], p=[0.2, 0.2, 0.05, 0.05, 0.5])
+    if kind != "none":
+        kt, step = bath * (1 + maybe(0.1)), free_time * rng.uniform(0.05, 0.5)
+        groups.append(f"&drive kind = '{kind}' interval = {step} {KICKS[kind].format(kt)} /")
+        driven |= kind in ("noise", "active")
+        baths += [kt] if kind in ("brownian", "andersen") else []
+    falls, sheared = sides[1] == "wall" and maybe(0.15), set(sides) == {"periodic"} and maybe(0.15)
+    obstructed = not sheared and maybe(0.08)
+    groups += ["&obstacle centre = 1, 1 radius = 0.5 /"] * obstructed
+    pull = f"gravity = 0, {-rng.uniform(0.1, 1) * start / box[1]}" if falls else ""
+    pull += f" shear_rate = {0.3 / free_time}" if sheared else ""
+    cadence = rng.choice(["collisions_per_disk = 1", f"time = {free_time / 2}"])
+
+    def text(length, mass, *more):
+        kinds = (
+            f"&species count = {n} radius = {r} mass = {m} temperature = {start} /"
+            for n, r, m in zip(count, radius, mass, strict=True)
+        )
+        box_of = f"&box upper = {box[0]}, {box[1]} boundary = '{sides[0]}', '{sides[1]}'"
+        stop = f"&stop collisions_per_disk = {length} time = {length * free_time} /"
+        first = f"&run seed = {rng.integers(10**6)} / {box_of} {' '.join(more[:1])} /"
+        return "\n".join([first, *kinds, *more[1:], stop, f"&output observables_every_{cadence} /"])
+
+    law = f"&contact restitution = {xi} wall_restitution = 1 tangential_restitution = {beta}"
+    law += f" contact_time = {free_time / 100} /" if xi < 1 or abs(beta) < 1 else " /"
+    settles = xi == 1 and abs(beta) == 1 and not (driven or sheared) and len(set(baths)) < 2
+    return DrawnGas(
+        text(400, mass, pull, law, *groups), text(800, (1, 1)), settles,
+        settles and not (falls or obstructed), beta > -1,
+        (sides == "periodic") & [True, not falls] & (not obstructed), baths[0] if baths else None,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("systems", [12, pytest.param(400, marks=pytest.mark.check)])
+def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
+    """The kT is that of walls or kicks, or the energy says it; Z that of the disks left alone."""
+    found = []
+    for k in range(systems):
+        known = drawn_gas(np.random.default_rng([int(os.environ.get("SEED", "1")), k]))
+        run = simulated(known.text)
+        for law, holds in ((td.temperature, known.settles), (td.z_ways, known.fluid)):
+            with nullcontext() if holds else pytest.raises(Refused, match=str(run.path)):
+                law(run)
+        kt = known.kt
+        if known.fluid and kt is None:  # the energy is shared by all momenta, and by all spins
+            still = known.kept * (run.mass @ run.velocity[0])
+            energy = run.kinetic_energy(0).sum() - np.sum(still**2) / (2 * run.mass.sum())
+            kt = energy / (run.count * (1 + known.rough / 2) - known.kept.sum() / 2)
+        pairs = [(td.temperature(run), (kt, 0))] if known.settles and kt else []
+        if known.fluid:
+            ways, plain = td.z_ways(run), td.z_ways(simulated(known.plain, name="plain"))
+            pairs += [(ways[way], plain[way]) for way in ways]
+        for one, other in pairs:
+            error = np.hypot(one.error, other[1])
+            off = abs(one.mean - other[0])
+            assert off < 6 * error or off < 1e-9 * one.mean, (k, one, other, known.text)
+            found += [off < error] if error else []
+    share = 2 * statistics.ONE_SIGMA - 1
+    assert abs(np.mean(found) - share) < 3 * np.sqrt(share * (1 - share) / (len(found) / 2))
+
+
+def test_kicked_disks_have_the_diffusion_of_their_displacements_alone(simulated, monkeypatch):
+    """Free for a time h they go D = kT h / 2 m; velocities at kicks would say twice that."""
+    run = simulated(
+        """&box boundary = 'periodic', 'periodic' /
+        &species count = 100 packing_fraction = 0.0005 temperature = 2 mass = 2 /
+        &drive kind = 'brownian' interval = 0.01 temperature = 2 / &stop time = 20 /
+        &output frames_every_time = 0.02 observables_every_time = 0.02 /"""
+    )
+    monkeypatch.setattr(correlations, "structure", lambda *_: ({}, {}))
+    found = correlations.analysed([run], None)
+    (d,) = found.members["D_displacement"]
+    assert d.mean == pytest.approx(0.01 / 2, abs=4 * d.error + 0.0001)
+    assert not any(name.startswith("D_velocities") for name in (*found.members, *found.curves))
 
 
 # --- free paths ---
