@@ -219,7 +219,7 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@.ci/set-up demo test check
 	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
-	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
+	@SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 

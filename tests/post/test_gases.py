@@ -172,7 +172,9 @@ def drawn_gas(rng) -> DrawnGas:
     kind = rng.choice([*KICKS, "none"], p=[0.2, 0.2, 0.05, 0.05, 0.5])
     if kind != "none":
         kt, step = bath * (1 + maybe(0.1)), free_time * rng.uniform(0.05, 0.5)
-        groups.append(f"&drive kind = '{kind}' interval = {step} {KICKS[kind].format(kt)} /")
+        whose = "" if kind == "noise" or maybe(0.7) else " species = 'species1'"
+        words = KICKS[kind].format(kt) + whose
+        groups.append(f"&drive kind = '{kind}' interval = {step} {words} /")
         driven |= kind in ("noise", "active")
         baths += [kt] if kind in ("brownian", "andersen") else []
     falls, sheared = sides[1] == "wall" and maybe(0.15), set(sides) == {"periodic"} and maybe(0.15)
@@ -192,14 +194,17 @@ def drawn_gas(rng) -> DrawnGas:
         first = f"&run seed = {rng.integers(10**6)} / {box_of} {' '.join(more[:1])} /"
         return "\n".join([first, *kinds, *more[1:], stop, f"&output observables_every_{cadence} /"])
 
+    rule = rng.choice(["velocity", "normal"])
     law = f"&contact restitution = {xi} wall_restitution = 1 tangential_restitution = {beta}"
+    law += f" wall_rule = '{rule}'"
     law += f" contact_time = {free_time / 100} /" if xi < 1 or abs(beta) < 1 else " /"
     settles = xi == 1 and abs(beta) == 1 and not (driven or sheared) and len(set(baths)) < 2
-    return DrawnGas(
-        text(400, mass, pull, law, *groups), text(800, (1, 1)), settles,
-        settles and not (falls or obstructed), beta > -1,
-        (sides == "periodic") & [True, not falls] & (not obstructed), baths[0] if baths else None,
-    )  # fmt: skip
+    kept = (sides == "periodic") & [True, not falls] & (not obstructed)
+    if beta > -1 and rule == "normal":  # rough sides
+        kept &= kept[::-1]
+    fluid = settles and not (falls or obstructed)
+    texts = text(400, mass, pull, law, *groups), text(800, (1, 1))
+    return DrawnGas(*texts, settles, fluid, beta > -1, kept, baths[0] if baths else None)
 
 
 @pytest.mark.parametrize("systems", [12, pytest.param(400, marks=pytest.mark.check)])
