@@ -566,37 +566,40 @@ LOSSY = {"restitution": 0.9}
 WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1"}
 MIXED = {"packing": "0.1 temperature = 2 / &species name = 'b' count = 9 packing_fraction = 0.1"}
-EQUAL = "melting is that of "
+UNEVEN = {
+    "sides": "'wall', 'periodic' / &side name = 'left' temperature = 1 / "
+    "&side name = 'right' temperature = 2"
+}
+SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "equipartition")
 
 
 @pytest.mark.parametrize(
-    ("script", "unusual", "said"),
+    ("unusual", "refused"),
     [
-        ("transport", WALLS, "in a periodic box"),
-        ("transport", LOSSY, "elastic"),
-        ("transport", {"log": ".false."}, "event_log"),
-        ("transport", {"length": 12}, "eight collisions"),
-        ("transport", {"cadence": "frames_every_collisions = 500"}, "frames_every_time"),
-        ("correlations", LOSSY, "draw them"),
-        ("correlations", FALLING, "falls"),
-        ("correlations", MIXED, "not equal disks"),
-        ("equation_of_state", LOSSY, "not elastic"),
-        ("equation_of_state", FALLING, "falls"),
-        ("equation_of_state", MIXED, "not of one radius"),
-        *(("melting", unusual, EQUAL) for unusual in (WALLS, FALLING, MIXED)),
-        ("rough", LOSSY, "equal rough disks"),
-        ("equipartition", {}, "needs "),
-        ("mixture", {}, "needs "),
+        (WALLS, {"transport": "in a periodic box", "melting": "has walls"}),
+        ({"log": ".false."}, {"transport": "event_log"}),
+        ({"length": 12}, {"transport": "eight collisions"}),
+        ({"cadence": "frames_every_collisions = 500"}, {"transport": "frames_every_time"}),
+        (LOSSY, dict.fromkeys(SETTLED, "not elastic") | {"rough": "equal rough disks"}),
+        (LOSSY | {"log": ".false."}, {"rates": "not elastic", "correlations": "draw them"}),
+        (LOSSY | MIXED, {"mixture": "not elastic"}),
+        (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
+        (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
+        (MIXED, {"correlations": "not equal disks", "equation_of_state": "not of one radius"}),
+        (MIXED, {"melting": "disks of different mass or radius"}),
+        ({}, {"equipartition": "needs ", "mixture": "needs "}),
     ],
 )
-def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, script, unusual, said):
+def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, unusual, refused):
     """In one line, beside a run that it is for where it compares them."""
-    usual = [gas("usual", length=20).path] if script == "correlations" or unusual is MIXED else []
     path = gas(**{"length": 20} | unusual).path
-    assert run_script(script, *usual, path, "-o", tmp_path / "no.png") in (1, 2)
-    words = capsys.readouterr().err
-    assert words.startswith(f"{script}.py: ") and words.count("\n") == 1
-    assert said in words and str(path) in words
+    for script, said in refused.items():
+        compared = script == "correlations" or unusual is MIXED
+        usual = [gas("usual", length=20).path] if compared else []
+        assert run_script(script, *usual, path, "-o", tmp_path / "no.png") in (1, 2)
+        words = capsys.readouterr().err
+        assert words.startswith(f"{script}.py: ") and words.count("\n") == 1
+        assert said in words and str(path) in words
 
 
 # --- fields ---

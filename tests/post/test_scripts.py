@@ -456,15 +456,6 @@ def falling(path, rng, temperature=0.7, frames=400, dynamics="events", drift=0.0
     return write_run(path, x, v, **kinds, **more)
 
 
-def pairs_of_runs(folder, rng):
-    """By events and by steps, of two seeds."""
-    return [
-        falling(folder / f"{how}_{k}.h5", rng, dynamics=how, seed=k, hits=10 - k * step)
-        for step, how in enumerate(("events", "steps"))
-        for k in (1, 2)
-    ]
-
-
 def test_gravity_slopes_are_those_of_the_laws(tmp_path, rng):
     run = read_run(falling(tmp_path / "run.h5", rng))
     frames = thermodynamics.frames_from(run, thermodynamics.start_of_equilibrium(run, 40))
@@ -545,28 +536,6 @@ def test_runs_with_equal_seeds_are_compared_and_others_named(tmp_path, rng, caps
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):
             missed.compare(runs, 2.0)
-
-
-def bulk(folder, rng):
-    """Ten seeds of a gas in a periodic box."""
-    return [gas(folder / f"{k}.h5", rng, periodic=(True, True)) for k in range(10)]
-
-
-@pytest.mark.parametrize(
-    ("script", "made"),
-    [
-        ("mixture", lambda folder, rng: [mixed(folder / "a.h5", rng)]),
-        ("missed", pairs_of_runs),
-        *(
-            (name, lambda p, rng: [falling(p / "a.h5", rng)])
-            for name in ("gravity", "equipartition")
-        ),
-        *((name, bulk) for name in ("rates", "equation_of_state", "melting", "coverage")),
-    ],
-)
-def test_what_loses_energy_has_no_means_in_equilibrium(tmp_path, rng, capsys, script, made):
-    said = refusal(capsys, script, *map(made_to_cool, made(tmp_path, rng)), code=1)
-    assert "is not elastic: it loses energy in collisions" in said
 
 
 # --- frames, paths, export, times ---
