@@ -8,8 +8,8 @@ reach, flow u (mean of v by mass), kT (mean of m c^2 / 2, c = v - u), kT_rot (me
 disks that can turn, the stress that disks carry (sum of m c_a c_b over the area) and the heat that
 they carry (sum of m c^2 c / 2); what collisions hand on over the distance of two centres comes on
 top of both.  u changes within a cell as it does from cell to cell.  Frames count after --skip, or
-in the second half of a run.  Errors are over blocks of time, each three memories long, of all runs
-of one input (docs/theory.md); cells that fewer than two blocks saw a disk in are left out.
+in the second half of a run.  Errors are over blocks of time of all runs of one input
+(docs/theory.md); cells in which fewer than two of them saw a disk are left out.
 
 Across equal disks between two walls, dashed: what the fluxes of momentum and energy at the walls
 say by Enskog's viscosity and conductivity (Gass 1971) and the equation of state, from temperature

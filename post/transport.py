@@ -7,7 +7,7 @@ log (output.event_log), from which the Helfand moments of momentum and energy fo
 for D frames that are equally far apart in time.
 
 Small panels: half of the slope of the mean square of a moment between neighbouring lags, over
-Enskog's coefficient; bands are standard errors over the runs.  For D half the integral of
+Enskog's coefficient; bands are errors over the runs.  For D half the integral of
 <v(0) v(s)> from 0 to t.  Right, and in the table: the means between half a lag and that lag, with
 errors from the series of their values.  The lag is 20 mean free times, or an eighth of the run;
 that of D is the time in which sound crosses the box, as in correlations.py.
@@ -16,10 +16,10 @@ Enskog's coefficients (Gass 1971) are those with the pair correlation at contact
 theory takes the velocities of disks that meet for independent.  Unless the gas is dense that is
 good to some per cent for viscosity and conductivity, not for D.  In two dimensions none of them has
 a limit for late times in large boxes.  N disks that share a fixed energy have a conductivity that
-is lower by about 6 / N of it, viscosities by less (docs/theory.md).
+is lower by about 6 / N of it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
 """
 
-from ricochet.drawing import band, caption, colours, plt
+from ricochet.drawing import COLOURS, band, caption, colours, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 from ricochet.statistics import combined
 from ricochet.transport import MEMORY, Found, coefficients, enskog
@@ -54,7 +54,8 @@ def draw(results: Results, rows: list[dict]) -> plt.Figure:
     """All coefficients over Enskog's, against the lag and against packing."""
     layout = [["viscosity", "conductivity", "all"], ["bulk_viscosity", "D", "all"]]
     figure, panels = plt.subplot_mosaic(layout, figsize=(13, 7), width_ratios=(1, 1, 1.3))
-    for (eta, found), colour in zip(results, colours(len(results)), strict=True):
+    scale = colours(len(results), len(COLOURS))  # packing; at the right colours are coefficients
+    for (eta, found), colour in zip(results, scale, strict=True):
         line = {"color": colour, "lw": 1, "marker": ".", "ms": 3, "label": f"η = {eta:.3g}"}
         for name, one in found.items():
             band(panels[name], *one.curve, **line)

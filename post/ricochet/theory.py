@@ -52,7 +52,7 @@ def scattering_angle(b: np.ndarray, mass_ratio: float = np.inf, restitution: flo
 
 # Steady T_rot / T of cooling rough disks, moment of inertia m r^2 / 2, no friction limit, by direct
 # simulation of the Boltzmann equation (10^5 disks, errors 0.002): (xi, beta) -> ratio.
-ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055}
+ROUGH_RATIOS = {(0.9, 0.0): 0.4439, (0.9, 0.8): 1.0055, (0.85, 0.3): 0.708}
 
 
 def rough_rates(xi: float, beta: float, inertia: float) -> tuple[float, float, float]:
