@@ -125,6 +125,8 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
 def memory(series: np.ndarray) -> float:
     """1 + 2 tau, tau the integrated autocorrelation time in samples: as many count as one.
 
+    Less than 1, but at least a tenth, where samples make up for each other, as hits of a wall do.
+
     The window of the sum and the correction for the unknown mean are those of U. Wolff, Comput.
     Phys. Commun. 156, 143 (2004), with S = 1.5.  Sums that end at the first negative term, as
     libraries have them, give too small errors for series as short as these.
@@ -138,7 +140,7 @@ def memory(series: np.ndarray) -> float:
         tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
         if np.exp(-lag / tau) < tau / np.sqrt(lag * count):
             break
-    return max(1.0, found) * (1 + (2 * lag + 1) / count)
+    return max(0.1, found) * (1 + (2 * lag + 1) / count)
 
 
 def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
@@ -161,7 +163,7 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
     early, late = (half.mean() for half in np.array_split(rest, 2))
     samples = min(float(len(rest)), float(np.var(rest)) / error**2)
-    interval = error * float(student(free))
+    interval = error * float(student(min(free, len(coarse))))
     return SeriesMean(mean, interval, samples, float(late - early) / (2 * error))
 
 
@@ -199,7 +201,7 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
     mean, error, *_ = np.array(means).T
     if len(means) < 2 or not np.all(error > 0):
         return 1.0
-    return float(scipy.stats.chi2.sf(np.sum(((mean - mean.mean()) / error) ** 2), len(mean) - 1))
+    return float(scipy.stats.chi2.sf(len(mean) * np.var(mean) / np.mean(error**2), len(mean) - 1))
 
 
 def drifts(mean: SeriesMean) -> bool:

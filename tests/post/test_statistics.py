@@ -133,6 +133,14 @@ def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(noise, mem
     assert np.mean([one.error for one in means]) == pytest.approx(1.1 * exact, rel=0.12)
 
 
+def test_what_samples_make_up_for_is_no_error(noise):
+    """As of a wall, whose disks give it what they have: a sum that stays bounded."""
+    series = np.diff(noise.normal(size=(400, 641))) + 0.1 * noise.normal(size=(400, 640))
+    means = [statistics.series_mean(one) for one in series]
+    held = np.mean([abs(one.mean) < one.error for one in means])
+    assert 0.6 <= held <= 0.85
+
+
 def test_equilibrium_begins_where_a_drift_has_died_out(noise):
     decay = 20 * np.exp(-np.arange(4000) / 200)
     starts = [statistics.equilibration(remembering(noise, 4000, 3) + decay) for _ in range(40)]
