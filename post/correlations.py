@@ -59,11 +59,15 @@ class Found(NamedTuple):
 def check(run: Run, first: Run) -> None:
     """Refuse what is not alike everywhere; lags mean nothing without equal intervals of time."""
     allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
+    if run.count < 3:
+        raise RunError(f"{run.path}: needs three disks and more")
     if equal_disks(run) != equal_disks(first):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
     steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)
     settled = first.nature.in_equilibrium
-    even = not settled or np.ptp(steps) <= 1e-6 * steps[0]  # the last may be out of step
+    even = (
+        not settled or len(steps) == 0 or np.ptp(steps) <= 1e-6 * steps[0]
+    )  # the last may be out of step
     if run.frames < 10 or not even:
         how = ", written by frames_every_time" if settled else ""
         raise RunError(f"{run.path}: needs 10 frames and more{how}")

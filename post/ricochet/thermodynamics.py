@@ -256,6 +256,8 @@ def steps(run: Run, skip: float | None = None) -> Steps:
         for name in ("collisions", "virial", "wall_collisions", "wall_impulse")
     )
     collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
+    if not collisions.any():
+        raise RunError(f"{run.path}: has no collisions of two disks in equilibrium")
     time = time[first:]
     if run.nature.keeps_kinetic_energy:
         kt = np.full(len(time), kt_at_start(run))
