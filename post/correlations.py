@@ -63,11 +63,9 @@ def check(run: Run, first: Run) -> None:
         raise RunError(f"{run.path}: needs three disks and more")
     if equal_disks(run) != equal_disks(first):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
-    steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)
+    steps = np.diff(run.time[:-1] if run.frames > 2 else run.time)  # the last may be out of step
     settled = first.nature.in_equilibrium
-    even = (
-        not settled or len(steps) == 0 or np.ptp(steps) <= 1e-6 * steps[0]
-    )  # the last may be out of step
+    even = not settled or len(steps) == 0 or np.ptp(steps) <= 1e-6 * steps[0]
     if run.frames < 10 or not even:
         how = ", written by frames_every_time" if settled else ""
         raise RunError(f"{run.path}: needs 10 frames and more{how}")

@@ -57,18 +57,12 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     return Approach(time, light, heavy, gap, thermalisation_time(time, gap, within))
 
 
-def late_mean(run: Run, name: str, skip: float | None) -> float:
-    """Mean of an observable in equilibrium."""
-    time, value = run.observable(name)
-    return float(value[time >= start_of_equilibrium(run, skip)].mean())
-
-
-def late_energy(runs: list[Run], which: int, skip: float | None) -> Estimate:
-    """Mean over runs of K in equilibrium; 0 the lightest, 1 the heaviest."""
+def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
+    """Mean over runs of an observable in equilibrium."""
     means = []
     for run in runs:
-        name = run.names[lightest_and_heaviest(run)[which]]
-        means.append(late_mean(run, f"{name}/kinetic_energy", skip))
+        time, value = run.observable(name)
+        means.append(value[time >= start_of_equilibrium(run, skip)].mean())
     return estimate(means)
 
 
@@ -111,11 +105,13 @@ def main() -> None:
     groups, rows, notes = grouped(args.runs, start_width), [], []
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):
-        energy = [late_mean(run, "total_energy", args.skip) / run.count for run in runs]
         row = {"v0": v0, "runs": len(runs), "T_therm": found.thermalisation}
-        row |= measured("energy", estimate(energy))
-        row |= measured("K_light", late_energy(runs, 0, args.skip))
-        rows.append(row | measured("K_heavy", late_energy(runs, 1, args.skip)))
+        total = late(runs, "total_energy", args.skip)
+        row |= measured("energy", Estimate(*(part / runs[0].count for part in total)))
+        for which, kind in zip(("light", "heavy"), lightest_and_heaviest(runs[0]), strict=True):
+            name = f"{runs[0].names[kind]}/kinetic_energy"
+            row |= measured(f"K_{which}", late(runs, name, args.skip))
+        rows.append(row)
         if np.isnan(found.thermalisation):
             known, share = 2 * np.median(found.gap.error) <= args.within, f"{100 * args.within:g} %"
             why = f"the difference of the energies is not known to {share}, take more runs"

@@ -72,20 +72,14 @@ def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
 
 
 def crowded_heights(
-    height: np.ndarray,
-    species: list[Samples],
-    pull: float,
-    temperature: float,
-    width: float,
-    share: float,
+    height: np.ndarray, species: list[Samples], pull: float, kt: float, width: float, share: float
 ) -> list[np.ndarray]:
     """Densities at the heights (H,), with the area that disks take from each other.
 
-    `width` is that of the box for centres, `share` the number of `sharers`.  A disk does not crowd
-    itself.
+    `width` is that of the box for centres, `share` as of `sharers`.  A disk does not crowd itself.
     """
     numbers = [s.height.shape[1] for s in species]
-    ideal = [sharing(s.mass * pull * height, temperature, share) for s in species]
+    ideal = [sharing(s.mass * pull * height, kt, share) for s in species]
     density = [normalised(height, weight) for weight in ideal]
     for _ in range(50):
         taken = [  # area per height, by the other disks from one of each species

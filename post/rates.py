@@ -74,7 +74,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
         return time, np.sum(value.reshape(len(time), -1) * scale, axis=1)
 
     def ideal(run: Run) -> tuple[np.ndarray, np.ndarray]:
-        time, kt = td.kt_in_time(run)
+        _, time, kt = td.kt_in_time(run)
         carried = run.count / area * td.between(time, kt)[1]
         return time, np.append(0, np.cumsum(carried))
 

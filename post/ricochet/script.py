@@ -104,19 +104,14 @@ class Parser(argparse.ArgumentParser):
 
 def distinct(runs: list[Run]) -> list[Run]:
     """Each run once: one that ends as another, to the last digit, says nothing of its own."""
-    found: dict[bytes, Run] = {}
-    twins = []
+    found: dict[bytes, list[Run]] = {}
     for run in runs:
-        ending = hashlib.blake2b(run.time[-1:].tobytes())
-        for part in (run.position[-1], run.velocity[-1], run.mass, run.radius):
-            ending.update(part.tobytes())
-        if found.setdefault(ending.digest(), run) is not run:
-            twins.append((run, found[ending.digest()]))
-    for run, other in twins[:1]:
-        more = f", and {len(twins) - 1} more" if len(twins) > 1 else ""
-        words = f"{run.path} is the same run as {other.path}: left out{more}"
-        print(f"warning: {words}", file=sys.stderr)
-    return list(found.values())
+        parts = run.time[-1:], run.position[-1], run.velocity[-1], run.mass, run.radius
+        ending = hashlib.blake2b(b"".join(part.tobytes() for part in parts))
+        found.setdefault(ending.digest(), []).append(run)
+    if twins := [str(run.path) for _, *others in found.values() for run in others]:
+        print(f"warning: left out, the same as another run: {', '.join(twins)}", file=sys.stderr)
+    return [same for same, *_ in found.values()]
 
 
 def joined(words: Iterable[str]) -> list[str]:

@@ -13,14 +13,12 @@ import numpy as np
 
 from . import hard_disks
 from .nature import ROUNDING, SETTLED, allow
-from .reader import SIDES, Run, RunError, Series, Species
+from .reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
-KICKED = {"noisy", "bathed", "active"}
 MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
-#: Beside equal smooth disks that keep their energy, those with a pressure of one phase in an empty
-#: box.
+#: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
 FLUID = ("thermal", "bathed", "rough", "turning", "mixture")
 
 
@@ -124,9 +122,8 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 def conserved(run: Run) -> np.ndarray:
     """(2,) along which axes nothing ever changes the total momentum."""
-    if run.obstacles or len(run.walls) or run.nature & {"sheared", "changed"}:
-        return np.zeros(2, dtype=bool)
-    if run.nature & KICKED and not run.parameter("drive", "keep_momentum", False):
+    kicked = run.kicked and not run.parameter("drive", "keep_momentum", False)
+    if kicked or run.nature & {"obstructed", "sheared", "changed"}:
         return np.zeros(2, dtype=bool)
     kept = run.periodic & (run.gravity == 0)
     if run.nature & {"thermal", "rough", "turning"}:  # sides may change what is along them
@@ -159,19 +156,13 @@ def kt_at_start(run: Run) -> float:
     return float(kt_of(run, run.kinetic_energy(0).sum()))
 
 
-def better_track(run: Run) -> str:
-    """Where kT is looked up: at the observables, or at the frames if there are too few of those."""
-    few = len(run.collisions_per_disk.time) < min(run.frames, 2 * FEWEST)
-    return "frames" if few else "observables"
-
-
-def kt_in_time(run: Run) -> Series:
-    """The kT of each sample."""
-    if better_track(run) == "observables":
-        time, energy = run.observable("all/kinetic_energy")
-        return Series(time, kt_of(run, run.count * energy))
+def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
+    """Times and kT of the observables, or of the frames if there are too few of those."""
+    time, energy = run.observable("all/kinetic_energy")
+    if len(time) >= min(run.frames, 2 * FEWEST):
+        return "observables", time, kt_of(run, run.count * energy)
     energy = np.array([run.kinetic_energy(k).sum() for k in range(run.frames)])
-    return Series(run.time, kt_of(run, energy))
+    return "frames", run.time, kt_of(run, energy)
 
 
 def temperature(run: Run, skip: float | None = None) -> SeriesMean:
@@ -182,10 +173,9 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     """
     if run.nature.keeps_kinetic_energy:
         return SeriesMean(kt_at_start(run), 0.0, np.inf, 0.0)
-    start, (time, kt) = start_of_equilibrium(run, skip), kt_in_time(run)
+    start, (track, time, kt) = start_of_equilibrium(run, skip), kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
-    cadence = f"{better_track(run)}_every_time"
-    if run.parameter("output", cadence) is None and "falling" not in run.nature:
+    if run.parameter("output", f"{track}_every_time") is None and "falling" not in run.nature:
         return series_mean(kt**0.5, kt**-0.5)
     return series_mean(*between(time, kt)[::-1])
 
@@ -268,19 +258,19 @@ def steps(run: Run, skip: float | None = None) -> Steps:
     return Steps(step, mean, collisions, virial, hits.sum(axis=1), impulse)
 
 
-def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """An amount, what it is to be divided by, and a factor: its mean per time over kT^power.
+def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.ndarray]:
+    """Two series: the ratio of their means is that of an amount per time, over kT^power.
 
-    To first order, so that the error knows how the amount follows a kT that changes.
+    To first order, so that its error knows how the amount follows a kT that changes.
     """
     kt = float(np.average(s.kt, weights=s.time))
-    return amount, s.time * (1 + power * (s.kt / kt - 1)), kt**-power
+    return amount * kt**-power, s.time * (1 + power * (s.kt / kt - 1))
 
 
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Series whose ratio of means is Z - 1, by the virial."""
-    amount, per, factor = over_kt((s := steps(run, skip)).virial, s, 1)
-    return factor / (2 * run.count) * amount, per
+    s = steps(run, skip)
+    return over_kt(s.virial / (2 * run.count), s, 1)
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
@@ -297,11 +287,10 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the collision rate; equal masses."""
     s = steps(run, skip)
-    amount, per, factor = over_kt(s.collisions, s, 0.5)
     turning = run.count / 2 if run.nature & {"rough", "turning"} else 0.0
     share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
     unit = hard_disks.collision_rate(2.0, 2 * run.radius[0], share, 1.0, run.mass[0])
-    return series_mean(amount, per).scaled(2 * factor / (run.count * unit), 1.0)
+    return series_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.count * unit), 1.0)
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
@@ -309,8 +298,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
-    amount, per, factor = over_kt(work, s, 1)
-    return series_mean(amount, per).scaled(factor / (2 * run.count))
+    return series_mean(*over_kt(work, s, 1)).scaled(1 / (2 * run.count))
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
