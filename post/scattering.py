@@ -11,6 +11,7 @@ last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, ka
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, plt
+from ricochet.nature import allow
 from ricochet.script import command_line, launch, report
 from ricochet.theory import scattering_angle
 
@@ -27,6 +28,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 def scattering(run: Run) -> dict[str, float]:
     """Impact parameter and deflection of the disk that moves at the start."""
+    allow(run, "the law is for two smooth disks that meet freely", "lossy", "turning", "mixture")
     i, k = moving_and_resting(run)
     v, w = run.velocity[0][i], run.velocity[-1][i]
     gap = run.position[0][k] - run.position[0][i]
@@ -71,7 +73,12 @@ def main() -> None:
     first = args.runs[0]
     moving, resting = moving_and_resting(first)
     figure = draw(rows, first.mass[resting] / first.mass[moving], first.restitution)
-    report(args, figure, rows)
+    notes = [
+        f"{run.path.name}: hits of sides are in the angle; stop the run before"
+        for run in args.runs
+        if run.observable("wall_collisions").value[-1].any()
+    ]
+    report(args, figure, rows, notes=notes)
 
 
 if __name__ == "__main__":

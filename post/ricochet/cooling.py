@@ -37,7 +37,9 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     """
     names = ("all", *runs[0].names)
     for run in runs:
-        allow(run, "it does not cool by itself", *(TRAITS.keys() - SOURCES - {"collapsed"}))
+        allow(
+            run, "it does not cool by itself", *(TRAITS.keys() - SOURCES - {"collapsed", "falling"})
+        )
     energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
     first = np.mean([tracks[0, 0] for tracks in energy])
     left = [tracks / tracks[0, 0] for tracks in energy]

@@ -180,14 +180,14 @@ def equilibration(series: np.ndarray) -> int:
 
 
 def combined(means: Sequence[SeriesMean]) -> SeriesMean:
-    """The mean over independent runs; their scatter counts where their errors do not explain it.
+    """The mean over independent runs; their scatter counts where errors do not explain it, or lack.
 
     Samples add up, but where the scatter counts a run is one sample; drifts that agree grow.
     """
     runs = len(means)
     mean, error, samples, drift = np.array(means).T
     size, own = samples.sum(), np.sqrt(np.sum(error**2)) / runs
-    if scatter_p(means) < UNLIKELY:
+    if scatter_p(means) < UNLIKELY or np.isnan(own):
         size, own = runs, estimate(mean).error
     return SeriesMean(mean.mean(), float(own), float(size), float(drift.sum() / np.sqrt(runs)))
 
