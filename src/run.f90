@@ -8,8 +8,8 @@ module run
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: describe_system
-  use kinds, only: int64, real64
-  use observables, only: total_energy
+  use kinds, only: int64, never, real64
+  use observables, only: energies
   use output, only: output_t, planned_bytes
   use partners, only: n_sides
   use progress_line, only: progress_line_t
@@ -22,7 +22,7 @@ module run
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, legible, size_text, written
-  use timeline, only: advance_once
+  use timeline, only: advance_once, passed_collapse
   implicit none
   private
   public :: perform_run
@@ -84,6 +84,7 @@ contains
       if (error%code == exit_files) error%message = error%message//"; --resume goes on from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
+      if (run%sim%tally%collapse < never .and. .not. command%quiet) write (error_unit, "(a)") "note: "//note(run)
       call print_text(summary(run), error)
     end if
     call run%output%release()
@@ -240,16 +241,19 @@ contains
   function summary(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
+    real(real64) :: energy(3)                         ! of translation, of rotation, total
 
     associate (sim => run%sim)
+      energy = energies(sim)
       text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
         eol//"collisions = "//written(sim%tally%collisions)// &
         eol//"wall_collisions = "//written(sum(sim%tally%hits(:n_sides)))// &
         eol//"obstacle_collisions = "//written(sum(sim%tally%hits(n_sides + 1:)))// &
         eol//"time = "//written(sim%time())// &
-        eol//"kinetic_energy = "//written(sim%kinetic_energy())// &
-        eol//"total_energy = "//written(total_energy(sim))// &
+        eol//"kinetic_energy = "//written(energy(1))
+      if (sim%with%rotation) text = text//eol//"rotational_energy = "//written(energy(2))
+      text = text//eol//"total_energy = "//written(energy(3))// &
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
@@ -259,15 +263,19 @@ contains
     if (note(run) /= "") text = text//eol//"note = "//note(run)
   end function summary
 
-  !> Why the run ended if no stop rule was met; else empty.
+  !> What a reader of the results should know: a collapse, and why the run ended if no stop rule was met; else empty.
   function note(run) result(text)
     type(run_t), intent(in) :: run
     character(len=:), allocatable :: text
 
-    text = ""
+    text = passed_collapse(run%sim)
     if (run%stop_rule%met(run%sim)) return
-    text = "no further events are possible"
-    if (run%stop_rule%too_cold(run%sim)) text = coldness//", below which rounding errors dominate"
+    if (text /= "") text = text//"; "
+    if (run%stop_rule%too_cold(run%sim)) then
+      text = text//coldness//", below which rounding errors dominate"
+    else
+      text = text//"no further events are possible"
+    end if
     text = text//": the run ended before its stop rule was met"
   end function note
 

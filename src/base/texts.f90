@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: counted, size_text
+  public :: about, counted, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -256,6 +256,18 @@ contains
       text = written((bytes + 500000)/1000000)//" MB"
     end if
   end function size_text
+
+  !> A number with three significant digits.
+  pure function about(number) result(text)
+    real(real64), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=12) :: buffer
+    real(real64) :: rounded
+
+    write (buffer, "(es12.2e3)") number
+    read (buffer, *) rounded
+    text = written(rounded)
+  end function about
 
   !> `1 value`, `2 values`
   pure function counted(number, noun) result(text)

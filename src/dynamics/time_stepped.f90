@@ -16,7 +16,7 @@ module time_stepped
   use near_pairs, only: near_pairs_t
   use partners, only: axis_of, n_sides, nothing, sense_of
   use simulation_state, only: simulation_t
-  use texts, only: written
+  use texts, only: about
   implicit none
   private
   public :: time_stepped_t
@@ -91,6 +91,7 @@ contains
     self%turns_left = limits%turns
     k = steps_taken(sim%now, self%dt)
     do while (self%turns_left > 0)
+      self%arrived = .not. sim%now < limits%time    ! a step is one moment, whatever ends there
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time) then
@@ -286,19 +287,6 @@ contains
       text = text//"contact.contact_time: inelastic disks sink into each other and the floor unless it " &
         //"is more than run.dt"
     end if
-  contains
-
-    !> A number with three significant digits.
-    pure function about(number) result(text)
-      real(real64), intent(in) :: number
-      character(len=:), allocatable :: text
-      character(len=12) :: buffer
-      real(real64) :: rounded
-
-      write (buffer, "(es12.2e3)") number
-      read (buffer, *) rounded
-      text = written(rounded)
-    end function about
   end function warning
 
 end module time_stepped

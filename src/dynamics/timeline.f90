@@ -10,9 +10,10 @@ module timeline
   use kinds, only: int32, int64, never, real64
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
+  use texts, only: about, counted, written
   implicit none
   private
-  public :: advance, advance_once, next_kick
+  public :: advance, advance_once, next_kick, passed_collapse
 
 contains
 
@@ -118,12 +119,37 @@ contains
     else
       restitution = sim%box%surface(1 - code)%law%restitution
     end if
-    text = "; "//trim(merge("raise", "set  ", sim%law%contact_time > 0)) &
-      //" contact.contact_time (TC model), well below the mean time between collisions"
+    text = "; "//longer_contacts(sim)
     if (restitution < 1) text = text//", or raise " &
       //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
     if (code <= 0 .and. sim%box%falling()) text = text//"; a disk that starts at rest on a wall never leaves it: " &
       //"start it higher, or take run.dynamics = 'steps'"
   end function remedy
+
+  !> What is to be said of a collapse that a run has passed; empty if there was none.
+  pure function passed_collapse(sim) result(text)
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (sim%tally%collapse < never) text = "passed an inelastic collapse, in " &
+      //counted(sim%tally%stuck, "collision")//" that took no time, the first at time "//written(sim%tally%collapse) &
+      //": rounding decides what follows; "//longer_contacts(sim)
+  end function passed_collapse
+
+  !> The advice to let contacts last: so much longer than the collapse, and so much shorter than flights, as is known.
+  pure function longer_contacts(sim) result(text)
+    type(simulation_t), intent(in) :: sim
+    character(len=:), allocatable :: text
+    real(real64), parameter :: share = 0.01_real64
+    integer(int64) :: contacts                     ! of all disks
+    real(real64) :: proposal                       ! [time]
+
+    text = trim(merge("raise", "set  ", sim%law%contact_time > 0))//" contact.contact_time (TC model)"
+    contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%stuck
+    proposal = share*sim%time()*sim%n_disks()/max(contacts, 1_int64)
+    if (proposal > sim%law%contact_time) text = text//", say to "//about(proposal)
+    text = text//", well below the mean time between collisions"
+  end function longer_contacts
 
 end module timeline

@@ -18,7 +18,7 @@ module cadence
     integer(int64) :: count = 0                   !! samples taken; the first is due at once
     real(real64) :: next(3) = never               !! time, collisions and events at which the next are due
     real(real64) :: last_time = -1.0_real64       !! of the last sample [time]
-    integer(int64) :: last_events = -1
+    integer(int64) :: last_events = -1            !! that had happened then, collisions and kicks
   contains
     procedure :: is_due
     procedure :: is_new
@@ -75,7 +75,7 @@ contains
     type(simulation_t), intent(in) :: sim
     logical :: yes
 
-    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events /= self%last_events
+    yes = self%count == 0 .or. sim%time() > self%last_time .or. sim%tally%events + sim%kicks /= self%last_events
   end function is_new
 
   !> Counts a sample taken now.
@@ -85,7 +85,7 @@ contains
 
     self%count = self%count + 1
     self%last_time = sim%time()
-    self%last_events = sim%tally%events
+    self%last_events = sim%tally%events + sim%kicks
     call self%look_ahead(sim)
   end subroutine take
 

@@ -29,7 +29,7 @@ module checkpoint
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides
 
-  integer, parameter :: layout = 6                !! of the checkpoints; another one is not understood
+  integer, parameter :: layout = 7                !! of the checkpoints; another one is not understood
   character(len=*), parameter :: eol = new_line("a"), slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
   integer, parameter :: none = 0
@@ -379,6 +379,8 @@ contains
       associate (tally => sim%tally)
         call record%exchange(tally%events)
         call record%exchange(tally%collisions)
+        call record%exchange(tally%stuck)
+        call record%exchange(tally%collapse)
         call exchange_sums(tally%sum)
         call record%exchange(tally%hits)
         do k = 1, size(tally%at_surface, 1)

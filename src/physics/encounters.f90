@@ -5,7 +5,7 @@ module encounters
   use collisions, only: pair_impulse, tangential_impulse
   use disks, only: image_column, land, mass_column
   use event_log, only: event_log_t
-  use free_flight, only: flight
+  use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
   use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
@@ -41,10 +41,10 @@ contains
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
-      call sim%bring(second, t)
+      call sim%turn(second, t)
     end if
-    call sim%bring(first, t)
-    v = sim%disk(first)%v
+    call sim%turn(first, t)
+    v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
     if (code > 0) then
       call collide_pair(sim, i, code, t, counts)
       if (sim%law%grip%is_rough()) &
@@ -67,7 +67,7 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally
-    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
+    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j, before
     integer(int32) :: si, sj
     logical :: elastic
 
@@ -80,6 +80,7 @@ contains
       call sim%make_contact(j, t, elastic)
       if (elastic) restitution = 1
     end if
+    before = min(sim%disk(i)%clock, sim%disk(j)%clock)
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
@@ -100,16 +101,32 @@ contains
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! by rounding
+    if (counts) then
+      sim%tally%events = sim%tally%events + 1
+      sim%tally%collisions = sim%tally%collisions + 1
+      call sim%tally%sum(virial)%add(-q*distance2)
+      if (restitution < 1) then
+        call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
+        if (.not. before < t) call note_stuck(sim, i, j, t)
+      end if
+    end if
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
     sim%tag(j)%met = sim%tag(i)%id
-    if (.not. counts) return
-    sim%tally%events = sim%tally%events + 1
-    sim%tally%collisions = sim%tally%collisions + 1
-    call sim%tally%sum(virial)%add(-q*distance2)
-    if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
+
+  !> Counts a lossy collision of two disks that have both had one at this very time. Many disks of a lattice may have that;
+  !> but if two of them have hit each other then, and part no more, it is a collapse.
+  pure subroutine note_stuck(sim, i, j, t)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+
+    sim%tally%stuck = sim%tally%stuck + 1
+    if (sim%tag(i)%met == sim%tag(j)%id .or. sim%tag(j)%met == sim%tag(i)%id) &
+      sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
+  end subroutine note_stuck
 
   !> The tangential part of a collision of the rough disks i and j, whose velocities along the normal have changed already.
   subroutine rub(sim, i, j, normal_impulse, counts)

@@ -9,7 +9,7 @@ module observables
   use tally, only: dissipated, drive_energy, gain, heat, impulse, stress, virial, work
   implicit none
   private
-  public :: observable_list_t, observed, own_names, total_energy
+  public :: observable_list_t, observed, own_names, energies
 
   integer, parameter :: most_components = 4
 
@@ -161,14 +161,14 @@ contains
   end function own_names
 
   !> Energy of all kinds, of all disks.
-  pure function total_energy(sim)
+  pure function energies(sim)
     type(simulation_t), intent(in) :: sim
-    real(real64) :: total_energy
+    real(real64) :: energies(3)                   !! of translation, of rotation, total [energy]
     real(real64) :: sums(lost, 0:size(sim%species))
 
     call add_up(sim, sums)
-    total_energy = total(sim, sums(:, 0))
-  end function total_energy
+    energies = [sums(kinetic, 0), sums(rotational, 0), total(sim, sums(:, 0))]
+  end function energies
 
   !> The same from the sums.
   pure function total(sim, sums)

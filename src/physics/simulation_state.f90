@@ -69,6 +69,7 @@ module simulation_state
     procedure :: spin
     procedure :: spin_up
     procedure :: bring
+    procedure :: turn
     procedure :: make_contact
     procedure :: inertia_of
     procedure :: kinetic_energy
@@ -271,13 +272,21 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
 
-    if (self%with%rotation) then
-      associate (angle => self%extra(self%row(angle_column), i))
-        angle = angle + self%spin(i)*(t - self%disk(i)%clock)
-      end associate
-    end if
+    call self%turn(i, t)
     call land(self%disk(i), self%box%gravity, t)
   end subroutine bring
+
+  !> Turns disk i as far as it is turned at the time t, to which it is about to be taken.
+  pure subroutine turn(self, i, t)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: t
+
+    if (.not. self%with%rotation) return
+    associate (angle => self%extra(self%row(angle_column), i))
+      angle = angle + self%spin(i)*(t - self%disk(i)%clock)
+    end associate
+  end subroutine turn
 
   !> Disk i makes contact at the time t, which is elastic if its last contact is not over yet (TC model).
   pure subroutine make_contact(self, i, t, elastic)

@@ -2,7 +2,7 @@
 !> in whatever parts of a simulation, they are gathered.
 module tally
   use exact_sums, only: exact_sum_t
-  use kinds, only: int64, real64
+  use kinds, only: int64, never, real64
   implicit none
   private
   public :: tally_t
@@ -32,6 +32,8 @@ module tally
   type :: tally_t
     integer(int64) :: events = 0                   !! collisions of any kind
     integer(int64) :: collisions = 0               !! of pairs
+    integer(int64) :: stuck = 0                    !! of these, see `encounters: note_stuck`
+    real(real64) :: collapse = never               !! the first moment of a collapse, since the start of the run [time]
     type(exact_sum_t) :: sum(size(sums))
     integer(int64), allocatable :: hits(:)         !! (surfaces) collisions at each
     type(exact_sum_t), allocatable :: at_surface(:, :)     !! (3,surfaces) impulse along x, y; gain
@@ -90,6 +92,8 @@ contains
 
     self%events = self%events + other%events
     self%collisions = self%collisions + other%collisions
+    self%stuck = self%stuck + other%stuck
+    self%collapse = min(self%collapse, other%collapse)
     self%sum%units = self%sum%units + other%sum%units
     self%hits = self%hits + other%hits
     self%at_surface%units = self%at_surface%units + other%at_surface%units
@@ -101,6 +105,8 @@ contains
 
     self%events = 0
     self%collisions = 0
+    self%stuck = 0
+    self%collapse = never
     self%sum%units = 0
     self%hits = 0
     self%at_surface%units = 0

@@ -1,7 +1,8 @@
 !> What changes in the state when a disk hits a surface of the box.
 module wall_hits
-  use kinds, only: int32, real64
-  use box_geometry, only: strike_velocity, surface_velocity, wall_normal
+  use kinds, only: int32, never, real64
+  use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
+  use box_sides, only: side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: land, spin_column
   use partners, only: is_side
@@ -11,6 +12,8 @@ module wall_hits
   implicit none
   private
   public :: collide_wall
+
+  real(real64), parameter :: while_parted = 0.4_real64    !! contact times for which a disk that rests on a surface leaves it
 
 contains
 
@@ -38,6 +41,7 @@ contains
     else
       sim%disk(i)%v = wall_rebound(law, v - strike, normal, elastic)
       if (any(abs(strike) > 0)) sim%disk(i)%v = sim%disk(i)%v + strike   ! never behind the side: rounded sums keep order
+      if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
@@ -63,6 +67,28 @@ contains
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
     if (sim%with%rotation) sim%extra(sim%row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine leave_thermally
+
+  !> Parts disk i from a surface on which it rests: with restitution 0 nothing is left that the TC model could keep, and the
+  !> next hit would come at once, for ever. The disk gets the speed that keeps it away for a while, within a factor of two.
+  pure subroutine part(sim, i, code, normal)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
+    real(real64), intent(in) :: normal(2)        !! from the wall to the disk
+    real(real64) :: speed, t
+    integer(int32) :: met
+
+    associate (disk => sim%disk(i), contact_time => sim%law%contact_time)
+      speed = epsilon(speed)*disk%radius/contact_time
+      do while (speed < disk%radius/contact_time)
+        t = never
+        if (is_side(code)) t = side_time(sim%box, disk, code)
+        if (.not. is_side(code)) call next_obstacle(sim%box, disk, code, [code], t, met)
+        if (t - disk%clock > while_parted*contact_time) exit
+        disk%v = disk%v + speed*normal
+        speed = 2*speed
+      end do
+    end associate
+  end subroutine part
 
   !> The tangential part of a hit of disk i on a rough wall; the velocity along the normal has changed already.
   pure subroutine rub_wall(sim, i, grip, normal, u, before)
