@@ -187,7 +187,8 @@ contains
     if (self%is_part) counts = self%tracks%counts(sim%tag, i, code)
     if (code > 0) then
       if (sim%disk(code)%stamp == sim%tag(i)%partner_stamp) then
-        if (self%thorough .or. sim%tag(i)%met == sim%tag(code)%id) then  ! seldom
+        ! Equal clocks are rare: of two that are together, or that have both had a collision at this very time.
+        if (self%thorough .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
           call collide_pair(sim, i, code, t, counts)

@@ -41,6 +41,7 @@ contains
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
+      if (counts .and. .not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) call note_stuck(sim, i, code, t)
       call sim%turn(second, t)
     end if
     call sim%turn(first, t)
@@ -67,7 +68,7 @@ contains
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally
-    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j, before
+    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
     integer(int32) :: si, sj
     logical :: elastic
 
@@ -80,7 +81,6 @@ contains
       call sim%make_contact(j, t, elastic)
       if (elastic) restitution = 1
     end if
-    before = min(sim%disk(i)%clock, sim%disk(j)%clock)
     call land(sim%disk(i), sim%box%gravity, t)
     call land(sim%disk(j), sim%box%gravity, t)
     dx = sim%disk(j)%x - sim%disk(i)%x
@@ -101,28 +101,25 @@ contains
     sim%disk(j)%v = sim%disk(j)%v - (q/mass_j)*dx
     dv = sim%disk(j)%v - sim%disk(i)%v
     if (dx(1)*dv(1) + dx(2)*dv(2) < 0) call keep_apart(sim, i, j)    ! by rounding
-    if (counts) then
-      sim%tally%events = sim%tally%events + 1
-      sim%tally%collisions = sim%tally%collisions + 1
-      call sim%tally%sum(virial)%add(-q*distance2)
-      if (restitution < 1) then
-        call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
-        if (.not. before < t) call note_stuck(sim, i, j, t)
-      end if
-    end if
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(j)%collisions = sim%tag(j)%collisions + 1
     sim%tag(i)%met = sim%tag(j)%id
     sim%tag(j)%met = sim%tag(i)%id
+    if (.not. counts) return
+    sim%tally%events = sim%tally%events + 1
+    sim%tally%collisions = sim%tally%collisions + 1
+    call sim%tally%sum(virial)%add(-q*distance2)
+    if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
 
-  !> Counts a lossy collision of two disks that have both had one at this very time. Many disks of a lattice may have that;
-  !> but if two of them have hit each other then, and part no more, it is a collapse.
+  !> Counts a collision of two disks that have both had one at this very time, if it is lossy: by the TC model it is not. In
+  !> a lattice many may have that; but if two have hit each other then, and do so again, it is a collapse.
   pure subroutine note_stuck(sim, i, j, t)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
 
+    if (sim%law%contact_time > 0 .or. .not. sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species) < 1) return
     sim%tally%stuck = sim%tally%stuck + 1
     if (sim%tag(i)%met == sim%tag(j)%id .or. sim%tag(j)%met == sim%tag(i)%id) &
       sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)

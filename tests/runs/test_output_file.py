@@ -167,12 +167,18 @@ def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
     assert differences(tmp_path / "one.h5", tmp_path / "two.h5") == []
 
 
-def test_the_summary_says_what_the_file_says(ricochet, tmp_path):
-    run = ricochet(write_input(tmp_path), "-o", "gas.h5")
+@pytest.mark.parametrize("turn", ["", "species.light.angular_velocity=9"])
+def test_the_summary_says_what_the_file_says(ricochet, tmp_path, turn):
+    run = ricochet(write_input(tmp_path), "-o", "gas.h5", *(["--set", turn] if turn else []))
     said = dict(line.split(" = ") for line in run.stdout.splitlines())
     found = contents(tmp_path / "gas.h5")
     for name in ("total_energy", "dissipated_energy", "collisions"):
         assert float(said[name]) == pytest.approx(found[f"/observables/{name}/value"][-1], rel=1e-6)
+    for name in ("kinetic_energy", *["rotational_energy"] * bool(turn)):
+        mean = found[f"/observables/all/{name}/value"][-1]
+        count = len(found["/particles/disks/mass"])
+        assert float(said[name]) == pytest.approx(count * mean, rel=1e-6)
+    assert ("rotational_energy" in said) == bool(turn)
     rate = found["/provenance@collisions_per_second"]
     assert float(said["collisions_per_second"]) == pytest.approx(rate, rel=1e-6)
 

@@ -96,7 +96,8 @@ class Draw:
         words = f"&run seed = {self.rng.randint(0, 10**6)}"
         if self.steps:
             width = math.sqrt(math.prod(self.edges) * self.packing / self.disks)
-            words += f" dynamics = 'steps' dt = {0.1 * width / self.speed!r}"
+            self.step = 0.1 * width / self.speed
+            words += f" dynamics = 'steps' dt = {self.step!r}"
         return words + " /"
 
     def box(self) -> str:
@@ -329,6 +330,8 @@ class Draw:
         rng = self.rng
         flight = math.sqrt(math.prod(self.edges) / self.disks) / self.speed
         interval = flight * 10.0 ** rng.uniform(-1, 2)
+        if self.steps and self.chance(0.5):
+            interval = self.step * rng.randint(1, 5)  # each at the end of a step
         energy = self.speed**2 * 10.0 ** rng.uniform(-2, 1)
         turn = self.maybe(0.7, f"rotational_diffusion = {rng.choice([0.1, 10]) / flight!r}")
         words = rng.choice(
