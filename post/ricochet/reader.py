@@ -372,7 +372,8 @@ class Run:
         """Why this is not a run that went on until a stop rule was met; empty if it is."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
-            return f"{self.path.name} ended early: {note}" if note else ""
+            early = "" if note.startswith("passed") else "ended early: "
+            return f"{self.path.name} {early}{note}" if note else ""
         state = f"broke off: {note}" if note else "is unfinished: going on, stopped, or broken off"
         return f"{self.path.name} {state}; last frame at t = {self.time[-1]:.6g}"
 

@@ -257,16 +257,14 @@ contains
     end if
   end function size_text
 
-  !> A number with three significant digits.
+  !> A positive number with three significant digits.
   pure function about(number) result(text)
     real(real64), intent(in) :: number
     character(len=:), allocatable :: text
-    character(len=12) :: buffer
-    real(real64) :: rounded
+    real(real64) :: unit
 
-    write (buffer, "(es12.2e3)") number
-    read (buffer, *) rounded
-    text = written(rounded)
+    unit = 10.0_real64**(floor(log10(number)) - 2)
+    text = written(anint(number/unit)*unit)
   end function about
 
   !> `1 value`, `2 values`

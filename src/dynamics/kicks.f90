@@ -2,7 +2,7 @@
 !> alone, so that it matters neither in which order disks are kicked nor how the run has come there.
 module kicks
   use kinds, only: int32, pi, real64
-  use disks, only: angle_column, spin_column
+  use disks, only: angle_column, land, spin_column
   use drive, only: active, andersen, noise
   use exact_sums, only: exact_sum_t
   use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
@@ -78,7 +78,8 @@ contains
         is_hit = u < drive%fraction
       end if
       if (.not. is_hit) return
-      call sim%bring(i, sim%now)
+      call sim%turn(i, sim%now)
+      call land(sim%disk(i), sim%box%gravity, sim%now)
       sim%tag(i)%met = 0
       call stream%draw_normals(z)
       if (drive%kind == noise) then

@@ -4,7 +4,7 @@ module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: angle_column, columns, contact_column, disk_t, image_column, land, mass_column, n_columns, species_by_id, &
+  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, species_by_id, &
     species_t, spin_column, tag_t
   use drive, only: drive_t
   use features, only: features_t
@@ -68,7 +68,6 @@ module simulation_state
     procedure :: velocity
     procedure :: spin
     procedure :: spin_up
-    procedure :: bring
     procedure :: turn
     procedure :: make_contact
     procedure :: inertia_of
@@ -266,17 +265,7 @@ contains
     end associate
   end subroutine spin_up
 
-  !> Takes disk i to where it is at the time t, and turns it.
-  pure subroutine bring(self, i, t)
-    class(simulation_t), intent(inout) :: self
-    integer(int32), intent(in) :: i
-    real(real64), intent(in) :: t
-
-    call self%turn(i, t)
-    call land(self%disk(i), self%box%gravity, t)
-  end subroutine bring
-
-  !> Turns disk i as far as it is turned at the time t, to which it is about to be taken.
+  !> Turns disk i as far as it is turned at the time t, before `disks: land` takes it there.
   pure subroutine turn(self, i, t)
     class(simulation_t), intent(inout) :: self
     integer(int32), intent(in) :: i
@@ -321,7 +310,6 @@ contains
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
-    if (.not. self%with%rotation) return
     do i = 1, self%n_disks()
       energy = energy + 0.5_real64*self%inertia_of(i)*self%spin(i)**2
     end do
@@ -339,7 +327,7 @@ contains
   pure subroutine start_sums(self)
     class(simulation_t), intent(inout) :: self
 
-    if (self%tally%has_units() .or. self%n_disks() == 0) return
+    if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
     call self%choose_units()
   end subroutine start_sums

@@ -40,7 +40,6 @@ module tally
   contains
     procedure :: make_room
     procedure :: choose_units
-    procedure :: has_units
     procedure :: total
     procedure :: include
     procedure :: clear
@@ -67,14 +66,6 @@ contains
     call self%at_surface(:gain - 1, :)%choose_unit(bound(impulses))
     call self%at_surface(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
-
-  !> Whether the units have been chosen.
-  pure function has_units(self) result(yes)
-    class(tally_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%sum(1)%per_one > 0
-  end function has_units
 
   !> A sum so far.
   elemental function total(self, k)

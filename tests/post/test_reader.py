@@ -287,6 +287,7 @@ def test_every_script_draws_a_running_simulation():
     [
         ("a.h5", "", ""),
         ("a.h5", "cooled to nothing", "a.h5 ended early: cooled to nothing"),
+        ("a.h5", "passed a collapse", "a.h5 passed a collapse"),
         ("a.h5.part", "", "a.h5.part is unfinished: going on, stopped, or broken off"),
         ("a.h5.part", "an inelastic collapse", "broke off: an inelastic collapse; last"),
     ],

@@ -307,6 +307,7 @@ class Draw:
         rng = self.rng
         restitution = rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()])
         words = f"&contact restitution = {restitution}"
+        self.drifts = self.drifts or (restitution < 1 and any(self.periodic))
         if self.kinds > 1 and self.chance(0.4):
             table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(3)] for _ in range(3)]
             kinds = range(self.kinds)
