@@ -2,7 +2,7 @@
 
     python post/cooling.py runs/cooling/*.h5 -o cooling.png --csv cooling.csv
 
-Runs are combined by restitution xi; lines are means over the runs, bands are standard errors.  K is
+Runs are combined by restitution xi; lines are means over the runs, bands are errors.  K is
 per disk and in units of its start value over all disks.  The lowest row shows the temperature ratio
 of the heaviest to the lightest species, 1 in equilibrium; not for equal masses.  The table has all
 curves, against collisions per disk in the same units, against time in those of the input.

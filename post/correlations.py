@@ -3,7 +3,7 @@
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
 Disks in an empty box, without gravity.  Runs are combined by packing fraction; lines are means over
-the runs, bands are standard errors, those of a single run for the structure alone, from blocks of
+the runs, bands are errors, those of a single run for the structure alone, from blocks of
 its frames. Frames must be equally far apart in time; lags are logarithmic, every frame is an
 origin. Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Times
 are in units of the mean free time 1/w, lengths of the mean diameter.  Of runs that have no

@@ -5,7 +5,7 @@
 The four parameters are read from each run.  Runs that differ in one of them make a curve against
 it; there is a curve for every combination of the other three, and a panel for every parameter that
 varies so.  A run without such a partner is named, in print and on the figure.  Points: means over
-the runs, bars: standard errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
+the runs, bars: errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
 restitution, the fraction of normal energy lost in a collision); the exponents are printed, with
 chi^2 per degree of freedom, and a fit that misses its points says so.  Open symbols are left out of
 the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the

@@ -128,7 +128,7 @@ def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figur
         figure.colorbar(image, ax=axes, label=LABELS[name], shrink=0.8)
         arrows = axes.quiver(*places(run, cells).T, *(part.ravel() for part in flow), **scale)
         key = {"labelpos": "E", "color": "black", "coordinates": "axes"}
-        axes.quiverkey(arrows, 0.05, 1.04, top, f"flow {top:.2g}", **key)
+        axes.quiverkey(arrows, 0.1, 1.04, top, f"flow {top:.2g}", **key)
     figure.suptitle(titled(runs))
     return figure
 

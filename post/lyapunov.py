@@ -7,8 +7,8 @@ point, with frames at the same times.  The distance of a pair is that of all pos
 periodic sides too.  It grows as exp(lambda t) until it is as large as the billiard; a straight line
 is fitted to its logarithm for each pair, over a time that is the same for all: it ends when the
 first pair is --largest apart, and begins at the share --fit-from of that time (before, the
-separation turns into the direction that grows).  lambda is the mean of the slopes, its error their
-standard error.  A gas that cools has no such rate.
+separation turns into the direction that grows).  lambda is the mean of the slopes, with its error.
+A gas that cools has no such rate.
 """
 
 from typing import NamedTuple

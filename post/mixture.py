@@ -3,7 +3,7 @@
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
 Equilibrium is found, or begins after --skip; it takes the frames of --frames that are at least
---apart collisions per disk from each other.  Errors are standard errors over the runs (of a single
+--apart collisions per disk from each other.  Errors are those over the runs (of a single
 run: from the autocorrelation over its frames).
 Theory: each species has <K> = kT and <v> = sqrt(pi kT / 2 m); in a periodic box <K> is smaller by
 the share of the disk in the mass of all.  kT is exact where the kinetic energy is kept; where walls

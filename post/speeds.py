@@ -138,7 +138,7 @@ def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -
 
 
 def draw_relaxation(axes: plt.Axes, groups: list) -> None:
-    """a2 against collisions per disk, mean and standard error over the runs."""
+    """a2 against collisions per disk, mean and error over the runs."""
     equal = True
     for (count, runs), colour in zip(groups, colours(len(groups)), strict=True):
         tracks = [relaxation(run) for run in runs]

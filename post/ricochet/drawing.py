@@ -282,13 +282,13 @@ def move_marks(marks: LineCollection, run: Run, frame: int) -> None:
 
 
 def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
-    """A line with its standard error."""
+    """A line with its error."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
 
 
 def bars(axes: plt.Axes, height: Estimate, bins: np.ndarray, **style) -> None:
-    """A histogram with its standard errors."""
+    """A histogram with its errors."""
     axes.stairs(height.mean, bins, **style)
     middle = (bins[1:] + bins[:-1]) / 2
     axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)

@@ -218,7 +218,8 @@ def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
     x, y = run.velocity[frames].reshape(-1, 2).T
     x = x - run.shear_rate * (place[:, 1] - run.edges[1] / 2)
     square = mass * (x**2 + y**2) / 2
-    dense = 1 / np.array(areas)[np.tile(run.species - 1, len(frames)), cell]
+    area = np.array(areas)[np.tile(run.species - 1, len(frames)), cell]
+    dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # beyond a moving side
     carried = [mass * x, mass * y, mass * x * x, mass * x * y, mass * y * y, square * x, square * y]
     turning = 0 * mass
     if "angular_velocity" in run.elements:
