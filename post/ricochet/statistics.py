@@ -122,10 +122,10 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
 
-def memory(series: np.ndarray) -> float:
+def memory(series: np.ndarray, least: float = 0.1) -> float:
     """1 + 2 tau, tau the integrated autocorrelation time in samples: as many count as one.
 
-    Less than 1, but at least a tenth, where samples make up for each other, as hits of a wall do.
+    Below 1, but not below `least`, where samples make up for each other, as hits of a wall do.
 
     The window of the sum and the correction for the unknown mean are those of U. Wolff, Comput.
     Phys. Commun. 156, 143 (2004), with S = 1.5.  Sums that end at the first negative term, as
@@ -140,7 +140,7 @@ def memory(series: np.ndarray) -> float:
         tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
         if np.exp(-lag / tau) < tau / np.sqrt(lag * count):
             break
-    return max(0.1, found) * (1 + (2 * lag + 1) / count)
+    return max(least, found) * (1 + (2 * lag + 1) / count)
 
 
 def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
@@ -157,7 +157,8 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
         return SeriesMean(mean, np.nan, float(len(amount)), 0.0)
     rest = (amount - mean * per) / np.mean(per)
     coarse = cells(rest, COARSE)
-    free = len(coarse) / memory(coarse)
+    least = min(1.0, memory(cells(rest, FINE)))  # few cells may seem to make up for each other
+    free = len(coarse) / memory(coarse, least)
     error = float(np.std(coarse, ddof=1) / np.sqrt(free))
     if not error > 0:
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
