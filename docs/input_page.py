@@ -20,7 +20,9 @@ GROUPS = {
     "species": "Disks of one kind; repeated for each.",
     "contact": "What happens at a contact.",
     "drive": "Kicks: random changes of velocity at fixed intervals.",
-    "stop": "When the run ends: at the first of these that is met. At least one is needed.",
+    "stop": "When the run ends: at the first of these that is met. At least one is needed. Where "
+    "nothing can happen any more and no `time` is given, it ends at the last collision, or at the "
+    "sample that is due after it.",
     "output": "What is written, and when. The initial and the final state are always written. "
     "Averages over samples by collisions or events differ from those over time by a part of the "
     "order 1/N ([output](output.md#observables)).",

@@ -307,13 +307,15 @@ class Draw:
         rng = self.rng
         restitution = rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()])
         words = f"&contact restitution = {restitution}"
-        self.drifts = self.drifts or (restitution < 1 and any(self.periodic))
         if self.kinds > 1 and self.chance(0.4):
             table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(3)] for _ in range(3)]
             kinds = range(self.kinds)
             pairs = [table[min(a, b)][max(a, b)] for a in kinds for b in kinds]
             words += f" pair_restitution = {numbers(*pairs)}"
-        words += self.maybe(0.5, f"wall_restitution = {rng.choice([0, 1, 0.9, rng.random()])}")
+        on_walls = rng.choice([0, 1, 0.9, rng.random()])
+        words += self.maybe(0.5, f"wall_restitution = {on_walls}")
+        if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
+            self.drifts = True  # or comes to rest: without a time the run ends at some sample
         if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
         if self.turns:
