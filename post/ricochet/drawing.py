@@ -140,20 +140,20 @@ def aspect_of(run: Run) -> float:
     return height / width
 
 
-def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> list:
+def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
 
     Sides that move are drawn where they are at this time [their own places], what lies beyond them
-    grey; `move_sides` moves what is returned.  Walls that heat or slide say so.
+    grey.  Walls that heat or slide say so.
     """
     low, high = run.room
+    (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.sides_at(time)
+    lines = [(x0, y0), (x0, y1)], [(x1, y0), (x1, y1)], [(x0, y0), (x1, y0)], [(x0, y1), (x1, y1)]
     styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
-    sides = LineCollection([], linestyles=styles, clip_on=False, zorder=3, **WALL)
-    inside, grey = Rectangle((0, 0), 0, 0, facecolor="white", zorder=-1), {"facecolor": "0.85"}
+    sides, grey = {"linestyles": styles, "clip_on": False, "zorder": 3}, {"facecolor": "0.85"}
     axes.add_patch(Rectangle(low, *(high - low), zorder=-2, **grey))
-    axes.add_patch(inside)
-    axes.add_collection(sides)
-    move_sides([sides, inside], run, time)
+    axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", zorder=-1))
+    axes.add_collection(LineCollection(lines, **sides, **WALL))
     for wall in run.walls:
         for shift in periods(run):
             axes.plot(*(wall + shift).T, zorder=3, **WALL)
@@ -176,7 +176,6 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> list:
     axes.label_outer()
     axes.spines[:].set_visible(False)
     name_walls(axes, run)
-    return [sides, inside]
 
 
 def name_walls(axes: plt.Axes, run: Run) -> None:
@@ -207,15 +206,6 @@ def name_walls(axes: plt.Axes, run: Run) -> None:
         )
 
 
-def move_sides(drawn: list, run: Run, time: float | None) -> None:
-    """To where they are at another time; `drawn` is what `draw_box` returns."""
-    sides, inside = drawn
-    (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.sides_at(time)
-    corners = np.array([(x0, y0), (x0, y1), (x1, y0), (x1, y1)])
-    sides.set_segments(corners[[(0, 1), (2, 3), (0, 2), (1, 3)]])  # in the order of their styles
-    inside.set_bounds(x0, y0, x1 - x0, y1 - y0)
-
-
 def periods(run: Run) -> np.ndarray:
     """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
     along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
@@ -237,48 +227,31 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
-    """Disks of true size at `position` (N, 2) and their periodic images, see `move_disks`."""
-    colours = {name: style.pop(name) for name in ("array", "facecolors") if name in style}
-    style = {"linewidths": 0, "units": "xy", "offset_transform": axes.transData, **style}
-    collection = EllipseCollection([], [], [], offsets=np.empty((0, 2)), **style)
-    move_disks(collection, run, position, **colours)
-    axes.add_collection(collection)
-    return collection
+    """Disks of true size at `position` (N, 2) and their periodic images.
 
-
-def move_disks(
-    collection: EllipseCollection,
-    run: Run,
-    position: np.ndarray,
-    array: np.ndarray | None = None,
-    facecolors: Sequence | None = None,
-) -> None:
-    """To `position` (N, 2); `array` (N,) colours them by value, or else `facecolors`."""
+    Of their style `array` (N,) colours them by value, or else `facecolors`.
+    """
     which, places = with_images(run, position)
-    collection.set(offsets=places, angles=np.zeros(len(which)))
-    collection.set(widths=2 * run.radius[which], heights=2 * run.radius[which])
-    if array is not None:
-        collection.set_array(np.asarray(array)[which])
-    if facecolors is not None:
-        collection.set_facecolors(np.asarray(facecolors)[which])
+    size, flat = 2 * run.radius[which], np.zeros(len(which))
+    for name in style.keys() & {"array", "facecolors"}:
+        style[name] = np.asarray(style[name])[which]
+    style = {"linewidths": 0, "units": "xy", "offset_transform": axes.transData, **style}
+    disks = EllipseCollection(size, size, flat, offsets=places, **style)
+    axes.add_collection(disks)
+    return disks
 
 
 def radius_marks(axes: plt.Axes, run: Run, frame: int) -> LineCollection | None:
     """A radius of each disk that shows how it has turned; None where disks have no orientation."""
     if "orientation" not in run.elements:
         return None
-    marks = LineCollection([], colors="black", linewidths=0.6, zorder=1.5)
-    move_marks(marks, run, frame)
-    axes.add_collection(marks)
-    return marks
-
-
-def move_marks(marks: LineCollection, run: Run, frame: int) -> None:
-    """To another frame."""
     which, places = with_images(run, run.position[frame])
     angle = run.orientation[frame][which]
     rim = run.radius[which] * np.array([np.cos(angle), np.sin(angle)])
-    marks.set_segments(np.stack([places, places + rim.T], axis=1))
+    lines = np.stack([places, places + rim.T], axis=1)
+    marks = LineCollection(lines, colors="black", linewidths=0.6, zorder=1.5)
+    axes.add_collection(marks)
+    return marks
 
 
 def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import player
 from ricochet import read_run
-from ricochet.drawing import draw_box, move_sides, plt
+from ricochet.drawing import draw_box, plt
 from ricochet.reader import SIDES
 from synthetic_run import maxwell_velocities, run_script, write_run, written
 from whole_runs import wait_for
@@ -397,10 +397,10 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     touched = place[hits + 1, events.i[hits] - 1, axis] - rim
     np.testing.assert_allclose(touched, sides[hits + 1, -events.j[hits]], atol=1e-9)
     axes = plt.figure().add_subplot()
-    drawn = draw_box(axes, run, run.time[-1])
     for k in (-1, len(lower) // 2):
-        move_sides(drawn, run, run.time[k])
-        segments = np.array(drawn[0].get_segments())
+        axes.clear()
+        draw_box(axes, run, run.time[k])
+        segments = np.array(axes.collections[0].get_segments())
         assert np.all(segments.min((0, 1)) == lower[k]) and np.all(segments.max((0, 1)) == upper[k])
     assert np.array_equal(np.transpose([axes.get_xlim(), axes.get_ylim()]), run.room)
     plt.close()
