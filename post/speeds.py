@@ -19,62 +19,26 @@ collisions per disk.
 a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
-from typing import NamedTuple
-
 from ricochet import Run, RunError
 from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.nature import TRAITS, allow
 from ricochet.script import command_line, grouped, late_frames, launch, measured, report
-from ricochet.speeds import (
-    all_move,
-    exact_law,
-    independent_frames,
-    kt_of_frames,
-    reduced_speeds,
-    relaxation,
-)
-from ricochet.statistics import (
-    Estimate,
-    SeriesMean,
-    binned,
-    combined,
-    drifts,
-    grows,
-    estimate,
-    hold_against,
-    series_mean,
-    to_error,
-)
+from ricochet.speeds import all_move, exact_law, independent_frames, kt_of_frames
+from ricochet.speeds import reduced_speeds, relaxation
+from ricochet.statistics import Estimate, SeriesMean, binned, combined, drifts, estimate, grows
+from ricochet.statistics import hold_against, series_mean, to_error
 from ricochet.theory import RELAXATION, maxwell_cdf, maxwell_pdf
 
 import numpy as np
 
 BINS = np.linspace(0, 3, 51)  # u = 1 lies inside a bin
+#: What the late frames of all runs are, in words; the first two have one kT.
+EQUILIBRIUM, STEADY = "Equilibrium, many frames", "Steady state, many frames"
+COOLING, MOVING = "No equilibrium: each frame at its own kT", "Sides move: each frame at its own kT"
+UNSTEADY = "No steady kT yet: each frame at its own"
 
 
-class Pool(NamedTuple):
-    """The late frames of the runs with the same number of disks."""
-
-    density: Estimate  # (B,) of reduced speeds
-    row: dict  # the tests
-
-
-class State(NamedTuple):
-    """What the late frames of all runs are, in words, and whether each has a kT for itself."""
-
-    late: str
-    way: str = "The way there"
-    each: bool = True
-
-
-COOLING = State("No equilibrium: each frame at its own kT")
-MOVING = State("Sides move: each frame at its own kT")
-UNSTEADY = State("No steady kT yet: each frame at its own")
-EQUILIBRIUM = State("Equilibrium, many frames", "The way to equilibrium", each=False)
-STEADY = State("Steady state, many frames", each=False)
-
-
-def state_of(run: Run) -> State:
+def state_of(run: Run) -> str:
     """That of the late frames, if nothing drifts."""
     known = set(TRAITS) - {"changed", "collapsed", "sliding"}
     allow(run, "its speeds are of no single state; see fields.py", *known)
@@ -90,16 +54,18 @@ def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, l
         for run, frames in zip(runs, picked, strict=True)
     ]
     kt = combined([series_mean(track) for track in tracks])
-    if all(np.ptp(track) <= 1e-9 * np.max(track) for track in tracks):
-        kt = kt._replace(error=0.0, drift=0.0)  # constant, however few there are
+    if all(run.nature.keeps_kinetic_energy for run in runs):
+        kt = kt._replace(error=0.0, drift=0.0)  # however few there are
     ends = [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
     return kt, ends, drifts(kt) or any(map(grows, tracks))
 
 
-def pooled(runs: list[Run], picked: list[list[int]], state: State, kts: tuple) -> Pool:
-    """The late frames of all runs."""
-    own = zip(runs, picked, strict=True)
-    u = np.concatenate([reduced_speeds(*one, each=state.each) for one in own])
+def pooled(
+    runs: list[Run], picked: list[list[int]], state: str, kts: tuple
+) -> tuple[Estimate, dict]:
+    """The late frames of runs with the same number of disks: density of speeds (B,), and tests."""
+    own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
+    u = np.concatenate([reduced_speeds(*one, each=each) for one in own])
     n = runs[0].count * sum(map(independent_frames, runs, picked))
     maxwell, law = hold_against(u, maxwell_cdf, independent=n), exact_law(runs[0])
     exact = hold_against(u, law, independent=n) if law else None
@@ -109,7 +75,7 @@ def pooled(runs: list[Run], picked: list[list[int]], state: State, kts: tuple) -
         "frames": sum(map(len, picked)),
         "speeds": len(u),
         "independent": n,
-        **(measured("kT", kts[0]) if state is not COOLING else {}),
+        **(measured("kT", kts[0]) if state != COOLING else {}),
         "kT_first": kts[1][0],
         "kT_last": kts[1][1],
         "mean_u": float(np.mean(u)),
@@ -122,7 +88,7 @@ def pooled(runs: list[Run], picked: list[list[int]], state: State, kts: tuple) -
         "KS_D_exact": exact and exact.ks,
         "KS_p_exact": exact and exact.ks_p,
     }
-    return Pool(binned(u, BINS, n), row)
+    return binned(u, BINS, n), row
 
 
 def draw_histogram(axes: plt.Axes, heights: list[Estimate], labels: list[str]) -> None:
@@ -167,7 +133,7 @@ def cooling(row: dict) -> str:
     return f"kT {goes} from {row['kT_first']:.4g} to {row['kT_last']:.4g}"
 
 
-def label_of(row: dict, state: State) -> str:
+def label_of(row: dict, state: str) -> str:
     """The temperature and the tests in words."""
     size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
     words = f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
@@ -183,7 +149,7 @@ def chance(p: float) -> str:
     return "p < 0.0001" if p < 1e-4 else f"p = {min(p, 0.9999):.4f}"
 
 
-def draw(runs: list[Run], groups: list, pools: list[Pool], state: State) -> plt.Figure:
+def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
     """Four panels: start, last frame, late frames, relaxation."""
     figure, ((first, last), (late, way)) = plt.subplots(2, 2, figsize=(10, 7))
     largest = groups[-1][1][0]
@@ -194,13 +160,14 @@ def draw(runs: list[Run], groups: list, pools: list[Pool], state: State) -> plt.
         else:
             axes.set_axis_off()
             axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
-    draw_histogram(late, [pool.density for pool in pools], [label_of(p.row, state) for p in pools])
-    late.set_ylim(0, 1.1 + (0.6 if state.each else 0.4) * len(groups))
+    densities, rows = zip(*pools, strict=True)
+    draw_histogram(late, densities, [label_of(row, state) for row in rows])
+    late.set_ylim(0, 1.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(groups))
     draw_relaxation(way, groups)
     first.set_title("Start")
     last.set_title("One frame at the end")
-    late.set_title(state.late)
-    way.set_title(state.way)
+    late.set_title(state)
+    way.set_title("The way " + ("to equilibrium" if state == EQUILIBRIUM else "there"))
     figure.suptitle(caption(runs))
     return figure
 
@@ -221,14 +188,14 @@ def main() -> None:
         for (_, runs), own, kts in zip(groups, picked, found, strict=True)
     ]
     data, notes = {"u_low": BINS[:-1], "u_high": BINS[1:]}, []
-    for (count, _), pool in zip(groups, pools, strict=True):
-        data[f"density_N{count}"], data[f"density_error_N{count}"] = pool.density
+    for (count, _), (density, row) in zip(groups, pools, strict=True):
+        data[f"density_N{count}"], data[f"density_error_N{count}"] = density
         if state in (COOLING, UNSTEADY):
-            why = "loses energy, no equilibrium" if state is COOLING else "has no steady kT yet"
-            notes.append(f"N = {count}: {why}; {cooling(pool.row)}")
+            why = "loses energy, no equilibrium" if state == COOLING else "has no steady kT yet"
+            notes.append(f"N = {count}: {why}; {cooling(row)}")
     data["maxwell"] = np.diff(maxwell_cdf(BINS)) / np.diff(BINS)
     figure = draw(args.runs, groups, pools, state)
-    report(args, figure, [pool.row for pool in pools], data=data, notes=notes)
+    report(args, figure, [row for _, row in pools], data=data, notes=notes)
 
 
 if __name__ == "__main__":
