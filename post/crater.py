@@ -32,24 +32,19 @@ def draw_state(axes: plt.Axes, run: Run, frame: int, values: np.ndarray, limits:
     axes.set_title(f"t = {run.time[frame]:.4g}")
 
 
-def draw_hull(axes: plt.Axes, run: Run) -> None:
-    """The outline of the crater: hull of the first positions of the displaced disks."""
+def hull(run: Run) -> np.ndarray:
+    """(P, 2) outline of the first positions of the displaced disks; empty of hardly any."""
     points = run.position[0][displaced(run)]
-    if len(points) > 3:
-        hull = scipy.spatial.ConvexHull(points, qhull_options="QJ")  # QJ: also for a row
-        ring = points[hull.vertices]
-        axes.fill(*ring.T, fill=False, edgecolor=COLOURS[1], lw=1.4, zorder=4)
-        axes.plot([], [], color=COLOURS[1], lw=1.4, label="hull of the displaced disks")
-        axes.legend(loc="upper left")
+    if len(points) < 4:
+        return points[:0]
+    vertices = scipy.spatial.ConvexHull(points, qhull_options="QJ").vertices  # QJ: also for a row
+    return points[np.append(vertices, vertices[0])]
 
 
-def draw_hole(axes: plt.Axes, run: Run) -> None:
-    """The outline of the hole."""
-    outline = crater.hole(run)
-    if len(outline):
-        axes.plot(
-            *outline.T, color=COLOURS[1], lw=1.4, zorder=4, label="hole: less than half as dense"
-        )
+def draw_outline(axes: plt.Axes, ring: np.ndarray, label: str) -> None:
+    """A line around what the label says, if there is one."""
+    if len(ring):
+        axes.plot(*ring.T, color=COLOURS[1], lw=1.4, zorder=4, label=label)
         axes.legend(loc="upper left")
 
 
@@ -76,14 +71,12 @@ def draw_energy(axes: plt.Axes, run: Run) -> None:
 def draw(run: Run, size: Crater) -> plt.Figure:
     """Before, after, collisions per disk, energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
-    moved, limits = (
-        run.displacement(-1),
-        (0, drawing.scale_top(run, [run.frames - 1], "displacement")),
-    )
+    moved = run.displacement(-1)
+    limits = (0, drawing.scale_top(run, [run.frames - 1], "displacement"))
     draw_state(before, run, 0, moved, limits)
-    draw_hull(before, run)
+    draw_outline(before, hull(run), "hull of the displaced disks")
     draw_state(after, run, -1, moved, limits)
-    draw_hole(after, run)
+    draw_outline(after, crater.hole(run), "hole: less than half as dense")
     below = {"location": "bottom", "pad": 0.02}
     scale = plt.cm.ScalarMappable(plt.Normalize(*limits), "viridis")
     label = f"{LABELS['displacement']} at the end"
