@@ -243,14 +243,15 @@ def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
 
 
 def windows(time: np.ndarray, value: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middles and means of the windows of a series (T,); an incomplete last one is left out."""
+    """Middles and means of windows of a series (T,) that have samples; no incomplete last one."""
     count = max(1, int(np.floor((time[-1] - time[0]) / width + 1e-9)))
     if count > MOST_WINDOWS:
         raise ValueError(f"{count} windows of {width:g}")
     index = np.minimum(((time - time[0]) / width).astype(int), count)
     sums = np.bincount(index, value, count + 1)[:count]
     numbers = np.bincount(index, minlength=count + 1)[:count]
-    return time[0] + (np.arange(count) + 0.5) * width, sums / np.maximum(numbers, 1)
+    some = np.flatnonzero(numbers)
+    return time[0] + (some + 0.5) * width, sums[some] / numbers[some]
 
 
 def binned(values: np.ndarray, bins: np.ndarray, independent: int | None = None) -> Estimate:

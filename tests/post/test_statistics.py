@@ -170,3 +170,5 @@ def test_windows_are_means():
     middle, mean = statistics.windows(time, time, 2.0)
     np.testing.assert_allclose(middle, [1, 3, 5, 7, 9])
     np.testing.assert_allclose(mean, [0.95, 2.95, 4.95, 6.95, 8.95])
+    some = statistics.windows(time[::50], time[::50], 2.0)
+    np.testing.assert_allclose(some, [[1, 5], [0, 5]], err_msg="no window without samples")
