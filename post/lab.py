@@ -22,7 +22,7 @@ from urllib.parse import unquote
 from player import LIVE_ROOM, chosen_film, enclosed, filled, page, policy, text_of, texts
 from ricochet import Run, RunError
 from ricochet.drawing import disk_collection, draw_box, species_colours
-from ricochet.lab import Lab, Refused, edited
+from ricochet.lab import Lab, edited
 from ricochet.live import HTML, JSON, LOOK, NOT_FOUND, Handler, serving
 from ricochet.script import Parser, launch
 
@@ -42,7 +42,7 @@ class Answers(Handler):
     def found(self, path: str, query: str) -> tuple[int, str, bytes]:
         try:
             return self.answer(path.strip("/").split("/"), unquote(query))
-        except (Refused, RunError) as problem:
+        except RunError as problem:
             return 409, "text/plain; charset=utf-8", f"{problem}\n".encode()
         except FileNotFoundError:  # the program renames its file, or a newer run has replaced it
             return 409, "text/plain; charset=utf-8", b"the file is not there any more: try again\n"
@@ -88,7 +88,7 @@ class Answers(Handler):
         try:
             wish = json.loads(self.rfile.read(int(length)))
             body = json.dumps(actions[self.path](wish)).encode()
-        except (Refused, RunError) as problem:
+        except RunError as problem:
             return self.reply(409, "text/plain; charset=utf-8", f"{problem}\n".encode())
         except (AttributeError, LookupError, RecursionError, TypeError, ValueError):
             return self.send_error(400)  # it is no wish
@@ -110,7 +110,7 @@ def picture(lab: Lab, name: str) -> bytes:
     with drawing:  # one at a time: a form must not wait long
         run = lab.sample(name) if name in lab.inputs else None
         if run is None:
-            raise Refused("there is no picture")
+            raise RunError("there is no picture")
         figure, file = Figure(figsize=(1.6, 1.6), layout="none"), io.BytesIO()
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
         draw_box(axes, run, run.time[-1])

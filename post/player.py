@@ -32,6 +32,7 @@ from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, scale_top, values_of
 from ricochet.files import destination
 from ricochet.live import serve
+from ricochet.nature import KICKED
 from ricochet.paths import MOST_AT_ONCE, Paths
 from ricochet.reader import SIDES, amplitude, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
@@ -288,7 +289,7 @@ def film(
         "time": run.time[frames].tolist(),
         "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
-        "kicked": run.kicked,
+        "kicked": bool(run.nature & KICKED),
         "settles": run.nature.in_equilibrium,
         "gravity": run.gravity.tolist(),
         "lower": run.room[0].tolist(),

@@ -148,7 +148,7 @@ def main() -> None:
         draw_pressure(panels[0, 0], shown, means["pressure_virial"], start)
         curves = {(f"pressure_{way}(t)",): curve for way, curve in shown.items()}
     if paths:
-        draw_paths(panels[0, -1], paths, td.equal_disks(runs[0]))
+        draw_paths(panels[0, -1], paths, "mixture" not in runs[0].nature)
         curves["free_path_density",] = Curve((BINS[1:] + BINS[:-1]) / 2, *paths[1])
     figure.suptitle(f"{caption(runs)},  η = {td.packing(runs[0]):.4g}")
     rows = table(runs, start, means, paths and paths[0])

@@ -12,7 +12,7 @@ from . import hard_disks, theory
 from .nature import SOURCES, TRAITS, Refused, allow
 from .reader import Run
 from .statistics import Estimate, estimate
-from .thermodynamics import equal_disks, free_disks, kt_at_start, lightest_and_heaviest, packing
+from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
 
 Curves = dict[str, np.ndarray | Estimate]
 
@@ -74,7 +74,7 @@ def first_rate(run: Run) -> float:
     if not run.periodic.all() or "lossy" not in run.nature:
         state = "has walls" if "lossy" in run.nature else "does not cool"
         raise Refused(f"{run.path}: {state}; Haff's law is for disks that cool in a periodic box")
-    if not equal_disks(run):
+    if "mixture" in run.nature:
         return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
     kt = kt_at_start(run)

@@ -36,10 +36,6 @@ MEMORY = 2 << 30  # bytes of a run
 CHECK = 20  # seconds for a check, and for the samples that are shown with the inputs
 
 
-class Refused(Exception):
-    """A request that makes no sense, or comes at a wrong time; the message is one line."""
-
-
 # --- inputs, as the program understands them ---
 
 
@@ -155,14 +151,14 @@ class LabRun:
                 self.process.wait()
 
     def opened(self) -> Run:
-        """The run as it is; waits for its first frame.  Raises Refused if there is none."""
+        """The run as it is; waits for its first frame.  Raises RunError if there is none."""
         while True:
             over = not self.running
             for ending in (".h5", ".h5.part"):
                 with suppress(RunError):
                     return read_run(self.folder / f"{self.name}{ending}")
             if over:
-                raise Refused(self.said() or "the run has ended before its first frame")
+                raise RunError(self.said() or "the run has ended before its first frame")
             time.sleep(0.02)
 
     def problems(self) -> list[dict[str, str]]:
@@ -262,12 +258,12 @@ class Lab:
         self.sample_locks = {name: threading.Lock() for name in self.inputs}
 
     def new_page(self) -> str:
-        """The number of a new page; Refused if there are too many."""
+        """The number of a new page; RunError if there are too many."""
         with self.lock:
             silent = [number for number, page in self.pages.items() if page.silent]
             if len(self.pages) >= PAGES:
                 if not silent:
-                    raise Refused(f"{PAGES} pages are open, which is all that may be: close one")
+                    raise RunError(f"{PAGES} pages are open, which is all that may be: close one")
                 self.pages.pop(silent[0]).close()
             number = secrets.token_hex(8)
             (self.folder / number).mkdir()
@@ -278,7 +274,7 @@ class Lab:
         """The page of this number, which has just been heard of."""
         page = self.pages.get(number) if isinstance(number, str) else None
         if page is None:
-            raise Refused("the laboratory does not know this page any more: load it again")
+            raise RunError("the laboratory does not know this page any more: load it again")
         page.asked = time.monotonic()
         return page
 
@@ -378,7 +374,7 @@ class Lab:
         """A run of a page."""
         runs = {str(k): own for k, own in self.page(number).runs.items()}
         if run not in runs:
-            raise Refused("no such run")
+            raise RunError("no such run")
         return runs[run]
 
     def film(self, number: str, run: str, known: str) -> bytes:
@@ -396,7 +392,7 @@ class Lab:
     def form(self, name: str) -> dict:
         """What an input file gives, group by group, and how often frames are to be written."""
         if name not in self.inputs:
-            raise Refused("no such input")
+            raise RunError("no such input")
         head = self.inputs[name].read_text(errors="replace").split("\n&")[0]
         groups = [
             {
@@ -437,7 +433,7 @@ class Lab:
                     run.process.wait(CHECK / 4)
                 run.end()
                 self.samples[name] = None
-                with suppress(RunError, Refused):
+                with suppress(RunError):
                     self.samples[name] = run.opened()
             return self.samples[name]
 

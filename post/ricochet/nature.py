@@ -38,6 +38,8 @@ TRAITS = {
 }
 #: By which energy comes and goes, other than by being lost in collisions.
 SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed", "thermal"}
+#: With which velocities change between collisions, too.
+KICKED = {"noisy", "active", "bathed"}
 #: With which velocities do not settle to Maxwell's law.
 UNSETTLED = {*SOURCES, "uneven", "lossy"} - {"bathed", "thermal"}
 #: With which they do.

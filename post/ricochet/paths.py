@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import RunError
+from .nature import KICKED
 from .reader import Run
 
 CLOSE = 1e-3  # radii between where a path leads and where the disk is
@@ -103,7 +104,7 @@ class Paths:
         gain = self.run.mass[disk] * np.sum(kick * (before + t * g + 0.5 * kick), axis=1)
         goal = place[last] + (h - t[last]) * (after[last] + 0.5 * (h + t[last]) * g)
         guessed[disk[last]] = ~self.arrives(disk[last], goal, end[disk[last]])
-        guessed |= self.run.kicked
+        guessed |= bool(self.run.nature & KICKED)
         known = ~guessed[disk]
         self.most -= known.sum()
         return Turns(disk[known], time[known], place[known], gain[known], guessed)

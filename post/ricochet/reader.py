@@ -350,11 +350,6 @@ class Run:
         steps = self.parameter("run", "dynamics", "events") == "steps"
         return float(self.parameter("run", "dt")) if steps else 0.0
 
-    @property
-    def kicked(self) -> bool:
-        """Whether velocities change between collisions, too."""
-        return self.parameter("drive", "kind", "none") != "none"
-
     @cached_property
     def nature(self) -> Nature:
         """What kind of run this is: see `ricochet.nature`."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
-from .nature import ROUNDING, SETTLED, allow
+from .nature import KICKED, ROUNDING, SETTLED, allow
 from .reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
@@ -122,7 +122,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 
 def conserved(run: Run) -> np.ndarray:
     """(2,) along which axes nothing ever changes the total momentum."""
-    kicked = run.kicked and not run.parameter("drive", "keep_momentum", False)
+    kicked = run.nature & KICKED and not run.parameter("drive", "keep_momentum", False)
     if kicked or run.nature & {"obstructed", "sheared", "changed"}:
         return np.zeros(2, dtype=bool)
     kept = run.periodic & (run.gravity == 0)
@@ -198,11 +198,6 @@ def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
 def packing(run: Run) -> float:
     """Area of the disks over area of the box."""
     return float(np.pi * np.sum(run.radius**2) / np.prod(run.edges))
-
-
-def equal_disks(run: Run) -> bool:
-    """Whether the run is of one component, as most laws are."""
-    return bool(np.ptp(run.radius) == 0 and np.ptp(run.mass) == 0)
 
 
 def kinds_of_disks(run: Run) -> tuple[Species, ...]:
@@ -305,7 +300,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """P / (n kT) by virial, rate, walls, where they apply."""
     allow(run, "it has no equation of state", *FLUID)
     walled = not run.periodic.any() and np.ptp(run.radius) == 0
-    ways = {"virial": z_virial} | ({"rate": z_rate} if equal_disks(run) else {})
+    ways = {"virial": z_virial} | ({} if "mixture" in run.nature else {"rate": z_rate})
     ways |= {"walls": z_wall} if walled else {}
     return {name: way(run, skip) for name, way in ways.items()}
 

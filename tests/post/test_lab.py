@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 import lab as script
+from ricochet import RunError
 from ricochet import lab as module
-from ricochet.lab import Lab, Refused, edited
+from ricochet.lab import Lab, edited
 from ricochet.live import Server
 from ricochet.program import namelist
 from synthetic_run import ROOT, run_script
@@ -193,7 +194,7 @@ def test_a_run_ends_when_its_page_is_silent_and_another_comes(lab, monkeypatch, 
 def test_no_more_than_so_many_pages_and_disks_and_bytes(lab):
     pages = [lab.new_page() for _ in range(module.PAGES)]
     assert len(set(pages)) == module.PAGES
-    with pytest.raises(Refused, match="close one"):
+    with pytest.raises(RunError, match="close one"):
         lab.new_page()
     lab.leave({"page": pages[0]})
     page = lab.new_page()
