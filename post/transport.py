@@ -20,9 +20,10 @@ is lower by about 6 / N of it, a bulk viscosity by 5 / N, a viscosity by 2 / N (
 """
 
 from ricochet.drawing import COLOURS, band, caption, colours, plt
+from ricochet.hard_disks import enskog, henderson
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 from ricochet.statistics import combined
-from ricochet.transport import MEMORY, Found, coefficients, enskog
+from ricochet.transport import MEMORY, Found, coefficients
 
 LABELS = {
     "viscosity": "shear viscosity",
@@ -37,7 +38,7 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
     """A row per packing fraction and coefficient, in units of m, the diameter and kT; doubts."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
-        for name, theory in enskog(eta).items():
+        for name, theory in enskog(henderson(eta), eta, 1.0).items():
             members, about = found[name].members, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
             row |= measured("value", combined(members).scaled(theory)) | {"enskog": float(theory)}

@@ -340,11 +340,9 @@ def expected(run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[flo
     def slope(_: float, state: np.ndarray) -> tuple[float, float]:
         u, kt = state[0], max(state[1], 1e-6)
         eta = packing(kt)
-        state_of_gas = (hard_disks.henderson(eta), eta, diameter, kt, mass)
-        density = mass * eta / per_disk
-        viscosity = density * hard_disks.enskog_viscosity(*state_of_gas)
-        conductivity = hard_disks.enskog_conductivity(*state_of_gas)
-        return -flux.shear / viscosity, -(flux.energy - flux.shear * u) / conductivity
+        gas = hard_disks.enskog(hard_disks.henderson(eta), eta, diameter, kt, mass)
+        heat = flux.energy - flux.shear * u
+        return -flux.shear / gas["viscosity"], -heat / gas["conductivity"]
 
     centre = run.lower[axis] + run.edges[axis] / 2
     rows = np.empty((len(x), 3))

@@ -134,33 +134,21 @@ def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
     return math.sqrt((slope + henderson(eta) ** 2) * kt / mass)
 
 
-def enskog_viscosity(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
-    """Shear viscosity over mass density; Gass, J. Chem. Phys. 54, 1898 (1971)."""
+def enskog(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0) -> dict:
+    """Viscosities, heat conductivity (k = 1) and D, by name; Gass, J. Chem. Phys. 54, 1898 (1971).
+
+    The bulk viscosity is all of it collisional; D is the first Sonine approximation.
+    """
+    y, thermal = z - 1, np.sqrt(mass * kt / math.pi)
     density = 4 * eta / (math.pi * diameter**2)
-    dilute = 1.022 / (2 * diameter) * np.sqrt(mass * kt / math.pi)
-    return dilute * 2 * eta * (1 / (z - 1) + 1 + 0.8729 * (z - 1)) / (mass * density)
-
-
-def enskog_bulk_viscosity(
-    z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0
-):
-    """Bulk viscosity over mass density, all of it collisional; Gass, as above."""
-    density = 4 * eta / (math.pi * diameter**2)
-    return 4 / math.pi * eta * (z - 1) / diameter * np.sqrt(mass * kt / math.pi) / (mass * density)
-
-
-def enskog_conductivity(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
-    """Heat conductivity, k = 1; Gass, J. Chem. Phys. 54, 1898 (1971)."""
-    dilute = 1.029 * 2 / diameter * np.sqrt(kt / (math.pi * mass))
-    return dilute * 2 * eta * (1 / (z - 1) + 1.5 + 0.8718 * (z - 1))
+    return {
+        "viscosity": 1.022 * thermal / diameter * eta * (1 / y + 1 + 0.8729 * y),
+        "conductivity": 1.029 * 4 * thermal / mass / diameter * eta * (1 / y + 1.5 + 0.8718 * y),
+        "bulk_viscosity": 4 / math.pi * eta * y / diameter * thermal,
+        "D": thermal / mass / (2 * density * diameter * contact_value(z, eta)),
+    }
 
 
 def long_time_tail(time: np.ndarray, density: float, diffusion: float, viscosity: float):
     """<v(0) v(t)> / <v^2> at late times by mode coupling; Dorfman and Cohen, PRL 25, 1257."""
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))
-
-
-def enskog_diffusion(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0):
-    """D_E, first Sonine approximation."""
-    density = 4 * eta / (math.pi * diameter**2)
-    return math.sqrt(kt / (math.pi * mass)) / (2 * density * diameter * contact_value(z, eta))

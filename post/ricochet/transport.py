@@ -222,21 +222,10 @@ class Found(NamedTuple):
     lag: float  # at which they were taken [mean free times]
 
 
-def enskog(eta: float, diameter: float = 1.0, kt: float = 1.0, mass: float = 1.0):
-    """The coefficients by Enskog's theory, by name."""
-    state = (hard_disks.henderson(eta), eta, diameter, kt, mass)
-    density = mass * 4 * eta / (np.pi * diameter**2)
-    return {
-        "viscosity": density * hard_disks.enskog_viscosity(*state),
-        "conductivity": hard_disks.enskog_conductivity(*state),
-        "bulk_viscosity": density * hard_disks.enskog_bulk_viscosity(*state),
-        "D": hard_disks.enskog_diffusion(*state),
-    }
-
-
 def enskog_of(run: Run) -> dict[str, float]:
-    """The same of a run that keeps its kinetic energy, in its units and at its temperature."""
-    return enskog(td.packing(run), 2 * run.radius[0], td.kt_at_start(run), run.mass[0])
+    """Those of a run that keeps its kinetic energy, in its units and at its temperature."""
+    eta, kt = td.packing(run), td.kt_at_start(run)
+    return hard_disks.enskog(hard_disks.henderson(eta), eta, 2 * run.radius[0], kt, run.mass[0])
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:

@@ -553,7 +553,7 @@ def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, ca
     runs = [gas(f"gas{k}", packing=packing).path for k, packing in enumerate((0.1, 0.3))]
     rows = drawn(tmp_path, "transport", *runs)
     means = [row for row in rows if not row["wt"]]
-    coefficients = {(name, eta) for name in tp.enskog(0.1) for eta in (0.1, 0.3)}
+    coefficients = {(name, eta) for name in hd.enskog(1.5, 0.1, 1.0) for eta in (0.1, 0.3)}
     assert {(row["what"], float(row["packing"])) for row in means} == coefficients
     assert all(float(row["error"]) > 0 for row in means)
     assert all(float(row["wt"]) > 0 for row in rows if row["what"].endswith("(t)"))
@@ -708,8 +708,8 @@ def test_the_law_carries_the_fluxes_and_is_a_gas_at_rest_without(simulated):
     eta = np.pi * density / 4
     z = hd.henderson(eta)
     assert density * kt * z == pytest.approx(1.2)
-    shear = -density * hd.enskog_viscosity(z, eta, 1.0, kt) * np.gradient(u, x)
-    heat = -hd.enskog_conductivity(z, eta, 1.0, kt) * np.gradient(kt, x)
+    gas = hd.enskog(z, eta, 1.0, kt)
+    shear, heat = -gas["viscosity"] * np.gradient(u, x), -gas["conductivity"] * np.gradient(kt, x)
     assert shear[1:-1] == pytest.approx(-0.05, rel=1e-3)
     assert (heat + shear * u)[1:-1] == pytest.approx(0.1, rel=2e-3)
 

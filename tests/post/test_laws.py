@@ -75,7 +75,7 @@ def test_enskog_bulk_viscosity_is_what_uncorrelated_collisions_hand_on():
     z, density = float(hd.henderson(eta)), 4 * eta / (np.pi * 0.7**2)
     pairs = density * hd.collision_rate(z, diameter, 1e6, kt, mass) / 2
     expected = pairs / 2 * diameter**2 / 4 * 4 * mass
-    bulk = mass * density * hd.enskog_bulk_viscosity(z, eta, diameter, kt, mass)
+    bulk = hd.enskog(z, eta, diameter, kt, mass)["bulk_viscosity"]
     assert bulk == pytest.approx(expected, rel=1e-6)
 
 

@@ -55,7 +55,7 @@ def enskog_ratio(run: Run) -> float:
     step = run.time[1] - run.time[0]
     kt = np.sum(run.kinetic_energy(0)) / (run.count - 1)
     eta = 0.05
-    expected = hd.enskog_diffusion(float(hd.simulated(eta)), eta, 2 * run.radius[0], kt)
+    expected = hd.enskog(float(hd.simulated(eta)), eta, 2 * run.radius[0], kt)["D"]
     return (high - low) / (4 * 20 * step) / expected
 
 

@@ -36,7 +36,7 @@ def heating(eta: float) -> tuple[Member, ...]:
 
 def viscosity(eta: float) -> float:
     """Enskog's, over the mass density, at T = 1."""
-    return float(hd.enskog_viscosity(hd.simulated(eta), eta, 1.0))
+    return float(hd.enskog(hd.simulated(eta), eta, 1.0)["viscosity"] * pi / 4 / eta)
 
 
 def heated_by_shear(eta: float) -> Callable[[Run], float]:
