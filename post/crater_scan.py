@@ -101,18 +101,6 @@ def unused(points: list[Point], scans: Scans) -> list[str]:
     ]
 
 
-def missed(scans: Scans) -> list[str]:
-    """The fits that miss their points."""
-    return [
-        f"{size} against {axis}: misses its points, chi^2 per degree of freedom is {fit.chi2:.2g}"
-        for axis, scan in scans.items()
-        for curve in scan
-        for size in ALL
-        for fit in [fit_of(axis, curve, size)]
-        if fit and fit.misses(fewest(curve))
-    ]
-
-
 def fewest(curve: list[Point]) -> int:
     """Runs of a point that is fitted."""
     return min(p.runs for p in curve if p.free)
@@ -212,9 +200,9 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
     return figure
 
 
-def tables(scans: Scans) -> tuple[list[dict], list[dict]]:
-    """A row per point of each curve, and a row per fit."""
-    rows, fits = [], []
+def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
+    """A row per point of each curve, a row per fit, and which fits miss their points."""
+    rows, fits, missed = [], [], []
     for axis, curve in ((axis, curve) for axis, scan in scans.items() for curve in scan):
         for p in curve:
             row = {"scan": axis, **p.values, "runs": p.runs}
@@ -229,16 +217,17 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict]]:
                 row |= {"of": "1 - xi^2" if axis == "restitution" else axis}
                 row |= measured("exponent", Estimate(fit.exponent, fit.exponent_error))
                 fits.append(row | {"chi2/dof": fit.chi2})
-    return rows, fits
+                what = f"{size} against {axis}: misses its points, chi^2 per degree of freedom is "
+                missed += [f"{what}{fit.chi2:.2g}"] * fit.misses(fewest(curve))
+    return rows, fits, missed
 
 
 def main() -> None:
     args = command_line(__doc__, "crater_scan.png").parse_args()
     points = [point(*one) for one in grouped(args.runs, key_of)]
     scans = scanned(points)
-    report(
-        args, draw(args.runs, scans), *tables(scans), notes=[*unused(points, scans), *missed(scans)]
-    )
+    *results, missed = tables(scans)
+    report(args, draw(args.runs, scans), *results, notes=[*unused(points, scans), *missed])
 
 
 if __name__ == "__main__":

@@ -165,22 +165,17 @@ def main() -> None:
         x, law = data["xy"[axis]], None
         if has_theory(runs, axis):
             law, flux = prediction(own, axis, with_ends(runs[0], axis, x))
-            values = flux._asdict().items()
-            tables = [
-                [{k: v for name, one in values for k, v in measured(f"{name}_flux", one).items()}]
-            ]
-            if law is None:
-                notes.append(
-                    "no gas has these fluxes and this temperature in the middle: run longer"
-                )
-            else:
-                inner = {
-                    name: Estimate(one.mean[1:-1], one.error[1:-1]) for name, one in law.items()
-                }
-                data |= spread(
-                    {"_expected": {name: inner[name] for name in ("flow", "temperature")}}
-                )
-                tables.append(at_walls(runs[0], axis, law))
+            row: dict = {}
+            for name, value in flux._asdict().items():
+                row |= measured(f"{name}_flux", value)
+            tables = [[row]]
+        if law:
+            ends = {name: law[name] for name in ("flow", "temperature")}
+            inner = {k: Estimate(*(part[1:-1] for part in one)) for k, one in ends.items()}
+            data |= spread({"_expected": inner})
+            tables.append(at_walls(runs[0], axis, law))
+        elif tables:
+            notes.append("no gas has these fluxes and this temperature in the middle: run longer")
         figure = draw_profile(runs, axis, x, found, law)
         tables = [{name: v for name, v in data.items() if "stress" not in name}, *tables]
     report(args, figure, *tables, data=data, notes=notes)
