@@ -1,27 +1,8 @@
-"""Runs for other programs, in their own types."""
+"""Runs for other programs, in their own types; for pandas see `Run.to_dataframe`."""
 
 import numpy as np
 
 from .reader import Run
-
-
-def observables_frame(run: Run):
-    """The observables as a pandas DataFrame (needs the package pandas), a row per sample.
-
-    The index is the time, the columns are called like the observables: `all/kinetic_energy`; of
-    those with several numbers `momentum_x`, `wall_collisions_left`, `virial_tensor_xy`, and so on.
-    """
-    import pandas
-
-    columns = {}
-    for name in run.observables:
-        time, value = run.observable(name)
-        parts = {(): ("",), (2,): ("_x", "_y"), (4,): ("_left", "_right", "_bottom", "_top")}
-        values = value.reshape(len(time), -1).T
-        if name == "virial_tensor":
-            parts[4,] = ("_xx", "_xy", "_yx", "_yy")
-        columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
-    return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
 
 def mdanalysis_universe(run: Run):

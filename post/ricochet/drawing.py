@@ -71,7 +71,7 @@ def numbers_of(run: Run) -> dict[str, float]:
         if "packing_fraction" in own:
             own = {name: value for name, value in own.items() if name != "radius"}
         found |= {prefix * (len(run.names) > 1) + name: value for name, value in own.items()}
-    for name in ("left", "right", "bottom", "top"):
+    for name in SIDES:
         own = run.parameters.get("side", {}).get(name, {})
         found |= {f"{name} {variable}": value for variable, value in own.items()}
     found |= {f"drive {name}": value for name, value in run.parameters.get("drive", {}).items()}

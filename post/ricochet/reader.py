@@ -286,10 +286,22 @@ class Run:
             return tuple(series_in(file["observables"]))
 
     def to_dataframe(self):
-        """The observables as a pandas DataFrame, a row per sample, the time as index."""
-        from .bridges import observables_frame
+        """The observables as a pandas DataFrame (needs that package), a row per sample.
 
-        return observables_frame(self)
+        The index is the time, the columns are called like the observables: `all/kinetic_energy`; of
+        those with several numbers `momentum_x`, `wall_collisions_left`, `virial_tensor_xy`, ...
+        """
+        import pandas
+
+        columns = {}
+        for name in self.observables:
+            time, value = self.observable(name)
+            parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
+            values = value.reshape(len(time), -1).T
+            if name == "virial_tensor":
+                parts[4,] = ("_xx", "_xy", "_yx", "_yy")
+            columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
+        return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
     @cached_property
     def events(self) -> Events:
