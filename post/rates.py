@@ -21,12 +21,18 @@ nothing drifts, or 15 collisions per disk after the start of a gas that cools.
 from ricochet import Run, RunError, statistics
 from ricochet import thermodynamics as td
 from ricochet.drawing import COLOURS, band, bars, caption, plt
-from ricochet.free_paths import BINS, STRAIGHT, mean_and_density, path_density
 from ricochet.nature import allow
 from ricochet.script import command_line, launch, points, report
 from ricochet.statistics import FINE, Curve, Estimate, SeriesMean, estimate
+from ricochet.theory import path_density
 
 import numpy as np
+
+BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
+BLOCKS = 8  # of the frames of a single run
+#: With which disks fly straight and at one speed, in all parts of the box alike.
+STRAIGHT = {"walled", "mixture", "unlike", "lossy", "rough", "turning"}
+STRAIGHT |= {"thermal", "uneven", "sliding"}
 
 
 def check(runs: list[Run]) -> None:
@@ -85,6 +91,50 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
     unit = scales(runs)[:, None]
     middle = (cuts[1:] + cuts[:-1]) / 2
     return {way: Curve(middle, *estimate(values * unit)) for way, values in ways.items()}
+
+
+def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths of the paths that the disks of all frames are on, and the weight of each."""
+    allow(run, "free paths are those of disks that fly freely in an empty box", *STRAIGHT)
+    log = run.events
+    disk = np.concatenate([log.i, log.j[log.j > 0]])
+    time = np.concatenate([log.time, log.time[log.j > 0]])
+    order = np.lexsort((time, disk))
+    ends = np.cumsum(np.bincount(disk, minlength=run.count + 1))
+    duration = np.full((run.frames, run.count), np.nan)
+    for k in range(run.count):
+        own = time[order[ends[k] : ends[k + 1]]]
+        after = np.searchsorted(own, run.time, side="right")
+        inside = (after > 0) & (after < len(own))
+        duration[inside, k] = own[after[inside]] - own[after[inside] - 1]
+    duration[run.time < td.start_of_steady_state(run, skip)] = np.nan
+    known = duration > 0
+    return (run.speed(slice(None)) * duration)[known], 1 / duration[known]
+
+
+def mean_and_density(
+    runs: list[Run], skip: float | None = None
+) -> tuple[Estimate, Estimate] | None:
+    """The mean free path, and the density of paths in units of it, in `BINS`; None without a log.
+
+    Their errors are from the scatter of the runs, or of a single run's frames in blocks.
+    """
+    parts = [free_paths(run, skip) for run in runs if td.has_log(run)]
+    if not parts or sum(len(path) for path, _ in parts) == 0:
+        return None
+    path, weight = (np.concatenate(part) for part in zip(*parts, strict=True))
+    mean = float(np.average(path, weights=weight))
+    if len(parts) == 1:
+        parts = list(zip(np.array_split(path, BLOCKS), np.array_split(weight, BLOCKS), strict=True))
+
+    def density(path: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        counts, _ = np.histogram(path / mean, BINS, weights=weight)
+        return counts / (np.sum(weight) * np.diff(BINS))
+
+    known = [part for part in parts if len(part[0]) > 0]
+    means = estimate([np.average(path, weights=weight) for path, weight in known])
+    shapes = estimate([density(*part) for part in known])
+    return Estimate(mean, means.error), Estimate(density(path, weight), shapes.error)
 
 
 def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, start: float) -> None:

@@ -39,6 +39,21 @@ def finite_n_cdf(count: int, periodic: bool = False) -> Law:
     return lambda u: 1 - np.clip(1 - np.square(u) / scale, 0, 1) ** free
 
 
+def path_density(x: np.ndarray) -> np.ndarray:
+    """Density of free paths in units of the mean one, <v> / w, if collisions have no memory.
+
+    nu(v) / w follows from the mean relative speed of a disk of speed v in a Maxwellian gas.
+    """
+    u = np.linspace(0, 5, 2001)[1:]  # v / sqrt(2 kT / m)
+    half = u**2 / 2
+    slow, fast = (scipy.special.ive(order, half) for order in (0, 1))
+    nu = ((1 + u**2) * slow + u**2 * fast) / np.sqrt(2)
+    rate = nu / (u * 2 / np.sqrt(np.pi))  # collisions per mean free path
+    weight = 2 * u * np.exp(-(u**2)) * nu
+    weight /= np.sum(weight)
+    return np.array([np.sum(weight * rate * np.exp(-rate * value)) for value in x])
+
+
 def scattering_angle(b: np.ndarray, mass_ratio: float = np.inf, restitution: float = 1.0):
     """Deflection [rad] of a disk hitting one at rest, b = impact parameter / (r1 + r2).
 

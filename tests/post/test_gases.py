@@ -17,12 +17,13 @@ from scipy.stats import binom
 import correlations
 import driven
 import melting
-from ricochet import Events, RunError, fields, free_paths, read_run, statistics, theory
+import rates
+from driven import demon_law, fuller, noise_law
+from ricochet import Events, RunError, fields, read_run, statistics, theory
 from ricochet import cooling as cool
 from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
-from ricochet.driven import demon_law, fuller, noise_law
 from ricochet.nature import Refused
 from synthetic_run import ROOT, run_script, write_run, written
 from validation.estimators import force, hit_rate
@@ -262,7 +263,7 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
     run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=collisions)
     zero = np.zeros(len(hits), int)
     run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
-    path, weight = free_paths.free_paths(run, skip=0)
+    path, weight = rates.free_paths(run, skip=0)
     assert set(np.round(path, 9)) == {0.5, 2.0}
     assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
 
@@ -270,14 +271,14 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
 def test_free_paths_scatter_as_their_errors_say(monkeypatch, rng):
     """Of runs, and of one run in blocks: paths without memory, 4000 to a run."""
     monkeypatch.setattr(
-        free_paths, "free_paths", lambda run, skip: (rng.exponential(2.0, 4000), np.ones(4000))
+        rates, "free_paths", lambda run, skip: (rng.exponential(2.0, 4000), np.ones(4000))
     )
-    monkeypatch.setattr(free_paths, "has_log", lambda run: True)
+    monkeypatch.setattr(rates.td, "has_log", lambda run: True)
     for runs, samples in ((1, 4000), (50, 200000)):
-        mean, density = free_paths.mean_and_density([None] * runs)
+        mean, density = rates.mean_and_density([None] * runs)
         assert abs(mean.mean - 2) < 4 * mean.error
         assert mean.error == pytest.approx(2 / np.sqrt(samples), rel=0.9 if runs == 1 else 0.4)
-        law = np.diff(np.exp(-free_paths.BINS)) / np.diff(free_paths.BINS)
+        law = np.diff(np.exp(-rates.BINS)) / np.diff(rates.BINS)
         off = (density.mean + law)[:16] / density.error[:16]
         assert np.mean(np.abs(off) < 3) > 0.8
 
@@ -323,14 +324,14 @@ def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
     per_disk, pairs = found["collisions_per_disk_and_time"], found["w_disks_disks"]
     assert pairs.mean == pytest.approx(per_disk.mean, rel=0.02)
     assert pairs.mean == pytest.approx(run.collisions_per_disk.value[-1] / run.time[-1], rel=0.1)
-    (mean, error), (density, _) = free_paths.mean_and_density([run])
+    (mean, error), (density, _) = rates.mean_and_density([run])
     assert 0 < error < 0.03 * mean
     speed = np.mean(run.speed(slice(None)))
     assert mean == pytest.approx(speed / per_disk.mean, rel=0.03)
-    assert np.sum(density * np.diff(free_paths.BINS)) == pytest.approx(1, abs=0.02)
+    assert np.sum(density * np.diff(rates.BINS)) == pytest.approx(1, abs=0.02)
     points = [row for row in drawn(tmp_path, "rates", *bulk[:1]) if row["x"]]
     names = [row["quantity"] for row in points]
-    assert names.count("free_path_density") == len(free_paths.BINS) - 1
+    assert names.count("free_path_density") == len(rates.BINS) - 1
     assert names.count("pressure_virial(t)") > 10
 
 

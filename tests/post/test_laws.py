@@ -5,7 +5,7 @@ import pytest
 
 from ricochet import hard_disks as hd
 from ricochet import theory
-from ricochet.free_paths import path_density
+from ricochet.theory import path_density
 from validation.laws import cooling_ratio, mixture_rates, mixture_z
 
 

@@ -4,8 +4,8 @@ from math import acos, pi, sin, sqrt
 
 import numpy as np
 
+from driven import fuller, share
 from ricochet import Run
-from ricochet.driven import fuller, share
 from ricochet.theory import demon_share
 
 from .case import AT_LEAST, AT_MOST, Case, Member, relative, sigmas, within
