@@ -43,6 +43,7 @@ import numpy as np
 
 MOST_FRAMES = 50  # for the structure
 BLOCKS = 8  # of the frames of a single run
+PLAIN = {"walled"}  # what equal smooth elastic disks may be
 #: What has no equilibrium, but a structure.
 RESTLESS = ("lossy", "unlike", "uneven", "noisy", "active", "sliding")
 NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
@@ -123,7 +124,7 @@ def motion(runs: list[Run], frames: list[slice]) -> dict[str, Curve]:
         "vacf": Curve(wt, *estimate([transport.velocity_memory(*one, at) for one in pairs])),
         "msd": Curve(wt, *estimate(msd / diameter**2)),
     }
-    if not first.nature:
+    if first.nature <= PLAIN:
         density, theory = first.count / np.prod(first.edges), transport.enskog_of(first)
         kinematic = theory["viscosity"] / (density * first.mass[0])
         tail = hard_disks.long_time_tail(time, density, theory["D"], kinematic)
@@ -174,7 +175,8 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
                 row |= over_runs(name, found.members[name], notes, f"η = {eta:g}, {name}")
             else:
                 row |= measured(name, None)
-        row["D_enskog"] = None if runs[0].nature else float(transport.enskog_of(runs[0])["D"])
+        plain = runs[0].nature <= PLAIN
+        row["D_enskog"] = float(transport.enskog_of(runs[0])["D"]) if plain else None
         _, *first = found.curves["g"]
         rows.append(row | measured("g_first_bin", Estimate(*first), 0))
     return rows, notes
@@ -249,7 +251,7 @@ def draw(
         draw_group(panels, found, row, colour, sum(run.count for run in runs))
     for name, style in shown.items():
         panels[name].set(**{"xlabel": "$w\\,t$", **style})
-    known = not groups[0][1][0].nature
+    known = groups[0][1][0].nature <= PLAIN
     if not cool:
         wt = np.geomspace(min(f.curves["vacf"].x[0] for f in results), 5, 200)
         if known:

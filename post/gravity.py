@@ -198,7 +198,7 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
     (run,) = args.runs
-    known = "falling", "mixture", "thermal", "bathed", "stepped"
+    known = "walled", "falling", "mixture", "thermal", "bathed", "stepped"
     allow(run, "it follows no exponential laws", *known)
     start = thermodynamics.start_of_equilibrium(run, args.skip)
     frames = thermodynamics.frames_from(run, start)

@@ -28,7 +28,8 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 
 def scattering(run: Run) -> dict[str, float]:
     """Impact parameter and deflection of the disk that moves at the start."""
-    allow(run, "the law is for two smooth disks that meet freely", "lossy", "turning", "mixture")
+    law = "the law is for two smooth disks that meet freely"
+    allow(run, law, "walled", "lossy", "turning", "mixture")
     i, k = moving_and_resting(run)
     v, w = run.velocity[0][i], run.velocity[-1][i]
     gap = run.position[0][k] - run.position[0][i]

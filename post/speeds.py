@@ -117,7 +117,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
         noise_band(axes, count * len(runs), colour)
-        closed = all(run.nature <= {"obstructed", "turning"} for run in runs)
+        closed = all(run.nature <= {"obstructed", "turning", "walled"} for run in runs)
         equal = equal and closed and max(a[0] for _, a in tracks) < -0.4
     if equal:
         dilute_limit(axes, RELAXATION)

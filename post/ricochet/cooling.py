@@ -35,11 +35,9 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     `K_...` over that of all at the start, against `collisions_per_disk`; `ratio` of the
     temperatures, heaviest to lightest species; `energy_...` against `time`.
     """
-    names = ("all", *runs[0].names)
+    names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "falling"}
     for run in runs:
-        allow(
-            run, "it does not cool by itself", *(TRAITS.keys() - SOURCES - {"collapsed", "falling"})
-        )
+        allow(run, "it does not cool by itself", *alone)
     energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
     first = np.mean([tracks[0, 0] for tracks in energy])
     left = [tracks / tracks[0, 0] for tracks in energy]
@@ -70,10 +68,10 @@ def moving_energy(run: Run, name: str = "all") -> np.ndarray:
 
 def first_rate(run: Run) -> float:
     """w0: collisions per disk and time at the start, by the equation of state, or as counted."""
-    allow(run, "Haff's law is for smooth disks that only cool", *SMOOTH)
-    if not run.periodic.all() or "lossy" not in run.nature:
-        state = "has walls" if "lossy" in run.nature else "does not cool"
-        raise Refused(f"{run.path}: {state}; Haff's law is for disks that cool in a periodic box")
+    law = "Haff's law is for smooth disks that only cool, in a periodic box"
+    allow(run, law, *SMOOTH)
+    if "lossy" not in run.nature:
+        raise Refused(f"{run.path}: does not cool; {law}")
     if "mixture" in run.nature:
         return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
@@ -141,10 +139,8 @@ def rough_law(run: Run) -> tuple[float, float, float]:
     """xi, beta, q of a run that the laws of rough disks are for."""
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
     allow(run, law, "lossy", "rough", "turning")
-    if "rough" not in run.nature or not run.periodic.all():
-        raise Refused(
-            f"{run.path}: has {'walls' if 'rough' in run.nature else 'smooth disks'}; {law}"
-        )
+    if "rough" not in run.nature:
+        raise Refused(f"{run.path}: has smooth disks; {law}")
     if run.parameter("contact", "friction") is not None:
         raise Refused(f"{run.path}: has a Coulomb limit; {law}")
     beta = float(run.parameter("contact", "tangential_restitution"))

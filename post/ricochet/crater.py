@@ -30,7 +30,7 @@ class Crater(NamedTuple):
 
 
 #: What a run may be in which nothing but a projectile moves a bed.
-QUIET = ("lossy", "rough", "turning", "unlike", "mixture", "obstructed", "stepped")
+QUIET = ("lossy", "rough", "turning", "unlike", "mixture", "obstructed", "walled", "stepped")
 FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
 
 
@@ -122,13 +122,8 @@ def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, .
     here = bed(run)
     side = run.edges.max() / cells
     shape = np.maximum(1, np.round(run.edges / side)).astype(int)
-    limits = np.stack([run.lower, run.upper], axis=1)
-    area, xs, ys = np.histogram2d(
-        *run.position[frame][here].T,
-        bins=shape,
-        range=limits,
-        weights=np.pi * run.radius[here] ** 2,
-    )
+    limits, disks = np.stack([run.lower, run.upper], axis=1), np.pi * run.radius[here] ** 2
+    area, xs, ys = np.histogram2d(*run.position[frame][here].T, shape, limits, weights=disks)
     reach = 2.5 * np.median(run.radius[here]) / side
     smooth = scipy.ndimage.gaussian_filter(area, reach, mode="reflect")
     fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])

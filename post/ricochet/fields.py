@@ -25,7 +25,8 @@ FEWEST_BLOCKS = 3  # of all runs, for an error
 LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
 SIDES = (("left", "right"), ("bottom", "top"))
-LAWFUL = {"thermal", "uneven", "sliding"}  # what a gas between two walls may be to have a theory
+#: What a gas between two walls may be to have a theory.
+LAWFUL = {"walled", "thermal", "uneven", "sliding"}
 Cells = tuple[int, int]
 
 

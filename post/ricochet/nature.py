@@ -1,7 +1,7 @@
 """What kind of run this is: the one place that says it, and in which words a law refuses a run.
 
-    run.nature                      # Nature({'lossy', 'periodic', ...}), what sets it apart from
-    run.nature.closed               # equal smooth elastic disks in an empty box with walls
+    run.nature                      # Nature({'lossy', 'walled', ...}), what sets it apart from
+    run.nature.closed               # equal smooth elastic disks in an empty periodic box
     allow(run, "Haff's law", "lossy", "mixture")   # refuses a run with any other trait
 
 A trait is found from the parameters of a run and from its balance of energy, by a pure function of
@@ -34,6 +34,7 @@ TRAITS = {
     "turning": "has disks that turn",
     "obstructed": "has obstacles or walls in the box",
     "unlike": "has a restitution for each pair of species",
+    "walled": "has walls",
     "mixture": "has disks of different mass or radius",
 }
 #: By which energy comes and goes, other than by being lost in collisions.

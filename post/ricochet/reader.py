@@ -370,6 +370,7 @@ class Run:
         found = nature_of(self.parameters, self.mass, self.radius, lost / most if most else 0.0)
         more = {
             "turning": "angular_velocity" in self.elements,
+            "walled": not self.periodic.all(),
             "collapsed": "collapse" in str(self.provenance.get("note", "")),
         }
         return Nature(found | {name for name, there in more.items() if there})

@@ -19,7 +19,7 @@ from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
 MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
 #: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
-FLUID = ("thermal", "bathed", "rough", "turning", "mixture")
+FLUID = ("walled", "thermal", "bathed", "rough", "turning", "mixture")
 
 
 class Steps(NamedTuple):

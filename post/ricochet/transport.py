@@ -20,7 +20,7 @@ import numpy as np
 
 from . import hard_disks
 from . import thermodynamics as td
-from .nature import Refused, allow
+from .nature import allow
 from .reader import Events, Run, RunError, read_run
 from .statistics import Curve, SeriesMean, estimate, series_mean
 
@@ -29,6 +29,7 @@ PER_FREE_TIME = 10  # samples of the moments
 #: heat, which lives longest; from half of this on less than 0.2 % of the conductivity is missing.
 MEMORY = 20.0
 CLOSE = 1e-5  # of a velocity
+TAKES = "transport takes equal elastic smooth disks in a periodic box"
 MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
 
 
@@ -106,14 +107,6 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 # --- Helfand moments ---
 
 
-def check(run: Run) -> None:
-    """Refuse all but the gases that the moments are for."""
-    takes = "transport takes equal elastic smooth disks in a periodic box"
-    allow(run, takes)
-    if not run.periodic.all():
-        raise Refused(f"{run.path}: has walls; {takes}")
-
-
 def log(run: Run) -> Events:
     """The events until the last frame."""
     events = read_run(run.path).events  # logs are long: the run would keep them
@@ -164,7 +157,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     Their step, and by coefficient the moments (T, C) without their mean growth: of the momentum xy
     and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y.
     """
-    check(run)
+    allow(run, TAKES)
     events = log(run)
     before, after = velocities(run, events)
     mass = run.mass[0]
@@ -277,6 +270,6 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
 def coefficients(runs: list[Run], skip: float | None) -> dict[str, Found]:
     """All coefficients at one packing fraction."""
     for run in runs:
-        check(run)
+        allow(run, TAKES)
     starts = [td.start_of_equilibrium(run, skip) for run in runs]
     return of_moments(runs, starts) | {"D": of_displacements(runs, starts)}
