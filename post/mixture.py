@@ -21,7 +21,6 @@ from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
 import numpy as np
 
-
 BINS = 60  # of a histogram
 
 

@@ -146,9 +146,6 @@ class Frames:
                 values = np.stack([data[k] for k in chosen])
         return values.astype(float) if values.dtype.kind == "f" else values
 
-    def __iter__(self) -> Iterator[np.ndarray]:
-        return (self[k] for k in range(len(self)))
-
 
 @dataclass(frozen=True)
 class Run:
