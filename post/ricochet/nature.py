@@ -32,6 +32,7 @@ TRAITS = {
     "lossy": "is not elastic: it loses energy in collisions",
     "rough": "has rough disks, whose collisions turn them",
     "turning": "has disks that turn",
+    "round": "keeps its angular momentum in a round container",
     "obstructed": "has obstacles or walls in the box",
     "unlike": "has a restitution for each pair of species",
     "walled": "has walls",
@@ -42,7 +43,7 @@ SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed
 #: With which velocities change between collisions, too.
 KICKED = {"noisy", "active", "bathed"}
 #: With which velocities do not settle to Maxwell's law.
-UNSETTLED = {*SOURCES, "uneven", "lossy"} - {"bathed", "thermal"}
+UNSETTLED = {*SOURCES, "uneven", "lossy", "round"} - {"bathed", "thermal"}
 #: With which they do.
 SETTLED = TRAITS.keys() - UNSETTLED
 
@@ -124,7 +125,19 @@ def nature_of(parameters: Mapping, mass: np.ndarray, radius: np.ndarray, lost: f
         "unlike": len(pairs) > 1,
         "mixture": bool(np.ptp(mass) > 0 or np.ptp(radius) > 0),
     }
+    torques = ("thermal", "falling", "noisy", "active", "bathed", "lossy", "rough")
+    found["round"] = held_round(parameters) and not any(found[name] for name in torques)
     return Nature(name for name, there in found.items() if there)
+
+
+def held_round(parameters: Mapping) -> bool:
+    """Whether nothing but one round container, which does not reach the sides, holds the disks."""
+    box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
+    if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
+        return False
+    centre = np.asarray(rows[0]["centre"])
+    gap = np.minimum(centre - box.get("lower", 0.0), box.get("upper", 1.0) - centre)
+    return bool(gap.min() >= rows[0]["radius"] * (1 - ROUNDING))
 
 
 def rows_of(group: Mapping) -> list[dict]:

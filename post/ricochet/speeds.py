@@ -72,7 +72,7 @@ def exact_law(run: Run) -> Law | None:
     """The law of N disks that share a fixed kinetic energy, for runs that have one."""
     axes = int(conserved(run).sum())
     free = not run.nature.keeps_kinetic_energy or run.count < 2 + axes / 2
-    if free or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
+    if free or "round" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None
     return finite_n_cdf(run.count, axes == 2)
 

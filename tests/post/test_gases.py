@@ -567,6 +567,7 @@ LOSSY = {"restitution": 0.9}
 WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1"}
 MIXED = {"packing": "0.1 temperature = 2 / &species name = 'b' count = 9 packing_fraction = 0.1"}
+ROUND = {"sides": "'wall', 'wall' / &obstacle centre = 0.5, 0.5 radius = 0.5 side = 'inside'"}
 UNEVEN = {
     "sides": "'wall', 'periodic' / &side name = 'left' temperature = 1 / "
     "&side name = 'right' temperature = 2"
@@ -584,6 +585,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (LOSSY, dict.fromkeys(SETTLED, "not elastic") | {"rough": "equal rough disks"}),
         (LOSSY | {"log": ".false."}, {"rates": "not elastic", "correlations": "draw them"}),
         (LOSSY | MIXED, {"mixture": "not elastic"}),
+        (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
         (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
         (MIXED, {"correlations": "not equal disks", "equation_of_state": "not of one radius"}),
