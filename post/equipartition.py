@@ -10,6 +10,7 @@ equilibrium, so take many.  K_light and K_heavy in the table are means in equili
 found or begins after --skip.
 """
 
+from functools import reduce
 from typing import NamedTuple
 
 from ricochet import Run
@@ -49,8 +50,8 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     for kind in lightest_and_heaviest(runs[0]):
         name = runs[0].names[kind]
         tracks = [windows(*run.observable(f"{name}/kinetic_energy"), width) for run in runs]
-        time = tracks[0][0]
-        both.append(np.array([values for _, values in tracks]))
+        time = reduce(np.intersect1d, [middles for middles, _ in tracks])  # all have samples then
+        both.append(np.array([values[np.isin(middles, time)] for middles, values in tracks]))
     light, heavy = map(estimate, both)
     difference = estimate(both[1] - both[0])
     gap = Estimate(difference.mean / light.mean, difference.error / light.mean)

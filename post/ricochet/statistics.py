@@ -134,7 +134,7 @@ def memory(series: np.ndarray, least: float = 0.1) -> float:
     count, rest = len(series), series - np.mean(series)
     if np.ptp(series) <= 1e-12 * np.max(np.abs(series), initial=0):
         return 1.0
-    found = 1.0
+    found, lag = 1.0, 0
     for lag in range(1, count // 2):
         found += 2 * np.mean(rest[lag:] * rest[:-lag]) / np.mean(rest**2)
         tau = 1.5 / np.log((found + 1) / (found - 1)) if found > 1 else 1e-9
@@ -160,7 +160,7 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
     least = min(1.0, memory(cells(rest, FINE)))  # few cells may seem to make up for each other
     free = len(coarse) / memory(coarse, least)
     error = float(np.std(coarse, ddof=1) / np.sqrt(free))
-    if not error > 0:
+    if not error > 1e-12 * np.max(np.abs(amount)) / np.mean(per):  # constant but for rounding
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
     early, late = (half.mean() for half in np.array_split(rest, 2))
     samples = min(float(len(rest)), float(np.var(rest)) / error**2)

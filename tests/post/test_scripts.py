@@ -506,6 +506,8 @@ def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
     assert row["T_therm"] == "nan" and "take more runs" in capsys.readouterr().err
     several = [read_run(falling(tmp_path / f"{k}.h5", rng, seed=k)) for k in range(2, 60)]
     assert equipartition.approach(several, 2, 0.1).thermalisation == 1
+    other = read_run(falling(tmp_path / "other.h5", rng, frames=300))  # in windows of their own
+    assert len(equipartition.approach([several[0], other], 0.25, 0.1).time) < 300
 
 
 def test_missed_share_is_that_of_chords_at_random_phases(rng):

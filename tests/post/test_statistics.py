@@ -159,6 +159,9 @@ def test_what_speaks_against_an_error_is_said(noise):
     assert "runs scatter by 3" in statistics.doubts("Z", apart)[0]
     assert statistics.combined(apart).error == pytest.approx(1, rel=0.1)
     assert statistics.combined(apart).samples == 10, "a run is a sample"
+    assert statistics.memory(noise.normal(size=3)) > 1
+    rounded = 1 + 1e-15 * remembering(noise, 640, 100)
+    assert statistics.doubts("kT", [statistics.series_mean(rounded)]) == []
     short = statistics.series_mean(noise.normal(size=5))
     assert "no error" in statistics.doubts("Z", [short])[0]
     slow = statistics.series_mean(remembering(noise, 640, 100))
