@@ -272,6 +272,7 @@ def draw(
             if name not in ("vacf", "a2"):
                 panels[name].set_ylim(0, None)
     panels["g6"].set_ylim(1e-5, 30)
+    panels["g6"].xaxis.set_minor_formatter("")
     for name in panels.keys() - {"g", "S"}:
         if panels[name].get_legend_handles_labels()[0]:
             panels[name].legend()

@@ -22,7 +22,7 @@ from ricochet.drawing import bars, caption, colours, plt
 from ricochet.nature import allow
 from ricochet.reader import Species
 from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, SeriesMean, binned, estimate, series_mean
+from ricochet.statistics import Estimate, SeriesMean, binned, estimate, series_mean, to_error
 
 import numpy as np
 import scipy
@@ -168,7 +168,7 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
             ("shared", "crowded"),
             strict=True,
         ):
-            fitted = f"{row[f'{kind}_slope']:.3f} ± {row[f'{kind}_slope_error']:.3f}"
+            fitted = " ± ".join(to_error(row[f"{kind}_slope"], row[f"{kind}_slope_error"]))
             label = f"{run.by_species[k].label}: {fitted} (dashed: {row[f'{kind}_{other}']:.3f})"
             draw_histogram(axes, values, x[-1], colour, label)
             for one in axes:
@@ -190,8 +190,8 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
         axes.set_xlabel("$v^2$ (reduced units)")
     for axes in panels[1]:
         axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
-    when = f"t = {start:.4g} to {run.time[-1]:g}"
-    figure.suptitle(f"{caption([run])},  {when},  kT = {kt:.4f} ± {result[0]['kT_error']:.2g}")
+    when, found = f"t = {start:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
+    figure.suptitle(f"{caption([run])},  {when},  kT = {' ± '.join(to_error(*found))}")
     return figure
 
 

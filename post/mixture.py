@@ -15,7 +15,7 @@ from ricochet.drawing import COLOURS, bars, caption, plt
 from ricochet.nature import SETTLED, allow
 from ricochet.script import command_line, late_frames, launch, measured, report
 from ricochet.speeds import means
-from ricochet.statistics import binned, combined, hold_against
+from ricochet.statistics import binned, combined, hold_against, to_error
 from ricochet.theory import maxwell_cdf, maxwell_pdf
 from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
@@ -75,8 +75,11 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         row[1].plot(v, law, color="black", lw=1.2, label=label, zorder=3)
         moments = (
             "⟨v⟩ = {v_start:.4g},  ⟨K⟩ = {K_start:.4g}".format(**found),
-            "⟨v⟩ = {v:.4f} ± {v_error:.4f} (theory {v_theory:.4f})\n"
-            "⟨K⟩ = {K:.4f} ± {K_error:.4f} (theory {K_theory:.4f})".format(**found),
+            "\n".join(
+                f"⟨{x}⟩ = {' ± '.join(to_error(found[x], found[x + '_error']))} "
+                f"(theory {found[x + '_theory']:.4g})"
+                for x in ("v", "K")
+            ),
         )
         for axes, chosen, words in zip(row, sides, moments, strict=True):
             speeds = pooled(runs, chosen, kind.name)

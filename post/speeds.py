@@ -130,6 +130,8 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
 def cooling(row: dict) -> str:
     """How far a gas has cooled; one that falls may become hotter."""
     goes = "falls" if row["kT_last"] < row["kT_first"] else "goes"
+    if row["frames"] == row["runs"]:
+        return f"kT is {row['kT_last']:.4g}"
     return f"kT {goes} from {row['kT_first']:.4g} to {row['kT_last']:.4g}"
 
 
@@ -162,7 +164,9 @@ def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
             axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
     densities, rows = zip(*pools, strict=True)
     draw_histogram(late, densities, [label_of(row, state) for row in rows])
-    late.set_ylim(0, 1.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(groups))
+    top = max(1.0, *(np.max(density.mean) for density in densities))
+    room = 0.1 + (0.4 if state in (EQUILIBRIUM, STEADY) else 0.6) * len(groups)
+    late.set_ylim(0, top * (1 + room))
     draw_relaxation(way, groups)
     first.set_title("Start")
     last.set_title("One frame at the end")

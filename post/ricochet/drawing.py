@@ -302,7 +302,11 @@ def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
     more = [f"and {rest} more warning{'s' * (rest > 1)}, as printed"] if rest > 0 else []
     lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
     text = "\n".join([line for part in lines for line in part] + more)
-    figure.supxlabel(text, fontsize=9, color="firebrick")
+    if figure.legends:  # one lies where the label would
+        figure.legends[0].set_title(text, {"size": 9})
+        figure.legends[0].get_title().set_color("firebrick")
+    else:
+        figure.supxlabel(text, fontsize=9, color="firebrick")
 
 
 def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:

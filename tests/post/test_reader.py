@@ -294,11 +294,16 @@ def test_every_script_draws_a_running_simulation():
 )
 def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name, note, said):
     """In print, and in red on the figure."""
-    run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note})
+    kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # whose legend lies there
+    run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note}, **kinds)
     texts = []
     monkeypatch.setattr(
         "ricochet.script.save",
-        lambda figure, *_: texts.append(figure.get_supxlabel().replace("\n", " ")),
+        lambda figure, *_: texts.append(
+            (figure.legends[0].get_title().get_text() if note else figure.get_supxlabel()).replace(
+                "\n", " "
+            )
+        ),
     )
     assert run_script("snapshot", run) == 0
     warned = capsys.readouterr().err
