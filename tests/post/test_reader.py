@@ -235,14 +235,8 @@ RUNNING = [
         {"rough": ()},
     ),
     ([BULK + "&contact restitution = 0.9 /\n" + OUTPUT.format("")], {"haff": ()}),
-    (
-        [PAIR.format(x) + LONGER for x in (0.3, 0.300001)],
-        {"lyapunov": ("--largest", "0.1")},
-    ),
-    (
-        [FALLING + OUTPUT.format(""), FALLING + STEPS + OUTPUT.format("")],
-        {"missed": SOON[:2]},
-    ),
+    ([PAIR.format(x) + LONGER for x in (0.3, 0.300001)], {"lyapunov": ("--largest", "0.1")}),
+    ([FALLING + OUTPUT.format(""), FALLING + STEPS + OUTPUT.format("")], {"missed": SOON[:2]}),
 ]
 ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 

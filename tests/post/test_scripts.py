@@ -145,10 +145,7 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monke
 
 def test_fewer_frames_than_asked_for_are_said(tmp_path, rng, capsys):
     path = gas(tmp_path / "a.h5", rng)
-    for frames, words in (
-        ("10:30", "takes 3 of 20 frames, from t = 15"),
-        ("3", "none of the fr"),
-    ):
+    for frames, words in (("10:30", "takes 3 of 20 frames, from t = 15"), ("3", "none of the fr")):
         draw("speeds", path, "--frames", frames, "-o", tmp_path / "a.png")
         assert f"warning: a.h5: {words}" in capsys.readouterr().err
 

@@ -392,9 +392,7 @@ def test_of_twins_started_at_once_one_runs(started, ricochet, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text",
-    [BUSY.replace("0.05", "0.001"), LOGGED, PLANNED],
-    ids=["growing", "rebuilt", "planned"],
+    "text", [BUSY.replace("0.05", "0.001"), LOGGED, PLANNED], ids=["growing", "rebuilt", "planned"]
 )
 @pytest.mark.parametrize("sizes", [4, pytest.param(40, marks=pytest.mark.check)])
 def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):

@@ -9,16 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from whole_runs import (
-    FILES,
-    FINISHED,
-    MIXTURE,
-    USAGE,
-    contents,
-    differences,
-    one_line,
-    write_input,
-)
+from whole_runs import FILES, FINISHED, MIXTURE, USAGE, contents, differences, one_line, write_input
 
 GRAVITY = """&box upper = 2, 3  boundary = 'periodic', 'wall'  gravity = 0, -2 /
 &species name = 'gas' count = 50 radius = 0.03 mass = 2 velocities = 'uniform' speed = 1 /

@@ -26,10 +26,7 @@ def between_walls(turning: bool) -> tuple[Member, ...]:
     return ensemble(
         10,
         box={"upper": (1.2, 1), "boundary": ("wall", "periodic")},
-        side=[
-            {"name": "left", "temperature": HOT},
-            {"name": "right", "temperature": COLD},
-        ],
+        side=[{"name": "left", "temperature": HOT}, {"name": "right", "temperature": COLD}],
         species={"name": "gas", "count": 1, "radius": 0.1, "temperature": 2.0, **spin},
         stop={"time": 40000},
         output={"frames_every_time": 40000, "observables_every_time": 4000},
