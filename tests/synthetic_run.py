@@ -1,7 +1,9 @@
 """Writes small HDF5 files in the layout of a Ricochet run, for tests of the post-processing."""
 
+import csv
 import importlib
 import sys
+import warnings
 from pathlib import Path
 from unittest import mock
 
@@ -123,11 +125,24 @@ def maxwell_velocities(rng, frames, count, temperature=1.0, mass=1.0):
 
 
 def run_script(name, *arguments):
-    """Run post/NAME.py as from the command line, in this process; returns the exit code."""
-    module = importlib.import_module(name)
-    with mock.patch.object(sys, "argv", [f"{name}.py", *map(str, arguments)]):
+    """Run post/NAME.py as from the command line, in this process; returns the exit code.
+
+    Warnings are errors.
+    """
+    module, words = importlib.import_module(name), [f"{name}.py", *map(str, arguments)]
+    with mock.patch.object(sys, "argv", words), warnings.catch_warnings():
+        warnings.simplefilter("error")
         try:
             launch(module.main)
         except SystemExit as end:
             return end.code or 0
     return 0
+
+
+def drawn(folder, script, *arguments):
+    """Let a script draw and write its table; the rows of this."""
+    figure, table = folder / f"{script}.png", folder / f"{script}.csv"
+    assert run_script(script, *arguments, "-o", figure, "--csv", table) == 0
+    assert figure.stat().st_size > 10000
+    with table.open() as file:
+        return list(csv.DictReader(file))

@@ -102,6 +102,26 @@ def write_input(folder, text=MIXTURE, name="gas.nml") -> Path:
     return path
 
 
+def executable(path, text, shell="sh") -> Path:
+    """A script that stands in for a program."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"#!/usr/bin/env {shell}\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+def environment(**more) -> dict[str, str]:
+    """That of the tests with more variables; no `make` in it takes itself for a part of another."""
+    own = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    return own | {name: str(value) for name, value in more.items()}
+
+
+def ran(*command, check=False, **options) -> subprocess.CompletedProcess:
+    """A command that has ended, with what it has said."""
+    options = {"capture_output": True, "text": True, "timeout": PATIENCE, **options}
+    return subprocess.run(list(map(str, command)), check=check, **options)
+
+
 #: A library that the program is started with instead of the system's own fsync.
 FSYNC = """#include <errno.h>
 #include <signal.h>

@@ -3,9 +3,7 @@
 Runs that are made, whose answer is known, and small runs of the program, on which the scripts draw.
 """
 
-import csv
 import os
-import warnings
 from contextlib import nullcontext
 from typing import NamedTuple
 
@@ -25,26 +23,10 @@ from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
 from ricochet.nature import Refused
-from synthetic_run import ROOT, run_script, write_run, written
+from synthetic_run import ROOT, drawn, run_script, write_run, written
 from validation.estimators import force, hit_rate
 
 PERIODIC = (True, True)
-
-
-def rows_of(path):
-    """The rows of a table."""
-    with path.open() as file:
-        return list(csv.DictReader(file))
-
-
-def drawn(folder, script, *arguments):
-    """Run a script, warnings being errors; the rows of its table."""
-    figure, table = folder / f"{script}.png", folder / f"{script}.csv"
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert run_script(script, *arguments, "-o", figure, "--csv", table) == 0
-    assert figure.stat().st_size > 10000
-    return rows_of(table)
 
 
 # --- pressure ---
@@ -406,14 +388,6 @@ def test_runs_that_a_law_is_not_for_are_refused(tmp_path, capsys, script, unlike
     assert run_script(script, path, "-o", tmp_path / "a.png") == 1
     said = capsys.readouterr().err
     assert words in said and said.startswith(f"{script}.py: {path}: ") and said.count("\n") == 1
-
-
-def test_rough_gases_are_drawn(simulated, tmp_path):
-    text = """&box upper = 60, 60 boundary = 'periodic', 'periodic' /
-    &species count = 100 radius = 0.5 temperature = 1 /
-    &contact restitution = 0.9 tangential_restitution = 0 /
-    &stop collisions_per_disk = 3 / &output observables_every_collisions = 20 /"""
-    drawn(tmp_path, "rough", simulated(text).path)
 
 
 def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):

@@ -1,7 +1,6 @@
 """The program started from Python: `ricochet.run`."""
 
 import io
-import os
 import re
 import signal
 import subprocess
@@ -14,7 +13,7 @@ import pytest
 import ricochet as package
 from ricochet import ProgramError, program
 from synthetic_run import ROOT
-from whole_runs import STOPPED, USAGE, differences, is_asleep, wait_for
+from whole_runs import STOPPED, USAGE, differences, environment, is_asleep, ran, wait_for
 
 THIRD = 0.1 / 3
 #: All kinds of values: repeated groups, texts with quotes, pairs, logicals, arrays; as of numpy.
@@ -72,9 +71,8 @@ def test_what_the_program_says_is_the_message(tmp_path):
 def test_nothing_is_left_of_a_run_without_output(tmp_path):
     code = "import ricochet, sys; print(ricochet.run(sys.argv[1]).path)"
     (tmp_path / "gas.nml").write_text(TEXT)
-    command = [sys.executable, "-c", code, "gas.nml"]
-    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
-    python = subprocess.run(command, env=paths, capture_output=True, text=True)
+    paths = environment(PYTHONPATH=ROOT / "post")
+    python = ran(sys.executable, "-c", code, "gas.nml", env=paths)
     assert (python.returncode, python.stderr) == (0, "")
     assert python.stdout.strip() and not Path(python.stdout.strip()).exists()
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
@@ -95,7 +93,7 @@ class Notebook(io.StringIO):
 def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch):
     (tmp_path / "gas.nml").write_text(TEXT)
     code = "import ricochet; ricochet.run('gas.nml', {'stop.collisions': 10**12}, 'long.h5')"
-    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
+    paths = environment(PYTHONPATH=ROOT / "post")
     python = subprocess.Popen(
         [sys.executable, "-c", code], env=paths, stderr=subprocess.PIPE, text=True
     )

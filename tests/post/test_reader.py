@@ -4,7 +4,6 @@ import csv
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import venv
 from pathlib import Path
@@ -17,7 +16,8 @@ import pytest
 from ricochet import RunError, read_run
 from ricochet.drawing import draw_box, plt, radius_marks
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
-from whole_runs import FINISHED, MIXTURE, STOPPED, frames_in, wait_for, write_input
+from whole_runs import FINISHED, MIXTURE, STOPPED
+from whole_runs import executable, frames_in, ran, wait_for, write_input
 
 
 def tiny(path, frames=1, count=1, **more):
@@ -67,8 +67,7 @@ def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
 
 def frames_seen_by_another_program(path):
     code = f"from ricochet import read_run; print(read_run({str(path)!r}).frames)"
-    command = [sys.executable, "-c", code]
-    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT / "post")
+    result = ran(sys.executable, "-c", code, cwd=ROOT / "post")
     return int(result.stdout) if result.returncode == 0 else result.stderr.splitlines()[-1]
 
 
@@ -409,7 +408,7 @@ def test_scripts_explain_themselves(script, capsys):
 def test_a_script_works_from_any_folder_and_without_a_display(small, tmp_path):
     command = [sys.executable, ROOT / "post" / "snapshot.py", small, "-o", "new/a.png"]
     bare = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)}
-    result = subprocess.run(command, cwd=tmp_path, env=bare, capture_output=True, text=True)
+    result = ran(*command, cwd=tmp_path, env=bare)
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "new" / "a.png").exists()
 
@@ -420,23 +419,20 @@ def test_after_set_up_python_finds_the_package_from_any_folder(tmp_path):
     for name in (".ci/set-up", "requirements.txt", "tests/readers.txt", package):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    environment = tmp_path / ".venv"
-    venv.create(environment, symlinks=True)
-    (environment / "purposes").write_text("demo\n")
+    own = tmp_path / ".venv"
+    venv.create(own, symlinks=True)
+    (own / "purposes").write_text("demo\n")
     wanted = [tmp_path / "requirements.txt", tmp_path / "tests" / "readers.txt"]
-    (environment / "requirements.txt").write_text("".join(path.read_text() for path in wanted))
-    subprocess.run([tmp_path / ".ci" / "set-up", "demo"], check=True)
+    (own / "requirements.txt").write_text("".join(path.read_text() for path in wanted))
+    ran(tmp_path / ".ci" / "set-up", "demo", check=True)
     code = "from importlib.util import find_spec; print(find_spec('ricochet').origin)"
-    command = [environment / "bin" / "python", "-c", code]
-    found = subprocess.run(command, cwd="/", capture_output=True, text=True, check=True).stdout
+    found = ran(own / "bin" / "python", "-c", code, cwd="/", check=True).stdout
     assert found.strip() == str(tmp_path / package)
 
 
 def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, capsys):
     film, path = tmp_path / "film.mp4", tiny(tmp_path / "run.h5", 2, 3)
-    ffmpeg = tmp_path / "its-ffmpeg"
-    ffmpeg.write_text('#!/bin/sh\nfor film; do :; done\ncat >"$film"\n')
-    ffmpeg.chmod(0o755)
+    ffmpeg = executable(tmp_path / "its-ffmpeg", 'for film; do :; done\ncat >"$film"')
     with plt.rc_context({"animation.ffmpeg_path": "no-ffmpeg"}):
         monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
         assert run_script("animate", path, "-o", film) == 2
@@ -449,8 +445,7 @@ def test_a_film_takes_the_ffmpeg_of_a_python_package(tmp_path, monkeypatch, caps
 
 @pytest.mark.parametrize("script", [*SCRIPTS, "lab"])
 def test_a_python_without_packages_is_told_where_they_are(script):
-    command = [sys.executable, "-S", ROOT / "post" / f"{script}.py", "--help"]  # no site-packages
-    run = subprocess.run(command, capture_output=True, text=True)
+    run = ran(sys.executable, "-S", ROOT / f"post/{script}.py", "--help")  # no site-packages
     assert run.returncode == 2 and run.stderr.count("\n") == 1
     assert run.stderr.startswith(f"{script}.py: ") and "has no numpy, h5py" in run.stderr
     assert f"{ROOT}/.venv/bin/python" in run.stderr

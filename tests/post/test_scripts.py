@@ -1,8 +1,5 @@
 """Each script of post/ against what it should find in runs that are made by closed formulas."""
 
-import csv
-import warnings
-
 import h5py
 import numpy as np
 import pytest
@@ -20,23 +17,13 @@ import player
 import scaling
 import scattering
 import trajectory
-from ricochet import RunError, cooling, crater, read_run, speeds, statistics, theory, thermodynamics
+from ricochet import RunError
+from ricochet import cooling, crater, read_run, script, speeds, statistics, theory, thermodynamics
 from ricochet.drawing import caption, plt, with_images
 from ricochet.script import chosen_frames, distinct, frame_list, grouped
-from synthetic_run import maxwell_velocities, run_script, write_run, written
+from synthetic_run import drawn, maxwell_velocities, run_script, write_run, written
 
 TWO = statistics.student(2)  # what an error of two runs is larger by
-
-
-def draw(script, *arguments):
-    """Run a script in this process, warnings being errors; the rows of its table, if it has one."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert run_script(script, *arguments) == 0
-    if "--csv" in arguments:
-        with arguments[arguments.index("--csv") + 1].open() as file:
-            return list(csv.DictReader(file))
-    return None
 
 
 def refusal(capsys, script, *arguments, code=2):
@@ -121,19 +108,25 @@ def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path
 def test_the_law_of_fixed_energy_is_used_only_where_it_holds(tmp_path, rng, system, exact):
     """Gravity takes kinetic energy away and gives it back; a strip keeps one momentum of two."""
     run = gas(tmp_path / "run.h5", rng, **system)
-    draw("speeds", run, "-o", tmp_path / "run.png")
+    drawn(tmp_path, "speeds", run)
     assert (speeds.exact_law(read_run(run)) is not None) == exact
 
 
-def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monkeypatch):
+@pytest.fixture
+def figures(monkeypatch):
+    """Those that scripts draw."""
+    found, save = [], script.save
+    monkeypatch.setattr(script, "save", lambda *all_of: (found.append(all_of[0]), save(*all_of)))
+    return found
+
+
+def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, figures):
     """Its frames are each drawn at their own temperature, here Maxwell's."""
-    figures = []
-    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
     calm = gas(tmp_path / "calm.h5", rng, count=2000)
     cool = made_to_cool(gas(tmp_path / "cool.h5", rng, count=2000))
-    draw("speeds", calm, "-o", tmp_path / "calm.png")
+    drawn(tmp_path, "speeds", calm)
     assert "Equilibrium, many frames" in words_on(figures[0]) and capsys.readouterr().err == ""
-    draw("speeds", cool, "-o", tmp_path / "cool.png")
+    drawn(tmp_path, "speeds", cool)
     assert "No equilibrium" in words_on(figures[1]) and "Equilibrium" not in words_on(figures[1])
     falls = "kT falls from 0.2362 to 0.06767"  # exp(-0.75) and exp(-2) halves
     printed, said = capsys.readouterr()
@@ -146,29 +139,26 @@ def test_a_gas_that_cools_is_not_called_equilibrium(tmp_path, rng, capsys, monke
 def test_fewer_frames_than_asked_for_are_said(tmp_path, rng, capsys):
     path = gas(tmp_path / "a.h5", rng)
     for frames, words in (("10:30", "takes 3 of 20 frames, from t = 15"), ("3", "none of the fr")):
-        draw("speeds", path, "--frames", frames, "-o", tmp_path / "a.png")
+        drawn(tmp_path, "speeds", path, "--frames", frames)
         assert f"warning: a.h5: {words}" in capsys.readouterr().err
 
 
 def cells(printed):
     """The row of a printed table by column."""
-    header, row, figure = (line.split() for line in printed.splitlines())
-    assert figure[0] == "figure:"
+    header, row, _ = (line.split() for line in printed.splitlines())
     return dict(zip(header, row, strict=True))
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.02])
-def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, monkeypatch, drift):
+def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, figures, drift):
     """With kT 0.5 beside a flow that has ten times that, or with one that drifts."""
-    figures = []
-    monkeypatch.setattr("ricochet.script.save", lambda figure, *_: figures.append(figure))
     sides = {"periodic": (True, True), "observable_time": np.arange(121.0)}
     box = {"box": {"shear_rate": 10.0}, "contact": {"restitution": 0.9}}
     path = gas(tmp_path / "a.h5", rng, count=1000, frames=121, parameters=box, **sides)
     with h5py.File(made_to_cool(path, -drift), "r+") as file:
         velocity, y = (file[f"particles/disks/{name}/value"] for name in ("velocity", "position"))
         velocity[...] += 10 * y[..., 1:] * [1, 0]
-    draw("speeds", path, "-o", tmp_path / "a.png", "--skip", 20)
+    drawn(tmp_path, "speeds", path, "--skip", 20)
     printed, said = capsys.readouterr()
     row, words = cells(printed), words_on(figures[0])
     if drift:
@@ -250,7 +240,7 @@ def test_cooling_averages_over_runs_on_one_grid(tmp_path):
 
 def test_a_gas_of_one_kind_cools_without_a_ratio(tmp_path, rng):
     path = gas(tmp_path / "gas.h5", rng, names=("all",))  # all/kinetic_energy, disks of that name
-    (row, *_) = draw("cooling", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    (row, *_) = drawn(tmp_path, "cooling", path)
     assert not any("ratio" in name for name in row)
 
 
@@ -378,7 +368,7 @@ def test_figures_and_films_have_scales_and_limits_of_their_data(tmp_path, rng):
 )
 def test_a_crater_that_was_cut_short_is_marked(tmp_path, capsys, words, more):
     path = impact(tmp_path / "a.h5", **more)
-    (row,) = draw("crater", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    (row,) = drawn(tmp_path, "crater", path)
     assert int(row["box_takes_part"]) == ("walls" in more)
     assert int(row["ended_by_time"]) == ("left" in more)
     said = capsys.readouterr().err
@@ -416,7 +406,7 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
     assert figure.axes[0].get_title("left") == "radius 5,  restitution 0.5"
-    rows = draw("crater_scan", *paths, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    rows = drawn(tmp_path, "crater_scan", *paths)
     assert len(rows) == 6 + 6 and {row["speed"] for row in rows} == {"2.0", "5.0"}
     said = capsys.readouterr().err.splitlines()
     for line, mass, xi, count in zip(said, (30, 40), (0.6, 0.5), (2, 1), strict=True):
@@ -499,7 +489,7 @@ def test_thermalisation_time_ignores_a_passing_agreement():
 def test_one_run_does_not_say_that_energies_agree(tmp_path, rng, capsys):
     """In equilibrium the energies of 30 disks pass through agreement again and again."""
     path = falling(tmp_path / "run.h5", rng)
-    (row,) = draw("equipartition", path, "-o", tmp_path / "a.png", "--csv", tmp_path / "a.csv")
+    (row,) = drawn(tmp_path, "equipartition", path)
     assert row["T_therm"] == "nan" and "take more runs" in capsys.readouterr().err
     several = [read_run(falling(tmp_path / f"{k}.h5", rng, seed=k)) for k in range(2, 60)]
     assert equipartition.approach(several, 2, 0.1).thermalisation == 1
@@ -530,7 +520,7 @@ def test_runs_with_equal_seeds_are_compared_and_others_named(tmp_path, rng, caps
     assert rows[1]["missed_percent_error"] == pytest.approx(5 * TWO)
     assert rows[1]["rate"] == pytest.approx(12.5 * 2 / 60 * 49 / 100)
     paths = [run.path for run in (*events, *steps)]
-    draw("missed", *paths, "--skip", 2, "-o", tmp_path / "missed.png")
+    drawn(tmp_path, "missed", *paths, "--skip", 2)
     assert capsys.readouterr().err.endswith(f"left out, as no event-driven run has their seeds: {paths[-1]}\n")  # fmt: skip  # noqa: E501
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):
@@ -602,7 +592,7 @@ def test_cost_takes_the_best_of_equal_runs_and_fits_a_power(tmp_path):
         read_run(timed(tmp_path / f"{k}.h5", n, search, collisions_per_second=rate))
         for k, (search, n, rate) in enumerate(kinds)
     ]
-    draw("cost", *(run.path for run in runs), "-o", tmp_path / "a.png")
+    drawn(tmp_path, "cost", *(run.path for run in runs))
     measured = cost.costs(runs)
     np.testing.assert_allclose(measured["pairs"], [[10, 20], [5, 10]])
     np.testing.assert_allclose(measured["cells"], [[10], [1]])
@@ -618,7 +608,7 @@ def test_cost_takes_the_best_of_equal_runs_and_fits_a_power(tmp_path):
 def test_several_cores_are_compared_with_one_by_medians(tmp_path):
     times = [(1, 12.0), (1, 10.0), (1, 20.0), (2, 6.0)]
     runs = [read_run(timed(tmp_path / f"{n}_{t}.h5", threads=n, wall_time=t)) for n, t in times]
-    draw("scaling", *(run.path for run in runs), "-o", tmp_path / "a.png")
+    drawn(tmp_path, "scaling", *(run.path for run in runs))
     alone, two = scaling.table(runs)
     assert alone["runs"] == 3 and alone["seconds"] == 12 and two["gain"] == pytest.approx(2)
     with pytest.raises(RunError, match="one thread"):
@@ -676,10 +666,10 @@ def test_captions_name_what_varies(tmp_path):
 
 
 def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
-    draw("cooling", cooled(tmp_path / "one.h5", 0.9, 0.3), "-o", tmp_path / "a.png")
+    drawn(tmp_path, "cooling", cooled(tmp_path / "one.h5", 0.9, 0.3))
     printed, said = capsys.readouterr()
     assert "nan" in printed and "no error of energy_left, temperature_ratio: it takes sev" in said
-    draw("equipartition", falling(tmp_path / "f.h5", rng), "--within", 0, "-o", tmp_path / "b.png")
+    drawn(tmp_path, "equipartition", falling(tmp_path / "f.h5", rng), "--within", 0)
     assert "v0 = 0.5: no T_therm; the difference of the energies is not known to 0" in (
         capsys.readouterr().err
     )
@@ -688,5 +678,5 @@ def test_what_is_no_number_has_its_reason(tmp_path, rng, capsys):
 def test_other_formats_are_written_too(tmp_path, rng):
     path = gas(tmp_path / "gas.h5", rng, frames=4)
     for ending, begin in {"pdf": b"%PDF", "svg": b"<?xml"}.items():
-        draw("snapshot", path, "-o", tmp_path / f"a.{ending}")
+        assert run_script("snapshot", path, "-o", tmp_path / f"a.{ending}") == 0
         assert (tmp_path / f"a.{ending}").read_bytes().startswith(begin)

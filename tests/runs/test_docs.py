@@ -2,10 +2,8 @@
 
 import importlib.util
 import json
-import os
 import re
 import shutil
-import subprocess
 import sys
 import textwrap
 import tomllib
@@ -16,7 +14,7 @@ import numpy as np
 import pytest
 
 from synthetic_run import ROOT, write_run
-from whole_runs import differences
+from whole_runs import differences, environment, ran
 
 PLACES = ("*.md", "docs/*.md", "*/README.md", "src/*/README.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
@@ -125,9 +123,9 @@ def called(build, *words, cwd):
     """The (module, procedure) pairs that a run of a program built with --coverage calls."""
     for counts in build.glob("*.gcda"):
         counts.unlink()
-    subprocess.run([build / "ricochet", *words], cwd=cwd, capture_output=True)
+    ran(build / "ricochet", *words, cwd=cwd)
     gcov = ["gcov", "--json-format", "--stdout", *sorted(build.glob("*.gcda"))]
-    lines = subprocess.run(gcov, cwd=build, capture_output=True, check=True).stdout.splitlines()
+    lines = ran(*gcov, cwd=build, check=True).stdout.splitlines()
     files = [file for line in lines for file in json.loads(line)["files"]]
     return {
         (Path(file["file"]).stem, re.sub(r"^__\w+?_MOD_|\.\d+$", "", function["name"]))
@@ -143,9 +141,8 @@ def test_procedures_that_are_named_are_called_in_their_examples(tmp_path):
         pytest.skip("gcov counts the calls")
     build = tmp_path / "build"
     flags = "OPT=-O0 --coverage -Wno-maybe-uninitialized"
-    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     make = ["make", "-j2", flags, f"BUILD={build}", "all"]
-    subprocess.run(make, cwd=ROOT, env=environment, check=True, capture_output=True)
+    ran(*make, cwd=ROOT, env=environment(), check=True)
     (tmp_path / "input").symlink_to(ROOT / "input")
     page = section("inside", "## Where is it decided …\\?")
     short = dict(re.findall(r"\*(\w+)\* is\s+`(.+)`", page))
@@ -185,7 +182,7 @@ def test_every_folder_introduces_its_modules_and_says_which_tests_protect_it(fol
 
 def test_options_that_are_named_exist(program):
     """Options of ricochet in code blocks of the pages."""
-    known = subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout
+    known = ran(program, "--help", check=True).stdout
     for page in PAGES:
         for line in page.read_text().splitlines():
             if re.match(r"    (build/)?ricochet ", line):
@@ -210,9 +207,9 @@ def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatc
         shutil.copy(script, tmp_path / "runs")
     for name in ("input", "post"):
         (tmp_path / name).symlink_to(ROOT / name)
-    environment = {**os.environ, "PYTHON": sys.executable, "RICOCHET": str(program)}
+    own = environment(PYTHON=sys.executable, RICOCHET=program)
     for study in ("mixture", "cooling"):
-        subprocess.run([tmp_path / f"runs/{study}.sh"], env=environment, check=True)
+        ran(tmp_path / f"runs/{study}.sh", env=own, check=True)
     pages = script_in_docs("tasks_page")
     monkeypatch.setattr(pages, "TABLES", tmp_path / "runs" / "figures")
     known = json.loads((ROOT / "docs" / "tasks.json").read_text())
@@ -223,15 +220,12 @@ def test_the_studies_give_the_numbers_of_the_tasks(program, tmp_path, monkeypatc
 
 
 def test_make_lists_its_targets_in_one_screen_and_suggests_them():
-    def make(target):
-        return subprocess.run(["make", target], capture_output=True, text=True, cwd=ROOT)
-
-    screen = make("help").stdout.splitlines()
+    screen = ran("make", "help", cwd=ROOT).stdout.splitlines()
     assert len(screen) <= 24 and max(map(len, screen)) <= 80
     names = ("demo", "test", "unit-tests", "figures", "check", "bench", "lint", "docs", "clean")
     for target in names:
         assert any(line.startswith(f"  make {target} ") for line in screen)
-    wrong = make("tset")
+    wrong = ran("make", "tset", cwd=ROOT)
     assert wrong.returncode == 2 and "no file tset; did you mean test?" in wrong.stderr
 
 
@@ -256,8 +250,7 @@ def test_the_script_of_a_recipe_works(tmp_path):
     (tmp_path / "fastest.py").write_text(textwrap.dedent(script))
     still = np.zeros((2, 3, 2))
     command = [sys.executable, "fastest.py", write_run(tmp_path / "run.h5", still, still)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
-    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    ran(*command, cwd=tmp_path, env=environment(PYTHONPATH=ROOT / "post"), check=True)
     assert (tmp_path / "fastest.png").exists()
 
 
@@ -270,17 +263,16 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     names = "all/kinetic_energy", "total_energy", "pressure"
     energies = {name: [0.0, 0.0] for name in names}
     write_run(tmp_path / "runs" / "gas.h5", x, x, observables=energies)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "post")}
-    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
+    own = environment(PYTHONPATH=ROOT / "post")
+    ran(sys.executable, "-c", code, cwd=tmp_path, env=own, check=True)
     assert (tmp_path / "runs" / "gas.png").exists()
 
 
 def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
     page = section("output", "## Running it from Python")
     code = textwrap.dedent("\n".join(re.findall(r"^    .*", page, re.M)))
-    paths = {**os.environ, "PYTHONPATH": str(ROOT / "post"), "RICOCHET": str(program)}
-    command = [sys.executable, "-c", code]
-    said = subprocess.run(command, cwd=tmp_path, env=paths, capture_output=True, text=True)
+    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
+    said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
     energies = [float(line) for line in said.stdout.splitlines()]
     assert (said.returncode, said.stderr) == (0, "")
     assert len(set(energies)) == 3 and all(0 < energy < 250 for energy in energies)
@@ -288,7 +280,7 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
 
 def test_there_is_one_version(program):
     """That of the program; the newest section of the changes and its date are those to cite."""
-    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    said = ran(program, "--version", check=True).stdout
     project = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
     page, cited = ((ROOT / name).read_text() for name in ("CHANGELOG.md", "CITATION.cff"))
     version, date = re.search(r"^## ([\d.]+) \((.*)\)$", page, re.M).groups()
@@ -304,7 +296,7 @@ def completed(program, *words):
     script = """source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ricochet
     printf '%s\\n' "${COMPREPLY[@]}" """
     command = ["bash", "-c", script, "bash", COMPLETION, program, *words]
-    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    result = ran(*command, cwd=ROOT, check=True)
     assert result.stderr == ""
     return result.stdout.split()
 
@@ -340,7 +332,7 @@ def test_completion_knows_ensembles(program, tmp_path):
     assert completed(ensemble, "--scan", "run.queue", "=", "he") == ["heap"]
     assert completed("runs/ensemble.sh", "--sc") == ["--scan"]
     known = 'source "$1"; complete -p ricochet ricochet-ensemble runs/ensemble.sh'
-    subprocess.run(["bash", "-c", known, "bash", COMPLETION], stdout=subprocess.PIPE, check=True)
+    ran("bash", "-c", known, "bash", COMPLETION, check=True)
 
 
 def replace_lines(text: str, old: list[str], new: list[str]) -> str:
@@ -369,8 +361,7 @@ def carry_out_recipes(page: str, root: Path) -> int:
 
 def look_at_bars(run, folder):
     """The bar is on the pages of Python; paths are known that meet it more than once."""
-    more = ["--set", "contact.wall_rule=normal", "--force"]
-    subprocess.run([*run, *more], cwd=folder, check=True)
+    ran(*run, "--set", "contact.wall_rule=normal", "--force", cwd=folder, check=True)
     code = """if True:
         from ricochet import read_run
         from ricochet.paths import Paths
@@ -380,11 +371,11 @@ def look_at_bars(run, folder):
         assert not any(turn.guessed.any() for turn in turns)
         assert sum(len(turn.time) for turn in turns) == (run.events[0] <= run.time[300]).sum() > 200
     """
-    environment = {**os.environ, "PYTHONPATH": str(folder / "post")}
-    subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, check=True)
+    own = environment(PYTHONPATH=folder / "post")
+    ran(sys.executable, "-c", code, cwd=folder, env=own, check=True)
     for script, figure in (("player", "all.html"), ("snapshot", "all.png")):
         command = [sys.executable, folder / f"post/{script}.py", "all.h5", "-o", figure]
-        subprocess.run(command, cwd=folder, env=environment, check=True)
+        ran(*command, cwd=folder, env=own, check=True)
 
 
 def test_the_recipes_work(tmp_path):
@@ -392,18 +383,14 @@ def test_the_recipes_work(tmp_path):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
     assert carry_out_recipes((ROOT / "docs" / "inside.md").read_text(), tmp_path) > 30
-    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
-    style = [sys.executable, "tests/support/check_style.py"]
-    said = subprocess.run(style, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    ran("git", "init", "-q", cwd=tmp_path, check=True)
+    said = ran(sys.executable, "tests/support/check_style.py", cwd=tmp_path)
     assert (said.returncode, said.stdout) == (0, "")
     build = ["make", "-j2", "OPT=-O0", f"BUILD={tmp_path}/build"]
-    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     about = "observables", "variables", "namelist_input"
     laws = " ".join(f"tests/unit/test_{name}.pf" for name in about)
     for goal in ([], [f"tests={laws}", "unit-tests"]):  # they hold for what is new, too
-        made = subprocess.run(
-            build + goal, cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
+        made = ran(*build, *goal, cwd=tmp_path, env=environment())
         assert made.returncode == 0, made.stdout + made.stderr
     (tmp_path / "all.nml").write_text(
         """&box upper = 2, 1 / &run dynamics = 'ideal' /
@@ -413,7 +400,7 @@ def test_the_recipes_work(tmp_path):
         &output frames_every_time = 0.01 observables_every_time = 0.01 event_log = .true. /"""
     )
     run = [tmp_path / "build" / "ricochet", "all.nml", "-o", "all.h5", "--quiet"]
-    subprocess.run(run, cwd=tmp_path, check=True)
+    ran(*run, cwd=tmp_path, check=True)
     with h5py.File(tmp_path / "all.h5") as file:
         fastest = file["observables/largest_speed/value"][:]
         x, y = np.moveaxis(file["particles/disks/position/value"][:], -1, 0)
@@ -436,7 +423,7 @@ def test_the_recipes_work(tmp_path):
         ("parts", "--resume"),
     ):
         command = [run[0], "gas.nml", "-o", f"{name}.h5", "--quiet", *options]
-        subprocess.run(command, cwd=tmp_path, check=True)
+        ran(*command, cwd=tmp_path, check=True)
     for other in ("cores", "parts"):
         found = differences(tmp_path / "plain.h5", tmp_path / f"{other}.h5")
         assert [name for name in found if "parameters" not in name] == []

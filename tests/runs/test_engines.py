@@ -11,11 +11,10 @@ import socket
 import subprocess
 from pathlib import Path
 
-import h5py
 import pytest
 
 from synthetic_run import ROOT
-from whole_runs import PATIENCE, frames_in, wait_for
+from whole_runs import PATIENCE, differences, environment, frames_in, ran, wait_for
 
 # Daemons, ports and signals across hosts: a minute that `.ci/run` and `make check` have.
 pytestmark = pytest.mark.check
@@ -69,23 +68,14 @@ def answers(port: int) -> bool:
 def ensemble(program, tmp_path):
     """`ensemble(*arguments)` runs the script in a folder of its own; `start=True` does not wait."""
 
-    def run(*arguments, start=False, **environment):
+    def run(*arguments, start=False):
         command = ["bash", SCRIPT, INPUT, "-d", "members", *map(str, arguments)]
-        settings = {**os.environ, "RICOCHET": str(program), **environment}
-        options = {"cwd": tmp_path, "env": settings, "text": True}
+        options = {"cwd": tmp_path, "env": environment(RICOCHET=program)}
         if start:
-            return subprocess.Popen(command, stderr=subprocess.PIPE, **options)
-        options |= {"capture_output": True, "timeout": PATIENCE}
-        return subprocess.run(command, check=False, **options)
+            return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **options)
+        return ran(*command, **options)
 
     return run
-
-
-def data_of(path: Path) -> bytes:
-    """Positions and velocities of the last frame."""
-    with h5py.File(path) as file:
-        disks = file["particles/disks"]
-        return disks["position/value"][-1].tobytes() + disks["velocity/value"][-1].tobytes()
 
 
 # --- shares ---
@@ -111,7 +101,7 @@ def hosts(tmp_path):
     folder, port = tmp_path / "ssh", free_port()
     folder.mkdir(mode=0o700)
     for key in ("host", "user"):
-        subprocess.run(["ssh-keygen", "-qt", "ed25519", "-N", "", "-f", folder / key], check=True)
+        ran("ssh-keygen", "-qt", "ed25519", "-N", "", "-f", folder / key, check=True)
     (folder / "authorized").write_text((folder / "user.pub").read_text())
     (folder / "sshd.conf").write_text(
         f"ListenAddress 127.0.0.1:{port}\nHostKey {folder}/host\nPidFile {folder}/pid\n"
@@ -145,8 +135,8 @@ def test_parallel_runs_all_members_on_this_machine(ensemble, tmp_path):
     plain = ensemble("-d", "plain", "--seeds", "1-4", *SMALL)
     assert plain.returncode == 0
     for k in range(1, 5):
-        name = f"seed_{k}.h5"
-        assert data_of(tmp_path / "my members" / name) == data_of(tmp_path / "plain" / name)
+        pair = [tmp_path / folder / f"seed_{k}.h5" for folder in ("my members", "plain")]
+        assert differences(*pair) == []
 
 
 def test_parallel_runs_members_on_two_hosts(ensemble, hosts, tmp_path):
@@ -197,11 +187,8 @@ def cluster(tmp_path, monkeypatch):
         (folder / name).mkdir(mode=0o755)
     (folder / "key").write_bytes(os.urandom(128))
     (folder / "key").chmod(0o400)
-    host, ports, munge = (
-        socket.gethostname().split(".")[0],
-        (free_port(), free_port()),
-        folder / "m",
-    )
+    host, munge = socket.gethostname().split(".")[0], folder / "m"
+    ports = free_port(), free_port()
     (folder / "slurm.conf").write_text(
         f"""ClusterName=test
 SlurmctldHost={host}(127.0.0.1)
@@ -230,7 +217,7 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
     files = {name: f"{folder}/munged.{name}" for name in ("log", "pid", "seed")}
 
     def slurm(*command) -> str:
-        return subprocess.run(command, capture_output=True, text=True, check=False).stdout
+        return ran(*command).stdout
 
     with contextlib.ExitStack() as stack:
         munged = ["munged", "-F", "-f", f"--key-file={folder}/key", f"--socket={munge}"]

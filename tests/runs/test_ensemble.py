@@ -14,24 +14,16 @@ from pathlib import Path
 
 import pytest
 
-from whole_runs import (
-    MIXTURE,
-    PATIENCE,
-    differences,
-    is_asleep,
-    occupy,
-    wait_for,
-    within,
-    write_input,
-)
+from whole_runs import MIXTURE, PATIENCE
+from whole_runs import differences, environment, executable, is_asleep, occupy, ran, wait_for
+from whole_runs import within, write_input
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
 # Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
 # `outcome.exit=N` fails with N; after 4 it has broken off, and does not resume.
-PROGRAM = """#!/usr/bin/env bash
-while (($#)); do
+PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
   --set) sets+="$2|" && [[ $2 != outcome.exit=* ]] || outcome=${2#*=} && shift ;;
@@ -57,9 +49,7 @@ def lab(tmp_path):
     """A folder with the stand-in and an input file, with a blank in its name."""
     folder = tmp_path / "a lab"
     folder.mkdir()
-    program = folder / "program"
-    program.write_text(PROGRAM)
-    program.chmod(0o755)
+    executable(folder / "program", PROGRAM, "bash")
     (folder / "gas.nml").write_text("&run\n/\n")
     return folder
 
@@ -68,19 +58,12 @@ def command(lab, *options):
     return [str(SCRIPT), str(lab / "gas.nml"), "-d", str(lab / "out"), *options]
 
 
-def environment(lab):
-    return {**os.environ, "RICOCHET": str(lab / "program"), "HOLD": str(lab / "hold")}
+def surroundings(lab, **more):
+    return environment(RICOCHET=lab / "program", HOLD=lab / "hold", **more)
 
 
-def ensemble(lab, *options, seconds=None):
-    return subprocess.run(
-        [*within(seconds), *command(lab, *options)],
-        env=environment(lab),
-        cwd=lab,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+def ensemble(lab, *options, seconds=None, **more):
+    return ran(*within(seconds), *command(lab, *options), env=surroundings(lab, **more), cwd=lab)
 
 
 @pytest.mark.parametrize(
@@ -97,9 +80,8 @@ def test_a_tool_that_is_missing_is_told(lab, tool, engine, said):
         link = lab / "tools" / path.name
         if path.name != tool and not link.is_symlink():
             link.symlink_to(path)
-    few = environment(lab) | {"PATH": str(lab / "tools")}
-    words = command(lab, "--seeds", "1", "--engine", engine)
-    done = subprocess.run(["bash", *words], env=few, capture_output=True, text=True)
+    few = surroundings(lab, PATH=lab / "tools")
+    done = ran("bash", *command(lab, "--seeds", "1", "--engine", engine), env=few)
     assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1
 
 
@@ -109,7 +91,7 @@ def started(lab, *options, members):
     (lab / "hold").touch()
     process = subprocess.Popen(
         command(lab, *options),
-        env=environment(lab),
+        env=surroundings(lab),
         start_new_session=True,
         stderr=subprocess.PIPE,
         text=True,
@@ -138,15 +120,8 @@ def starts(lab):
 
 def test_members_are_seeds_times_values(lab):
     """Values that are vectors are separated by semicolons."""
-    result = ensemble(
-        lab,
-        "--seeds",
-        "1-2,5",
-        "--scan",
-        "species.ball.velocity=0,-1;0,-2",
-        "--set",
-        "contact.restitution=0.5",
-    )
+    scan = ["--scan", "species.ball.velocity=0,-1;0,-2", "--set", "contact.restitution=0.5"]
+    result = ensemble(lab, "--seeds", "1-2,5", *scan)
     assert result.returncode == 0
     assert starts(lab) == {
         f"ball.velocity_0_{v}_seed_{seed}": [
@@ -260,14 +235,8 @@ def test_a_signal_at_any_command_leaves_nothing_behind(lab, moment):
     assert moment.isdigit() or moment in SCRIPT.read_text()
     (lab / "hold").touch()
     (lab / "at_a_command").write_text(AT_A_COMMAND)
-    variables = {"BASH_ENV": str(lab / "at_a_command"), "MOMENT": moment, "LAB": str(lab)}
-    run = subprocess.run(
-        command(lab, "--seeds", "1-3", "-j", "2"),
-        env=environment(lab) | variables,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+    variables = {"BASH_ENV": lab / "at_a_command", "MOMENT": moment, "LAB": lab}
+    run = ensemble(lab, "--seeds", "1-3", "-j", "2", **variables)
     assert (lab / "sent").exists() and run.returncode == 75, run.stderr
     assert not processes_of(lab)
     (lab / "hold").unlink()
@@ -401,8 +370,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(lab, small_disk):
     (full / "filler").write_bytes(bytes(4096))
 
     def start(*seeds):
-        line = [SCRIPT, lab / "gas.nml", "-d", full / "out", "--seeds", *seeds]
-        return subprocess.run(line, env=environment(lab), capture_output=True, text=True)
+        return ensemble(lab, "-d", full / "out", "--seeds", *seeds)
 
     result = start("1-3")
     assert result.returncode == 3 and result.stderr.count("\n") == 1
@@ -420,7 +388,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(lab, small_disk):
 def test_two_commands_at_once_remember_the_members_of_both(lab):
     lists = ["1-3", "4-6", "7-9"]
     copies = [
-        subprocess.Popen(command(lab, "--seeds", seeds), env=environment(lab)) for seeds in lists
+        subprocess.Popen(command(lab, "--seeds", seeds), env=surroundings(lab)) for seeds in lists
     ]
     assert [copy.wait() for copy in copies] == [0, 0, 0]
     lines = (lab / "out" / "manifest.txt").read_text().splitlines()
@@ -443,7 +411,7 @@ def real(program, tmp_path):
     def start(folder, *options, members=("--seeds", "1-6")):
         return subprocess.Popen(
             [SCRIPT, input_file, "-d", tmp_path / folder, *members, *options],
-            env={**os.environ, "RICOCHET": str(program)},
+            env=environment(RICOCHET=program),
             stderr=subprocess.PIPE,
             start_new_session=True,
             text=True,

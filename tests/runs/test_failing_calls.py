@@ -10,18 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 import h5py
 import pytest
 
-from whole_runs import (
-    FILES,
-    FINISHED,
-    PATIENCE,
-    STOPPED,
-    USAGE,
-    committed,
-    differences,
-    is_beginning,
-    one_line,
-    write_input,
-)
+from whole_runs import FILES, FINISHED, PATIENCE, STOPPED, USAGE
+from whole_runs import committed, differences, is_beginning, one_line, ran, write_input
 
 #: Few calls, but of every kind: frames of a planned number, observables and events of an unknown
 #: one, so that the file is rebuilt at the end, and two checkpoints.
@@ -87,9 +77,7 @@ def copy_folder(source, target):
 
 def started(*command, folder):
     """The run, in a folder; killed with all that it has started if it hangs."""
-    limit = ["timeout", "-s", "KILL", str(PATIENCE)]
-    options = {"capture_output": True, "text": True, "check": False}
-    return subprocess.run([*limit, *command], cwd=folder, **options)
+    return ran("timeout", "-s", "KILL", PATIENCE, *command, cwd=folder, timeout=None)
 
 
 def traced(program, folder, option, *what):

@@ -14,27 +14,10 @@ from pathlib import Path
 import h5py
 import pytest
 
-from whole_runs import (
-    FILES,
-    FINISHED,
-    MIXTURE,
-    STOPPED,
-    committed,
-    differences,
-    ended_soon,
-    filled_pipe,
-    frames_in,
-    has_ended,
-    heeds,
-    held,
-    is_asleep,
-    is_beginning,
-    let_work,
-    one_line,
-    wait_for,
-    with_fsync,
-    write_input,
-)
+from whole_runs import FILES, FINISHED, MIXTURE, STOPPED
+from whole_runs import committed, differences, ended_soon, filled_pipe, frames_in, has_ended, heeds
+from whole_runs import held, is_asleep, is_beginning, let_work, one_line, ran, wait_for, with_fsync
+from whole_runs import write_input
 
 #: Frames as fast as they come, in a file that grows; a checkpoint now and then.
 BUSY = """&species name = 'gas' count = 100 radius = 0.02 speed = 1 /
@@ -321,12 +304,9 @@ def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
 def test_ignored_signals_stay_ignored(program, tmp_path):
     """The run of nohup outlives the terminal."""
     write_input(tmp_path, BUSY)
-    process = subprocess.Popen(
-        ["nohup", program, "gas.nml", "-o", "gas.h5"],
-        cwd=tmp_path,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    command = ["nohup", program, "gas.nml", "-o", "gas.h5"]
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(command, cwd=tmp_path, **silent)
     let_work(process)
     assert not heeds(process.pid, signal.SIGHUP)
     process.send_signal(signal.SIGHUP)
@@ -424,12 +404,8 @@ def test_a_full_disk_costs_nothing(ricochet, tmp_path, small_disk, text, sizes):
 
 def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
     write_input(tmp_path, BUSY)
-    run = subprocess.run(
-        ["bash", "-c", 'ulimit -f 3000; exec "$0" gas.nml -o gas.h5', program],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
+    limited = 'ulimit -f 3000; exec "$0" gas.nml -o gas.h5'
+    run = ran("bash", "-c", limited, program, cwd=tmp_path)
     assert run.returncode == FILES and "gas.h5.part" in one_line(run)
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
 

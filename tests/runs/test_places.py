@@ -3,25 +3,14 @@
 import os
 import shutil
 import signal
-import subprocess
 import tempfile
 from pathlib import Path
 
 import pytest
 
-from whole_runs import (
-    FILES,
-    FINISHED,
-    STOPPED,
-    USAGE,
-    differences,
-    frames_in,
-    occupy,
-    one_line,
-    wait_for,
-    with_fsync,
-    write_input,
-)
+from whole_runs import FILES, FINISHED, STOPPED, USAGE
+from whole_runs import differences, frames_in, occupy, one_line, ran, wait_for, with_fsync
+from whole_runs import write_input
 
 SHORT = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 1 /
@@ -303,8 +292,7 @@ def test_a_run_needs_the_right_to_make_files_not_to_list_them(program, mode, sta
         folder.chmod(mode)
         user = {"user": 65534, "group": 65534, "extra_groups": []}
         try:
-            command = [folder / "ricochet", *COMMAND]
-            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, **user)
+            run = ran(folder / "ricochet", *COMMAND, cwd=folder, **user)
         except PermissionError:
             pytest.skip("no other user may enter the folders above this one")
     assert run.returncode == status, run.stderr

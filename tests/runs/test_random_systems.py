@@ -26,7 +26,8 @@ import pytest
 
 from random_systems import CADENCES, System, numbers, random_system, starting_file
 from run_laws import laws_broken
-from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED, contents, unlike, within
+from whole_runs import BROKEN, FINISHED, PATIENCE, STOPPED
+from whole_runs import contents, executable, ran, unlike, within
 
 SEEDS = [f"{os.environ.get('SEED', '1')} {k}" for k in range(int(os.environ.get("SYSTEMS", "60")))]
 SECONDS = 200  # of processor time: only something endless takes them
@@ -174,8 +175,7 @@ COLUMNS |= {"mass": "mass", "omega": "1 / time", "angle": "1"}
 @functools.cache
 def table_of(program: Path) -> dict:
     """The program's own table of variables."""
-    done = subprocess.run([program, "--print-variables"], capture_output=True, check=True)
-    return json.loads(done.stdout)
+    return json.loads(ran(program, "--print-variables", check=True).stdout)
 
 
 def rescaled(line: str, units: dict, table: dict) -> str:
@@ -217,7 +217,7 @@ def is_accepted(program: Path, folder: Path, system: System) -> bool:
     (folder / "start.txt").write_text(starting_file(system.columns, system.table))
     (folder / "case.nml").write_text(system.text)
     command = [*within(5), program, "case.nml", "--check"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    done = ran(*command, cwd=folder)
     told = [line for line in done.stderr.splitlines() if not line.startswith(NOT_THE_END)]
     assert all(map(NO_ROOM.search, told)), f"{done.stderr}{system.text}"
     return done.returncode == FINISHED
@@ -325,14 +325,8 @@ def test_many_systems_draw_every_pair_of_features_that_goes_together(program, tm
     "when", ["queue=heap", "resume", "threads=2", "output.frames", "other.nml"]
 )
 def test_a_program_whose_result_depends_on_the_way_is_found_out(program, tmp_path, when):
-    liar = tmp_path / "liar"
-    liar.write_text(
-        f"""#!/bin/sh
-case "$*" in *{when}*) exec {program} "$@" --set stop.events=3 ;; esac
-exec {program} "$@"
-"""
-    )
-    liar.chmod(0o755)
+    lie = f'case "$*" in *{when}*) exec {program} "$@" --set stop.events=3 ;; esac'
+    liar = executable(tmp_path / "liar", f'{lie}\nexec {program} "$@"')
     for k in range(20):
         (tmp_path / f"{k}").mkdir()
         if said := faults(liar, tmp_path / f"{k}", f"1 {k}"):

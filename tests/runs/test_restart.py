@@ -11,18 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from whole_runs import (
-    BROKEN,
-    FILES,
-    FINISHED,
-    MIXTURE,
-    STOPPED,
-    USAGE,
-    contents,
-    differences,
-    one_line,
-    write_input,
-)
+from whole_runs import BROKEN, FILES, FINISHED, MIXTURE, STOPPED, USAGE
+from whole_runs import contents, differences, one_line, write_input
 
 CRATER = Path(__file__).resolve().parents[2] / "input/crater.nml"
 CHECK = pytest.mark.check

@@ -2,10 +2,11 @@
 
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
 NO_SYSTEM = ("common", "ensemble", "figures", "bench", "scaling")
@@ -20,14 +21,11 @@ def study(tmp_path):
         for path in (ROOT / folder).iterdir():
             if path.is_file():
                 shutil.copy(path, tmp_path / folder)
-    stand_in(tmp_path / "ricochet", "exit 4")
-    stand_in(tmp_path / "python", f"echo \"$@\" >>'{tmp_path}/drawn.txt'")
-    stand_in(
-        tmp_path / "bin" / "awk",
-        f'echo "$LC_ALL" >>\'{tmp_path}/language.txt\'\nexec {shutil.which("awk")} "$@"',
-    )
-    environment = {
-        **os.environ,
+    executable(tmp_path / "ricochet", "exit 4")
+    executable(tmp_path / "python", f"echo \"$@\" >>'{tmp_path}/drawn.txt'")
+    noted = f"echo \"$LC_ALL\" >>'{tmp_path}/language.txt'"
+    executable(tmp_path / "bin" / "awk", f'{noted}\nexec {shutil.which("awk")} "$@"')
+    own = {
         "LC_ALL": "de_DE.UTF-8",  # where numbers have commas
         "PATH": f"{tmp_path}/bin:{os.environ['PATH']}",
         "PYTHON": f"{tmp_path}/python",
@@ -35,23 +33,10 @@ def study(tmp_path):
     }
 
     def run(script, *options, **more):
-        return subprocess.run(
-            ["bash", f"{script}.sh", *options],
-            cwd=tmp_path / "runs",
-            env={**environment, **more},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = ["bash", f"{script}.sh", *options]
+        return ran(*command, cwd=tmp_path / "runs", env=environment(**own | more))
 
     return run
-
-
-def stand_in(path: Path, text: str) -> None:
-    """An executable script."""
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(f"#!/bin/sh\n{text}\n")
-    path.chmod(0o755)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
@@ -93,7 +78,7 @@ def test_help_says_what_a_study_does_and_starts_nothing(study, tmp_path, script)
 
 def test_threads_are_measured_by_turns_and_drawn(study, tmp_path):
     """Nothing is measured twice, and a run that fails ends it with its reason."""
-    stand_in(tmp_path / "ricochet", f"echo $1 $2 $3 $6 >>'{tmp_path}/runs.txt'\n: >\"$3\"")
+    executable(tmp_path / "ricochet", f"echo $1 $2 $3 $6 >>'{tmp_path}/runs.txt'\n: >\"$3\"")
     sizes = {"SIZES": "100", "THREADS": "1 4", "RUNS": "2"}
     for _ in range(2):
         run = study("scaling", **sizes)
@@ -101,7 +86,7 @@ def test_threads_are_measured_by_turns_and_drawn(study, tmp_path):
         calls = (tmp_path / "runs.txt").read_text().splitlines()
         assert [call.split()[3][-1] for call in calls[1:]] == ["1", "4", "1", "4"]
     assert "post/scaling.py runs/scaling/gas_100_1_1.h5" in (tmp_path / "drawn.txt").read_text()
-    stand_in(tmp_path / "ricochet", "echo no room >&2\nexit 3")
+    executable(tmp_path / "ricochet", "echo no room >&2\nexit 3")
     run = study("scaling", **sizes | {"SIZES": "200"})
     assert run.returncode != 0 and run.stderr.splitlines()[-1] == "no room"
     assert study("scaling", "--help").returncode == 0
@@ -120,7 +105,7 @@ def test_the_gate_on_instructions_lets_nothing_through_that_it_did_not_count(
 ):
     many = 100000 * per_collision + 5000
     count = f'case "$* " in *collisions=1\\ *) n=5000 ;; *) n={many} ;; esac'
-    stand_in(tmp_path / "bin" / "valgrind", f'{count}\necho "==1== Collected : $n" >&2')
-    gate = study("bench", "--check", RICOCHET=str(program))
+    executable(tmp_path / "bin" / "valgrind", f'{count}\necho "==1== Collected : $n" >&2')
+    gate = study("bench", "--check", RICOCHET=program)
     assert gate.returncode == code, gate.stderr
     assert f"packing 0.5: {per_collision} instructions per collision" in gate.stdout

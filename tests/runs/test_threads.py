@@ -5,13 +5,12 @@ systems (test_random_systems.py).
 """
 
 import os
-import subprocess
 from pathlib import Path
 
 import h5py
 import pytest
 
-from whole_runs import BROKEN, FINISHED, STOPPED, differences, write_input
+from whole_runs import BROKEN, FINISHED, STOPPED, differences, ran, write_input
 
 #: So many that several cores share them.
 GAS = "&species name = 'gas' count = 10000 packing_fraction = 0.3 temperature = 1 /\n"
@@ -83,7 +82,7 @@ def test_too_little_memory_for_domains_is_said(program, gas):
     (gas / "meminfo").write_text("\n".join(["MemAvailable: 29500 kB", *facts]))
     script = f"mount --bind meminfo /proc/meminfo && exec {program} gas.nml -o many.h5"
     command = ["unshare", "-m", "sh", "-c", f"{script} --set run.threads=2"]
-    done = subprocess.run(command, cwd=gas, capture_output=True, text=True)
+    done = ran(*command, cwd=gas)
     if "unshare" in done.stderr or "mount" in done.stderr:
         pytest.skip("cannot pretend to have less memory here: needs root")
     said = "there is not enough memory for 2 threads; the run goes on with one"

@@ -9,11 +9,12 @@ import subprocess
 import sys
 import sysconfig
 import venv
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from whole_runs import PATIENCE
+from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
 #: What pages lead to and no install brings: see there in a clone.
@@ -30,22 +31,8 @@ end module test_it
 """
 
 
-def started(*arguments, **more) -> subprocess.Popen:
-    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name} | more
-    return subprocess.Popen(
-        ["make", *map(str, arguments)],
-        cwd=ROOT,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-
-
 def make(*arguments, **more) -> subprocess.CompletedProcess:
-    process = started(*arguments, **more)
-    out, err = process.communicate(timeout=PATIENCE)
-    return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+    return ran("make", *arguments, cwd=ROOT, env=environment(**more))
 
 
 @pytest.fixture
@@ -60,17 +47,14 @@ def small(tmp_path) -> list[str]:
 
 
 def test_two_at_once_in_one_folder_both_succeed(small):
-    makes = [started(*small) for _ in range(4)]
-    for process in makes:
-        out, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0 and " OK" in out and err == "", out + err
+    with ThreadPoolExecutor(4) as pool:
+        for done in pool.map(lambda _: make(*small), range(4)):
+            assert done.returncode == 0 and " OK" in done.stdout and done.stderr == "", done
 
 
 def test_a_build_that_is_killed_while_it_links_is_finished_by_the_next(small, tmp_path):
     """An empty program, newer than its objects, must not pass for a finished one."""
-    killer = tmp_path / "compiler"
-    killer.write_text("""#!/bin/sh
-case "$*" in
+    script = """case "$*" in
 *" -o "*/unit_tests*)
   printf '' > "$(echo "$*" | sed 's/.* -o \\([^ ]*\\) .*/\\1/')"
   pid=$PPID builders=
@@ -80,11 +64,9 @@ case "$*" in
   done
   kill -KILL $builders ;; # the first of them first, so that it sees no other end
 *) exec gfortran "$@" ;;
-esac
-""")
-    killer.chmod(0o755)
+esac"""
     compiler = tmp_path / "link"
-    compiler.symlink_to(killer)
+    compiler.symlink_to(executable(tmp_path / "compiler", script))
     assert make(*small, f"FC={compiler}").returncode == -signal.SIGKILL
     compiler.unlink()
     compiler.symlink_to(shutil.which("gfortran"))
@@ -106,10 +88,8 @@ def test_runners_take_turns_in_one_folder(small, tmp_path):
 
 def test_a_linker_that_cannot_redirect_gets_no_hints(small, tmp_path):
     """A stand-in for one: it refuses the option as others do."""
-    compiler = tmp_path / "gfortran"
     refusal = 'case "$*" in *--wrap*) echo unknown option: --wrap >&2; exit 1;; esac'
-    compiler.write_text(f'#!/bin/sh\n{refusal}\nexec gfortran "$@"\n')
-    compiler.chmod(0o755)
+    compiler = executable(tmp_path / "gfortran", f'{refusal}\nexec gfortran "$@"')
     run = make(*small, f"FC={compiler}")
     assert run.returncode == 0 and run.stderr == "", run.stderr
 
@@ -133,12 +113,6 @@ def test_what_cannot_be_made_is_refused_in_one_line(tmp_path, arguments, words):
     assert all(line.startswith("make") for line in more) and len(more) < 2
 
 
-def ran(*command, **options) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, **options
-    )
-
-
 def files_in(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if not path.is_dir()]
 
@@ -147,12 +121,9 @@ def test_a_film_takes_one_command(program, tmp_path):
     (tmp_path / "my gas.nml").write_text(
         "&species count = 20 radius = 0.01 temperature = 1 /\n&stop time = 9e9 /\n"
     )
-    (tmp_path / "browse").write_text('#!/bin/sh\necho "$1" > "$0.txt"\n')
-    (tmp_path / "browse").chmod(0o755)
-    film = tmp_path / "films"
+    browser, film = executable(tmp_path / "browse", 'echo "$1" > "$0.txt"'), tmp_path / "films"
     choices = [f"INPUT={tmp_path}/my gas.nml", f"FILM={film}", "SET=stop.time=1 output.event_log=T"]
-    environment = {"BROWSER": str(tmp_path / "browse")}
-    done = make("film", f"BUILD={program.parent}", *choices, **environment)
+    done = make("film", f"BUILD={program.parent}", *choices, BROWSER=browser)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "browse.txt").read_text().strip() == (film / "my gas.html").as_uri()
 
@@ -171,16 +142,14 @@ def installed(tmp_path_factory):
 def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_path):
     inputs = installed / "share/ricochet/input"
     ensemble = [installed / "bin/ricochet-ensemble", inputs / "lab.nml", "-d", "here"]
-    environment = {name: value for name, value in os.environ.items() if name != "RICOCHET"}
-    done = ran(*ensemble, "--seeds", "1,2", cwd=tmp_path, env=environment)
+    own = {name: value for name, value in os.environ.items() if name != "RICOCHET"}
+    done = ran(*ensemble, "--seeds", "1,2", cwd=tmp_path, env=own)
     assert done.returncode == 0, done.stderr
     script = installed / "share/ricochet/post/energy.py"
     done = ran(sys.executable, script, "here/seed_1.h5", "-o", "energy.png", cwd=tmp_path)
     assert done.returncode == 0 and (tmp_path / "energy.png").exists(), done.stderr
-    path = f"{Path(sys.executable).parent}:{environment['PATH']}"
-    done = ran(
-        installed / "bin/ricochet-lab", "--help", cwd=tmp_path, env=environment | {"PATH": path}
-    )
+    own["PATH"] = f"{Path(sys.executable).parent}:{own['PATH']}"
+    done = ran(installed / "bin/ricochet-lab", "--help", cwd=tmp_path, env=own)
     assert done.returncode == 0 and "--no-open" in done.stdout, done.stderr
 
 
@@ -283,15 +252,15 @@ def test_what_the_manual_pages_speak_of_is_installed(installed):
 
 def test_pip_brings_package_commands_and_inputs(program, tmp_path):
     """Into an environment that sees the packages of this one, without a network."""
-    environment = tmp_path / "venv"
-    venv.create(environment, symlinks=True)
-    python = environment / "bin/python"
-    (packages,) = environment.glob("lib/python*/site-packages")
+    own = tmp_path / "venv"
+    venv.create(own, symlinks=True)
+    python = own / "bin/python"
+    (packages,) = own.glob("lib/python*/site-packages")
     (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
     alone = ["--no-deps", "--no-index", "--no-build-isolation", "--quiet"]
     pip = [sys.executable, "-m", "pip", "--python", python, "install", *alone]
     ran(*pip, ROOT / "post", check=True)
-    commands = {path.name for path in (environment / "bin").glob("ricochet-*")}
+    commands = {path.name for path in (own / "bin").glob("ricochet-*")}
     scripts = {path.stem for path in ROOT.glob("post/*.py")} - {"hatch_build"}
     assert commands == {f"ricochet-{name.replace('_', '-')}" for name in scripts}
     code = "import ricochet; print(ricochet.__file__)"
@@ -299,7 +268,7 @@ def test_pip_brings_package_commands_and_inputs(program, tmp_path):
     inputs = packages / "ricochet/input"
     done = ran(program, inputs / "lab.nml", "-o", "lab.h5", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    done = ran(environment / "bin/ricochet-player", "lab.h5", "-o", "lab.html", cwd=tmp_path)
+    done = ran(own / "bin/ricochet-player", "lab.h5", "-o", "lab.html", cwd=tmp_path)
     assert done.returncode == 0 and (tmp_path / "lab.html").exists(), done.stderr
 
 
@@ -324,7 +293,7 @@ def test_a_release_builds_and_runs_without_git_and_names_its_commit(tmp_path):
     tarball = ran("make", "dist", cwd=clone, check=True).stdout.split()[-1]
     ran("tar", "-xzf", clone / tarball, "-C", tmp_path, check=True)
     release = next(tmp_path.glob("ricochet-*"))
-    built = subprocess.run(["make", "-j2"], cwd=release, capture_output=True, text=True)
+    built = ran("make", "-j2", cwd=release)
     assert built.returncode == 0, built.stderr
     version = ran("build/ricochet", "--version", cwd=release).stdout
     named = re.search(r"commit: +(\w+)", version)[1]

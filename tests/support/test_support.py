@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from check_style import problems_of  # noqa: E402
 from translate_pf import Refused, translate  # noqa: E402
 from weigh import main as weigh  # noqa: E402
 
-from whole_runs import PATIENCE  # noqa: E402
+from whole_runs import environment, executable, ran  # noqa: E402
 
 RUNNERS = ["", os.environ["PFUNIT_DIR"]] if os.environ.get("PFUNIT_DIR") else [""]
 FILE = """module test_it
@@ -114,18 +113,10 @@ def test_each_assertion_passes_or_fails_under_the_substitute_as_under_pfunit(tmp
     tests += [VERDICT.format("passes_after_all_failures", PASSES.strip())]
     text = "".join([VERDICTS, *tests, "end module test_verdicts\n"])
     (tmp_path / "test_verdicts.pf").write_text(text)
-    command = [
-        "make",
-        "unit-tests",
-        "sources=",
-        f"suites={tmp_path}",
-        "DEBUG=1",
-        f"shared={'' if pfunit else 'tests/support/funit.f90'}",
-        f"BUILD={tmp_path}",
-        f"PFUNIT_DIR={pfunit}",
-    ]
-    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    shared = f"shared={'' if pfunit else 'tests/support/funit.f90'}"
+    words = ["DEBUG=1", "sources=", shared, f"suites={tmp_path}", f"BUILD={tmp_path}"]
+    words.append(f"PFUNIT_DIR={pfunit}")
+    result = ran("make", "unit-tests", *words, cwd=ROOT, env=environment())
     failed = re.findall(r"test_verdicts(?:_suite)?\.((?:fails|passes)_\w+)", result.stdout)
     assert failed == failing, result.stdout + result.stderr
     assert result.returncode == 2
@@ -193,16 +184,12 @@ def test_translation_keeps_line_numbers_and_texts_with_commas_or_at_signs(tmp_pa
     assert "message='x=1, ''y'''" in lines[6]
 
 
-def judged(tmp_path: Path, script: str, suite: str, **variables) -> subprocess.CompletedProcess:
+def judged(tmp_path: Path, script: str, suite: str, **variables):
     """The verdict on a stand-in for the program with the unit tests."""
-    program = tmp_path / "unit_tests"
-    program.write_text(f"#!/bin/sh\n{script}")
-    program.chmod(0o755)
-    (tmp_path / "test_it.pf").write_text(suite)
-    command = [SUPPORT / "run_unit_tests.sh", "a stand-in", program, tmp_path / "test_it.pf"]
-    environment = {**os.environ, **variables}
-    options = {"capture_output": True, "text": True, "timeout": PATIENCE}
-    return subprocess.run(command, env=environment, **options)
+    program, path = executable(tmp_path / "unit_tests", script), tmp_path / "test_it.pf"
+    path.write_text(suite)
+    judge = SUPPORT / "run_unit_tests.sh"
+    return ran(judge, "a stand-in", program, path, env=environment(**variables))
 
 
 @pytest.mark.parametrize(
@@ -258,7 +245,7 @@ flowchart TD
 
 
 def style_problems(root: Path, text: str, picture: str = PICTURE):
-    subprocess.run(["git", "init", "-q", root], check=True)
+    ran("git", "init", "-q", root, check=True)
     for folder in ("high", "low", "lowest"):
         (root / "src" / folder).mkdir(parents=True)
         (root / "src" / folder / "README.md").write_text("A folder.\n")
