@@ -66,14 +66,14 @@ def started(program, tmp_path):
 
     def start(*arguments, **options):
         command = [program, *map(str, arguments)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **pipes, **options))
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+        processes.append(subprocess.Popen(command, cwd=tmp_path, text=True, **options))
         return processes[-1]
 
     yield start
     for process in processes:
-        process.kill()
-        process.communicate()
+        with process:  # whose pipes are closed
+            process.kill()
 
 
 @pytest.fixture

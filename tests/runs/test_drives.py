@@ -12,22 +12,29 @@ from run_laws import laws_broken
 from whole_runs import BROKEN, FINISHED, contents, one_line, write_input
 
 
-def performed(ricochet, folder, text: str, *settings: str):
-    """The path of the output of a run, a file of its own, and what the run says."""
-    write_input(folder, text)
-    path = folder / f"{len(list(folder.iterdir()))}.h5"
-    run = ricochet("gas.nml", "-o", path, *(f"--set={setting}" for setting in settings))
-    assert run.returncode == FINISHED, run.stderr
-    return path, run.stdout
+@pytest.fixture
+def performed(ricochet, tmp_path):
+    """`performed(text, *settings)`: the path of the output, a file of its own, and what is said."""
+
+    def run(text: str, *settings: str):
+        write_input(tmp_path, text)
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.h5"
+        done = ricochet("gas.nml", "-o", path, *(f"--set={setting}" for setting in settings))
+        assert done.returncode == FINISHED, done.stderr
+        return path, done.stdout
+
+    return run
 
 
-def run_of(*arguments: str):
-    return read_run(performed(*arguments)[0])
+@pytest.fixture
+def run_of(performed):
+    return lambda *words: read_run(performed(*words)[0])
 
 
-def observed(*arguments: str) -> dict[str, np.ndarray]:
-    """All that the run of an input writes."""
-    return contents(performed(*arguments)[0])
+@pytest.fixture
+def observed(performed):
+    """`observed(text, *settings)` is all that the run of an input writes."""
+    return lambda *words: contents(performed(*words)[0])
 
 
 # --- shear ---
@@ -40,7 +47,7 @@ SHEARED = """&run seed = 3 /
 """
 
 
-def test_a_pair_meets_across_the_seam_as_inside(ricochet, tmp_path):
+def test_a_pair_meets_across_the_seam_as_inside(run_of):
     """By Galileo: the disk beyond the top is seen with the velocity of the image."""
     slip, lift = 0.3 * 10, np.array([0, 4.5])
     place = np.array([[3, 5], [4.2, 5.9]])
@@ -57,7 +64,7 @@ def test_a_pair_meets_across_the_seam_as_inside(ricochet, tmp_path):
         ("shear_rate = 0.3", (place + lift) % 10, velocity - [[0, 0], [slip, 0]]),
     ):
         numbers = np.concatenate([x, v], axis=1).ravel()
-        runs.append(run_of(ricochet, tmp_path, system.format(shear, *map(float, numbers))))
+        runs.append(run_of(system.format(shear, *map(float, numbers))))
     inside, across = runs
     assert len(inside.events.time) == len(across.events.time) == 1
     assert across.events.time == pytest.approx(inside.events.time, rel=1e-13)
@@ -70,15 +77,12 @@ def test_a_pair_meets_across_the_seam_as_inside(ricochet, tmp_path):
     assert own == pytest.approx(inside.unwrapped(-1)[0] - inside.unwrapped(0)[0], rel=1e-12)
 
 
-def test_a_free_disk_goes_straight_on(ricochet, tmp_path):
+def test_a_free_disk_goes_straight_on(run_of):
     """Unwrapped, whatever it passes, and however often."""
     run = run_of(
-        ricochet,
-        tmp_path,
         """&box lower = -1, 2 upper = 2, 4 boundary = 'periodic', 'periodic' shear_rate = -0.4 /
-&species name = 'a' radius = 0.1 position = 0.5, 2.5 velocity = 0.3, 1.7 /
-&stop time = 300 / &output frames_every_time = 10 /
-""",
+        &species name = 'a' radius = 0.1 position = 0.5, 2.5 velocity = 0.3, 1.7 /
+        &stop time = 300 / &output frames_every_time = 10 /"""
     )
     straight = [0.5, 2.5] + run.time[:, None] * [0.3, 1.7]
     assert np.allclose(run.unwrapped(slice(None))[:, 0], straight, rtol=1e-12, atol=1e-9)
@@ -87,7 +91,7 @@ def test_a_free_disk_goes_straight_on(ricochet, tmp_path):
     assert run.velocity[:][:, 0, 0] == pytest.approx(0.3 + 0.8 * rows)
 
 
-def test_generated_velocities_get_the_profile_and_given_ones_do_not(ricochet, tmp_path):
+def test_generated_velocities_get_the_profile_and_given_ones_do_not(run_of):
     kinds = {
         "temperature = 1": True,
         "temperature = 1 exact_temperature = 2": True,
@@ -98,8 +102,7 @@ def test_generated_velocities_get_the_profile_and_given_ones_do_not(ricochet, tm
     for kind, generated in kinds.items():
         text = SHEARED.replace("temperature = 1", kind)
         sheared, plain = (
-            run_of(ricochet, tmp_path, text, "stop.time=0.1", f"box.shear_rate={rate}")
-            for rate in (0.7, 0)
+            run_of(text, "stop.time=0.1", f"box.shear_rate={rate}") for rate in (0.7, 0)
         )
         profile = np.zeros((120, 2))
         profile[:, 0] = 0.7 * (plain.position[0][:, 1] - 5)
@@ -108,16 +111,14 @@ def test_generated_velocities_get_the_profile_and_given_ones_do_not(ricochet, tm
         if generated:
             for name in ("all/temperature", "a/temperature", "pressure"):
                 value = plain.observable(name).value[0]
-                assert sheared.observable(name).value[0] == pytest.approx(value, abs=1e-12), (
-                    kind,
-                    name,
-                )
+                found = sheared.observable(name).value[0]
+                assert found == pytest.approx(value, abs=1e-12), f"{kind}: {name}"
 
 
-def test_kicks_are_relative_to_the_profile(ricochet, tmp_path):
+def test_kicks_are_relative_to_the_profile(run_of):
     bath = "&drive kind = 'brownian' temperature = 2 interval = 0.5 /\n"
     many = SHEARED.replace("count = 120", "count = 3000").replace("0.25", "0.04")
-    run = run_of(ricochet, tmp_path, many + bath)
+    run = run_of(many + bath)
     height, speed = run.position[-1][:, 1] - 5, run.velocity[-1][:, 0]
     error = np.sqrt(2 / np.sum(height**2))
     assert np.polyfit(height, speed, 1)[0] == pytest.approx(0.7, abs=5 * error)
@@ -142,26 +143,24 @@ ONE = """&box boundary = 'periodic', 'periodic' upper = 50, 50 /
     ids=["events", "steps"],
 )
 def test_kicks_are_at_multiples_of_the_interval_and_no_events(
-    ricochet, tmp_path, every, interval, end, steps, kicked
+    observed, every, interval, end, steps, kicked
 ):
     """The velocity changes at each kick, and only there; in time steps at the end of its step."""
     drive = f"&drive kind = 'brownian' interval = {interval} temperature = 1 / &stop time = {end} /"
-    found = observed(ricochet, tmp_path, ONE.format(every) + drive + steps)
+    found = observed(ONE.format(every) + drive + steps)
     velocity = found["/particles/disks/velocity/value"][:, 0]
     changed = np.flatnonzero((velocity[1:] != velocity[:-1]).any(axis=1)) + 1
     assert changed.tolist() == list(kicked)
     assert found["/observables/collisions/value"][-1] == 0
 
 
-def test_energy_balances_where_kinetic_and_potential_energy_cancel(ricochet, tmp_path):
+def test_energy_balances_where_kinetic_and_potential_energy_cancel(observed):
     """The sum over many disks is far smaller than its terms, and as exact as if it were not."""
     found = observed(
-        ricochet,
-        tmp_path,
         """&box lower = -0.5, 9.5 upper = 0.5, 10.5 gravity = 0, 0.1 /
         &species count = 5000 packing_fraction = 0.1 temperature = 1 /
         &drive kind = 'andersen' interval = 1e-5 fraction = 0.01 temperature = 1 /
-        &stop time = 1e-4 / &output observables_every_time = 1e-5 /""",
+        &stop time = 1e-4 / &output observables_every_time = 1e-5 /"""
     )
     names = ("total_energy", "drive_energy", "dissipated_energy")
     total, given, lost = (found[f"/observables/{name}/value"] for name in names)
@@ -169,47 +168,43 @@ def test_energy_balances_where_kinetic_and_potential_energy_cancel(ricochet, tmp
     assert np.ptp(total + lost - given) <= 1e-16 * 10_000  # of both
 
 
-def test_what_was_met_last_is_met_again_after_a_kick(ricochet, tmp_path):
+def test_what_was_met_last_is_met_again_after_a_kick(observed):
     """Two disks side by side are kicked together again and again: no hit is taken for the last."""
     found = observed(
-        ricochet,
-        tmp_path,
         "&species count = 2 radius = 0.1 position = 0.1, 0.5, 0.3, 0.5 /"
         "&box upper = 0.400001, 1 / &contact restitution = 0.99 contact_time = 1e-12 /"
         "&drive kind = 'brownian' interval = 1e-3 temperature = 1 / &stop time = 1 /"
-        "&output frames_every_time = 1e-3 observables_every_time = 1e-3 /",
+        "&output frames_every_time = 1e-3 observables_every_time = 1e-3 /"
     )
     assert list(laws_broken(found)) == []
 
 
-def test_the_kicks_of_a_disk_are_its_own(ricochet, tmp_path):
+def test_the_kicks_of_a_disk_are_its_own(observed):
     """They do not depend on who else there is, nor on where a disk is in memory."""
     drive = "&drive kind = 'brownian' interval = 0.1 temperature = 1e-4 / &stop time = 1 /"
     disk = "&species count = 1 radius = 0.01 position = 0.9, 0.9 /"
     others = "&species grid = 20, 20 radius = 0.01 region = 0, 0.8, 0, 0.8 /"
     alone, among = (
-        observed(ricochet, tmp_path, text)["/particles/disks/velocity/value"][-1, 0]
+        observed(text)["/particles/disks/velocity/value"][-1, 0]
         for text in (disk + drive, disk + others + drive)
     )
     assert alone.tolist() == among.tolist()
 
 
-def test_a_gas_at_rest_waits_for_its_kick(ricochet, tmp_path):
+def test_a_gas_at_rest_waits_for_its_kick(performed):
     """Nothing can happen before it, and no rule names a time."""
     drive = "&drive kind = 'noise' interval = 7 strength = 1 / &stop collisions = 1000 /"
-    _, said = performed(ricochet, tmp_path, "&species count = 100 radius = 0.01 /" + drive)
+    _, said = performed("&species count = 100 radius = 0.01 /" + drive)
     assert "note" not in said and "kicks = 1\n" in said and "collisions = 1000\n" in said
 
 
-def test_a_driven_gas_does_not_end_for_being_cold(ricochet, tmp_path):
+def test_a_driven_gas_does_not_end_for_being_cold(performed):
     """Its temperature falls below 1e-25 of the first between two kicks."""
     _, said = performed(
-        ricochet,
-        tmp_path,
         "&box boundary = 'periodic', 'periodic' /"
         "&species count = 50 packing_fraction = 0.4 temperature = 1 /"
         "&contact restitution = 0.7 contact_time = 1e-9 / &stop time = 2e16 /"
-        "&drive kind = 'noise' interval = 1e16 strength = 1e-60 /",
+        "&drive kind = 'noise' interval = 1e16 strength = 1e-60 /"
     )
     assert "note" not in said and "time = 2e16" in said
 
@@ -223,13 +218,11 @@ BOUNCE = """&box gravity = 0, -1 upper = 1, 1000 /
 """
 
 
-def test_a_disk_between_two_walls_knows_them_apart(ricochet, tmp_path):
+def test_a_disk_between_two_walls_knows_them_apart(observed):
     """It leaves the left wall with half its speed, the right one with all."""
     found = observed(
-        ricochet,
-        tmp_path,
         """&side name = 'left' restitution = 0.5 / &species count = 1 radius = 0.1
-        position = 0.5, 0.5 velocity = 1, 0 / &stop time = 6 / &output frames_every_events = 1 /""",
+        position = 0.5, 0.5 velocity = 1, 0 / &stop time = 6 / &output frames_every_events = 1 /"""
     )
     v = found["/particles/disks/velocity/value"][:, 0, 0]
     assert v[:5].tolist() == [1, -1, 0.5, -0.5, 0.25]
@@ -240,16 +233,14 @@ def test_a_disk_between_two_walls_knows_them_apart(ricochet, tmp_path):
     "law",
     ["restitution = 0", "temperature = 9 speed = 5", "tangential_restitution = 0.5 friction = 1"],
 )
-def test_disks_grow_between_walls_whatever_their_law(ricochet, tmp_path, law):
+def test_disks_grow_between_walls_whatever_their_law(observed, law):
     """The places of `dense` disks are those between elastic walls."""
     places = [
         observed(
-            ricochet,
-            tmp_path,
             f"&obstacle centre = 0.5, 0.5 radius = 0.2 {words} /"
             f"&wall from = 0.1, 0.9 to = 0.9, 0.9 {words} / &contact wall_rule = 'normal' /"
             "&species count = 40 packing_fraction = 0.4 placement = 'dense' temperature = 1 /"
-            "&stop collisions = 1 / &output frames_every_collisions = 1 /",
+            "&stop collisions = 1 / &output frames_every_collisions = 1 /"
         )["/particles/disks/position/value"][0]
         for words in ("", law)
     ]
@@ -257,24 +248,22 @@ def test_disks_grow_between_walls_whatever_their_law(ricochet, tmp_path, law):
 
 
 @pytest.mark.parametrize("dynamics", ["events", "steps"])
-def test_a_side_shakes_a_bed_at_rest(ricochet, tmp_path, dynamics):
+def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
     """Nothing moves at the start, and there is no gravity: the first event comes from the side."""
     found = observed(
-        ricochet,
-        tmp_path,
         """&side name = 'bottom' motion = 'sine' amplitude = 0.05 period = 1 /
         &run dt = 1e-3 / &species count = 300 radius = 0.02 / &stop time = 3 /""".replace(
             "dt", f"dynamics = '{dynamics}' dt"
-        ),
+        )
     )
     assert found["/observables/all/kinetic_energy/value"][-1] > 0
     assert found["/observables/work/value"][-1] > 0
 
 
-def test_time_steps_come_close_to_events(ricochet, tmp_path):
+def test_time_steps_come_close_to_events(observed):
     """The moments of some bounces of a disk on a floor that moves, at a fine step."""
     times = [
-        observed(ricochet, tmp_path, BOUNCE, *options)["/particles/disks/velocity/time"][1:6]
+        observed(BOUNCE, *options)["/particles/disks/velocity/time"][1:6]
         for options in ([], ["run.dynamics=steps", "run.dt=1e-5"])
     ]
     assert times[1] == pytest.approx(times[0], abs=1e-3)
@@ -287,14 +276,12 @@ RAMP = "&wall from = 0, 0.3 to = 1, 0.1 /"
 
 @pytest.mark.parametrize("on", [SHAKEN.format("sine"), SHAKEN.format("parabolic"), BOWL, RAMP])
 @pytest.mark.parametrize("lossy", [0, 0.5])
-def test_disks_rest_on_what_has_restitution_0(ricochet, tmp_path, on, lossy):
+def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
     """They are parted so gently and so seldom that the run goes on, and never sink in."""
     found = observed(
-        ricochet,
-        tmp_path,
         f"""{on} &box gravity = 0, -1 / &contact contact_time = 1e-3
         restitution = {lossy} wall_restitution = 0 wall_rule = 'normal' / &stop time = 3 /
-        &species count = 60 radius = 0.02 temperature = 1 region = 0.2, 0.8, 0.4, 0.8 /""",
+        &species count = 60 radius = 0.02 temperature = 1 region = 0.2, 0.8, 0.4, 0.8 /"""
     )
     assert found["/particles/disks/collisions/value"][-1].sum() < 3 * 60 * 3 / 1e-3
     assert list(laws_broken(found)) == []

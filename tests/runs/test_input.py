@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 import os
 import random
 import re
@@ -11,7 +10,6 @@ from pathlib import Path
 
 import fuzz_input
 import pytest
-from ricochet import read_run
 from ricochet.program import namelist
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -180,20 +178,6 @@ def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_
 def test_the_readme_of_the_inputs_lists_every_file():
     listed = re.findall(r"^\| `(\w+\.nml)`", (ROOT / "input" / "README.md").read_text(), re.M)
     assert sorted([*listed, "reference.nml"]) == [path.name for path in INPUTS]
-
-
-def test_the_output_file_holds_every_value_as_used(ricochet, tmp_path):
-    (tmp_path / "gas.nml").write_text(GOOD)
-    sets = ["species.gas.packing_fraction=0.1", "species.gas.radius=", "run.title=it's"]
-    sets += ["run.seed=2", "run.seed=3"]  # the last one counts
-    run = ricochet("gas.nml", "-o", "a.h5", *(word for s in sets for word in ("--set", s)))
-    assert run.returncode == 0
-    values = read_run(tmp_path / "a.h5").parameters
-    gas = values["species"]["gas"]
-    assert (values["run"]["seed"], values["run"]["title"]) == (3, "it's")
-    assert list(values["box"]["boundary"]) == ["wall", "wall"]
-    assert gas["radius"] == pytest.approx((0.1 / 20 / math.pi) ** 0.5)
-    assert gas["velocities"] == "equal_speed" and "temperature" not in gas
 
 
 def test_all_problems_come_at_once_and_the_last_line_says_so_too(checked):

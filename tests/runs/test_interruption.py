@@ -181,20 +181,16 @@ def wait_for_checkpoint(folder):
     wait_for(is_there)
 
 
-def test_a_later_second_signal_ends_the_run_at_once(program, tmp_path):
+def test_a_later_second_signal_ends_the_run_at_once(started, tmp_path):
     """Also a program that has no time to look: here it waits for a disk that does not answer."""
     endless = with_fsync(tmp_path, "while (1) usleep(100000);")
-    command = [program, write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG]
-    process = subprocess.Popen(command, cwd=tmp_path, env=endless, stderr=subprocess.DEVNULL)
-    try:
-        wait_for((tmp_path / "gas.h5.part").exists)
-        process.send_signal(signal.SIGTERM)
-        wait_for(lambda: not is_pending(process.pid, signal.SIGTERM))
-        time.sleep(0.6)  # those that follow within half a second do not count
-        process.send_signal(signal.SIGTERM)
-        assert process.wait() == -signal.SIGTERM
-    finally:
-        process.kill()
+    process = started(write_input(tmp_path, BUSY), "-o", "gas.h5", *LONG, env=endless)
+    wait_for((tmp_path / "gas.h5.part").exists)
+    process.send_signal(signal.SIGTERM)
+    wait_for(lambda: not is_pending(process.pid, signal.SIGTERM))
+    time.sleep(0.6)  # those that follow within half a second do not count
+    process.send_signal(signal.SIGTERM)
+    assert process.wait() == -signal.SIGTERM
 
 
 def is_pending(pid, number) -> bool:
@@ -285,20 +281,14 @@ def test_many_disks_stop_in_time(started, tmp_path, method, side):
         stopped_in_time(process)
 
 
-def test_a_stuck_summary_does_not_keep_a_finished_run(program, tmp_path):
+def test_a_stuck_summary_does_not_keep_a_finished_run(started, tmp_path):
     """Whoever reads its standard output may have stopped reading."""
     write_input(tmp_path, "&species count = 10 radius = .01 / &stop time = 1 /")
-    command = [program, "gas.nml", "-o", "gas.h5"]
     with filled_pipe() as inlet:
-        process = subprocess.Popen(
-            command, cwd=tmp_path, stdout=inlet, stderr=subprocess.PIPE, text=True
-        )
-        try:
-            wait_for(lambda: (tmp_path / "gas.h5").exists() and is_asleep(process.pid))
-            assert "the run is finished" in ended_soon(process, signal.SIGTERM)
-            assert process.returncode == FINISHED
-        finally:
-            process.kill()
+        process = started("gas.nml", "-o", "gas.h5", stdout=inlet)
+        wait_for(lambda: (tmp_path / "gas.h5").exists() and is_asleep(process.pid))
+        assert "the run is finished" in ended_soon(process, signal.SIGTERM)
+        assert process.returncode == FINISHED
 
 
 def test_ignored_signals_stay_ignored(program, tmp_path):

@@ -1,12 +1,12 @@
 """Runs at their limits: of memory, of the stack, and of anything happening any more."""
 
 import resource
-import subprocess
 
 import h5py
 import pytest
 
-USAGE, FILES = 2, 3
+from whole_runs import FILES, USAGE, ran
+
 GAS = """&species name = 'gas' count = {count} packing_fraction = 0.3 temperature = 1 /
 &stop collisions = {collisions} /
 """
@@ -29,8 +29,7 @@ def memory_of(program, tmp_path):
     def run(text, *words) -> int:
         (tmp_path / "gas.nml").write_text(text)
         command = [program, "gas.nml", "-o", "gas.h5", "--force", "--quiet", *options(words)]
-        command = ["python3", "-c", MEASURE, *command]
-        return 1024 * int(subprocess.check_output(command, cwd=tmp_path, text=True))
+        return 1024 * int(ran("python3", "-c", MEASURE, *command, cwd=tmp_path, check=True).stdout)
 
     return run
 
@@ -50,14 +49,8 @@ def limited(program, tmp_path):
                 if limit:
                     resource.setrlimit(kind, (limit, limit))
 
-        return subprocess.run(
-            [program, "gas.nml", "-o", "gas.h5", "--quiet", *anew, *options],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-            preexec_fn=set_limits,
-        )
+        command = [program, "gas.nml", "-o", "gas.h5", "--quiet", *anew, *options]
+        return ran(*command, cwd=tmp_path, preexec_fn=set_limits)
 
     return run
 

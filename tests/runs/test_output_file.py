@@ -82,13 +82,18 @@ def test_the_layout_is_h5md(ran):
 
 
 def test_every_parameter_is_there_as_it_was_used(ran, tmp_path):
-    file = ran(MIXTURE, "--set", "species.heavy.mass=5", "--set", "run.seed=6")["parameters"]
+    sets = ["species.heavy.mass=5", "species.light.radius=", "species.light.packing_fraction=0.1"]
+    sets += ["run.seed=2", "run.seed=6"]  # the last one counts
+    file = ran(MIXTURE, *(f"--set={word}" for word in sets))["parameters"]
     assert text(file["input"][()]) == MIXTURE.rstrip("\n") or text(file["input"][()]) == MIXTURE
-    assert text(file["overrides"][()]).split() == ["species.heavy.mass=5", "run.seed=6"]
+    assert text(file["overrides"][()]).split() == sets
     assert file["seed"][()] == 6 and file["run"].attrs["seed"] == 6
     assert text(file["run"].attrs["search"]) == "cells"
     assert file["species/heavy"].attrs["mass"] == 5
-    assert file["species/light"].attrs["radius"] == 0.02
+    light = file["species/light"].attrs
+    assert light["radius"] == pytest.approx((0.1 / 60 / np.pi) ** 0.5)
+    assert text(light["velocities"]) == "maxwell" and "speed" not in light
+    assert [text(kind) for kind in file["box"].attrs["boundary"]] == ["wall", "wall"]
     assert [text(name) for name in file["species/names"]] == ["light", "heavy"]
     assert list(file["species/counts"]) == [60, 20]
     assert file["contact"].attrs["wall_restitution"] == 0.9

@@ -4,10 +4,12 @@ module test_systems
   use kinds, only: dp => real64, int32, int64, never
   use box_geometry, only: box_t, obstacle_gap
   use box_sides, only: bounds
+  use disks, only: disk_t, tag_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use initial_state, only: create_simulation
+  use neighbour_search, only: earliest_contact, prospect_t, no_gravity
   use partners, only: n_sides
   use random_stream, only: random_stream_t
   use run_setup, only: input_from_text
@@ -22,7 +24,7 @@ module test_systems
   private
   public :: add_obstacle, build, few_disks, system, systems, every_system, prepare, evolve, difference
   public :: total_energy, momentum, tightest_gap
-  public :: draw_between, draw_vector, draw_magnitude, time_to_contact
+  public :: draw_between, draw_vector, draw_magnitude, meeting, time_to_contact
 
   !> What has to hold in every system holds in these, each feature with and without most others.
   character(len=*), parameter :: systems(*) = [character(len=40) :: "walls", "walls dilute", &
@@ -305,6 +307,24 @@ contains
     disc = sigma**2*dot_product(dv, dv) - (dx(1)*dv(2) - dx(2)*dv(1))**2
     if (b < 0 .and. disc > 0) s = max(dot_product(dx, dx) - sigma**2, 0.0_dp)/(sqrt(disc) - b)
   end function time_to_contact
+
+  !> When disk i meets the other of two, by the kernel that the searches share, if something else is known to happen at a time.
+  function meeting(disk, i, known) result(t)
+    type(disk_t), intent(in) :: disk(2)
+    integer, intent(in) :: i
+    real(dp), intent(in) :: known
+    real(dp) :: t
+    type(prospect_t) :: near
+    type(tag_t) :: tag(2)
+    tag%id = [1, 2]
+    near%time = known
+    near%partner = 0
+    near%disk = i
+    near%n = 1
+    near%list(1) = 2 - i
+    call earliest_contact(disk, tag, near, disk(i)%clock, [0.0_dp, 0.0_dp], no_gravity)
+    t = near%time
+  end function meeting
 
   !> A number uniform between two.
   subroutine draw_between(stream, low, high, u)
