@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from whole_runs import PATIENCE, within
+from whole_runs import ran, within
 
 # A shell that starts the tests in the background has them, and all they start, ignore these.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -52,9 +52,7 @@ def ricochet(program, tmp_path) -> Callable[..., subprocess.CompletedProcess]:
     """
 
     def run(*arguments, seconds=None, **options) -> subprocess.CompletedProcess:
-        command = [*within(seconds), program, *map(str, arguments)]
-        options = {"cwd": tmp_path, "capture_output": True, "text": True, **options}
-        return subprocess.run(command, check=False, timeout=PATIENCE, **options)
+        return ran(*within(seconds), program, *arguments, **{"cwd": tmp_path, **options})
 
     return run
 
@@ -85,12 +83,11 @@ def small_disk(tmp_path):
 
     def mount(kilobytes, mode="rw"):
         options = f"size={kilobytes}k,{mode}" + (",remount" if mounted else "")
-        command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
-        if subprocess.run(command, check=False, capture_output=True).returncode != 0:
+        if ran("mount", "-t", "tmpfs", "-o", options, "tmpfs", folder).returncode != 0:
             pytest.skip("cannot mount a small disk here: needs root")
         mounted.append(folder)
         return folder
 
     yield mount
     if mounted:
-        subprocess.run(["umount", folder], check=True)
+        ran("umount", folder, check=True)

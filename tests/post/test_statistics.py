@@ -7,11 +7,6 @@ from scipy.signal import lfilter
 from ricochet import statistics, theory
 
 
-@pytest.fixture
-def noise():
-    return np.random.default_rng(8)
-
-
 def remembering(rng, length: int, memory: float) -> np.ndarray:
     """A series (T,) of mean 0 and variance 1 whose correlation falls by 1/e in `memory` samples."""
     keep = np.exp(-1 / memory)
@@ -114,17 +109,17 @@ def test_errors_are_written_with_two_digits():
 # --- series in time ---
 
 
-def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(noise):
-    amount = noise.poisson(1000, 20000).astype(float)
+def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(rng):
+    amount = rng.poisson(1000, 20000).astype(float)
     found = statistics.series_mean(amount, np.full(20000, 2.0))
     assert found.mean == pytest.approx(500, rel=0.01)
     assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(20000), rel=0.4)
 
 
 @pytest.mark.parametrize("memory", [0.5, 5, 20])
-def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(noise, memory):
+def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memory):
     means = [
-        statistics.series_mean(remembering(noise, 2000, memory) + 3 * noise.normal(size=2000))
+        statistics.series_mean(remembering(rng, 2000, memory) + 3 * rng.normal(size=2000))
         for _ in range(400)
     ]
     hit = np.mean([abs(one.mean) < one.error for one in means])
@@ -133,38 +128,38 @@ def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(noise, mem
     assert np.mean([one.error for one in means]) == pytest.approx(1.1 * exact, rel=0.12)
 
 
-def test_what_samples_make_up_for_is_no_error(noise):
+def test_what_samples_make_up_for_is_no_error(rng):
     """As of a wall, whose disks give it what they have: a sum that stays bounded."""
-    series = np.diff(noise.normal(size=(400, 641))) + 0.1 * noise.normal(size=(400, 640))
+    series = np.diff(rng.normal(size=(400, 641))) + 0.1 * rng.normal(size=(400, 640))
     means = [statistics.series_mean(one) for one in series]
     held = np.mean([abs(one.mean) < one.error for one in means])
     assert 0.6 <= held <= 0.85
 
 
-def test_equilibrium_begins_where_a_drift_has_died_out(noise):
+def test_equilibrium_begins_where_a_drift_has_died_out(rng):
     decay = 20 * np.exp(-np.arange(4000) / 200)
-    starts = [statistics.equilibration(remembering(noise, 4000, 3) + decay) for _ in range(40)]
+    starts = [statistics.equilibration(remembering(rng, 4000, 3) + decay) for _ in range(40)]
     assert np.quantile(starts, 0.1) > 3 * 200 and np.quantile(starts, 0.9) < 2000
-    calm = [statistics.equilibration(remembering(noise, 4000, 3)) for _ in range(40)]
+    calm = [statistics.equilibration(remembering(rng, 4000, 3)) for _ in range(40)]
     assert np.median(calm) < 400
 
 
-def test_what_speaks_against_an_error_is_said(noise):
-    calm = [statistics.series_mean(noise.normal(size=640)) for _ in range(10)]
+def test_what_speaks_against_an_error_is_said(rng):
+    calm = [statistics.series_mean(rng.normal(size=640)) for _ in range(10)]
     assert statistics.doubts("Z", calm) == []
     slope = np.linspace(0, 0.5, 640)  # hardly seen in one run, but they all agree
-    drifting = [statistics.series_mean(noise.normal(size=640) + slope) for _ in range(10)]
+    drifting = [statistics.series_mean(rng.normal(size=640) + slope) for _ in range(10)]
     assert "Z: still drifts" in statistics.doubts("Z", drifting)[0]
     apart = [one._replace(mean=one.mean + k) for k, one in enumerate(calm)]
     assert "runs scatter by 3" in statistics.doubts("Z", apart)[0]
     assert statistics.combined(apart).error == pytest.approx(1, rel=0.1)
     assert statistics.combined(apart).samples == 10, "a run is a sample"
-    assert statistics.memory(noise.normal(size=3)) > 1
-    rounded = 1 + 1e-15 * remembering(noise, 640, 100)
+    assert statistics.memory(rng.normal(size=3)) > 1
+    rounded = 1 + 1e-15 * remembering(rng, 640, 100)
     assert statistics.doubts("kT", [statistics.series_mean(rounded)]) == []
-    short = statistics.series_mean(noise.normal(size=5))
+    short = statistics.series_mean(rng.normal(size=5))
     assert "no error" in statistics.doubts("Z", [short])[0]
-    slow = statistics.series_mean(remembering(noise, 640, 100))
+    slow = statistics.series_mean(remembering(rng, 640, 100))
     assert "independent samples; run longer" in " ".join(statistics.doubts("Z", [slow]))
 
 

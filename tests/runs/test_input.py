@@ -11,6 +11,7 @@ from pathlib import Path
 import fuzz_input
 import pytest
 from ricochet.program import namelist
+from whole_runs import FILES, USAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
@@ -21,7 +22,13 @@ OTHERS = """&obstacle name = 'pin' centre = 0.5, 0.5 radius = 0.1 /
 GOOD = """&species name = 'gas' count = 20 radius = 0.02 speed = 1 /
 &stop time = 0.1 /
 """
-USAGE, FILES = 2, 3
+#: What is refused, with all that is said of it.
+ROWS = Path(__file__).with_name("refused.txt").read_text().splitlines()
+DISKS, STARTED = (
+    "&species count = 10 radius = .01 /",
+    "&species name = 'gas' file = 'start.txt' {} /",
+)
+PLACE = r'f(:\d+)?: (\S+|".*"): |--set '
 
 
 @pytest.fixture
@@ -325,6 +332,43 @@ def test_the_limits_that_are_printed_are_those_that_hold(ricochet, checked):
             inside &= not whole or abs(number) < 2**63
             told = re.search(rf' {group}\.{name}: "\S+ is out of range; allowed: ', run.stderr)
             assert bool(told) != inside, setting
+
+
+def report(ricochet, folder, text) -> tuple[int, list[str]]:
+    """Exit code and messages of --check."""
+    text, *start = re.sub(r"600\*(.)", lambda found: 600 * found[1], text).split("<< ")
+    text, *settings = text.replace("\\n", "\n").split("--set ")
+    if start:
+        (folder / "start.txt").write_text(start[0].replace("\\n", "\n").rstrip("\n") + "\n")
+    if "&species" not in text:
+        text += "\n" + (STARTED.format("velocities = 'rest'") if start else DISKS)
+    if "&stop" not in text:
+        text += "\n&stop time = 1 /"
+    (folder / "f").write_text(text + "\n")
+    run = ricochet(
+        "f", "--check", "--quiet", *(word for own in settings for word in ("--set", own))
+    )
+    assert run.stdout == ""
+    return run.returncode, run.stderr.splitlines()
+
+
+def is_told(words: str, line: str) -> bool:
+    """Whether a message has the words of the table, in their order."""
+    return bool(re.search(".*".join(map(re.escape, words.strip().split(" ... "))), line))
+
+
+def test_what_is_refused_is_told_in_all_its_lines(ricochet, tmp_path):
+    rows = [row for row in ROWS if row and not row.startswith("#")]
+    faults = []
+    for row in rows:
+        text, *words = row.split(" | ")
+        code, lines = report(ricochet, tmp_path, text)
+        told = len(words) == len(lines) and all(map(is_told, words, lines))
+        legible = all(re.match(PLACE, line) and len(line) < 400 for line in lines)
+        if code != (FILES if "cannot be read" in row else USAGE) or not (told and legible):
+            faults += [row, *(f"    {line}" for line in lines)]
+    assert not faults, "\n".join(faults)
+    assert len(rows) > 200
 
 
 @pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.check)])

@@ -90,7 +90,7 @@ def test_a_run_that_was_killed_before_its_first_checkpoint_goes_on(ricochet, sta
     before = (tmp_path / "gas.h5.part").read_bytes()
     end = ["--set", "stop.time=9"]
     run = ricochet(*COMMAND, *end)
-    assert run.returncode == FILES and "--force" in one_line(run)
+    assert run.returncode == FILES and "--resume" in one_line(run) and "--force" in run.stderr
     assert (tmp_path / "gas.h5.part").read_bytes() == before
     assert ricochet(*COMMAND, *end, "--resume").returncode == FINISHED
     assert ricochet("gas.nml", "-o", "whole.h5", *end).returncode == FINISHED
@@ -263,7 +263,7 @@ def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
     assert ricochet("gas.nml", "-o", "other.h5", *EARLY).returncode == FINISHED
     (tmp_path / "other.h5").rename(tmp_path / "gas.h5")
     assert ricochet(*COMMAND, "--force").returncode == FINISHED
-    assert frames_in(tmp_path / "gas.h5") == 11
+    assert frames_in(tmp_path / "gas.h5") == 11 and not (tmp_path / "gas.h5.part").exists()
 
 
 # --- locks, users, folders ---

@@ -135,17 +135,6 @@ def test_a_file_that_is_damaged_is_refused_in_one_line(ricochet, before, trials)
     assert run.returncode == FILES and "no run to go on from" in one_line(run)
 
 
-def test_a_stopped_run_is_started_over_by_force_only(ricochet, tmp_path):
-    write_input(tmp_path, MIXTURE)
-    assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
-    content = (tmp_path / "gas.h5.part").read_bytes()
-    run = ricochet(*COMMAND)
-    assert run.returncode == FILES and "--resume" in one_line(run) and "--force" in run.stderr
-    assert (tmp_path / "gas.h5.part").read_bytes() == content
-    assert ricochet(*COMMAND, "--force").returncode == FINISHED
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["gas.h5", "gas.nml"]
-
-
 def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp_path):
     """The same command replaces it and says so; it cannot be resumed."""
     write_input(tmp_path, COLLAPSE)
