@@ -196,7 +196,8 @@ def test_a_file_cut_anywhere_is_refused(unfinished, ricochet, tmp_path, cuts):
 
 BOTH = "&output frames_every_time = 0.2 observables_every_time = 0.2 {}/\n"
 OUTPUT = "&stop time = 1e5 / " + BOTH
-LONGER = OUTPUT.format("").replace("1e5", "1e6")  # of few disks
+SHORT = OUTPUT.format("")
+LONGER = SHORT.replace("1e5", "1e6")  # of few disks
 PAIR = "&species name = 'one' count = 1 radius = 0.1 position = {}, 0.3 velocity = 1, 0.3 /\n"
 FALLING = """&box upper = 4, 4 gravity = 0, -9.81 /
 &species name = 'A' count = 8 mass = 1 radius = 0.05 velocities = 'uniform' speed = 3 /
@@ -208,34 +209,25 @@ BULK = """&box boundary = 'periodic', 'periodic' /
 CRATER = """&species name = 'bed' count = 40 radius = 0.04 region = 0, 1, 0, 0.5 /
 &species name = 'projectile' mass = 25 radius = 0.1 position = 0.5, 0.75 velocity = 0, -5 /
 """
+TARGET = "&species radius = 0.05 position = 0.8, 0.5 /\n"
+ROUGH = "&contact tangential_restitution = 0.5 restitution = 0.9 /\n"
 STEPS = "&run dynamics = 'steps' dt = 4e-3 /\n"
 LOG = "event_log = .true. virial_tensor = .true. "
 GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "player", "cooling")
+SETTLED = ("correlations", "equation_of_state", "rates", "melting", "transport")
 SOON = ("--skip", "1", "--apart", "1")
+FROM_HEIGHT = {"gravity": SOON[:2], "driven": ("--show", "height")}
 #: Simulations: inputs, and the scripts that draw them, with their options.
 RUNNING = [
-    ([MIXTURE.split("&contact")[0] + OUTPUT.format("")], dict.fromkeys(GENERIC, ())),
-    ([MIXTURE.split("&contact")[0] + OUTPUT.format("")], {"mixture": SOON}),
-    (
-        [FALLING + OUTPUT.format("")],
-        {"gravity": SOON[:2], "equipartition": (), "fields": (), "driven": ("--show", "height")},
-    ),
-    ([CRATER + OUTPUT.format("")], {"crater": (), "crater_scan": ()}),
-    (
-        [PAIR.format(0.3) + "&species radius = 0.05 position = 0.8, 0.5 /\n" + LONGER],
-        {"scattering": ()},
-    ),
-    (
-        [BULK + OUTPUT.format(LOG)],
-        dict.fromkeys(("correlations", "equation_of_state", "rates", "melting", "transport"), ()),
-    ),
-    (
-        [BULK + "&contact tangential_restitution = 0.5 restitution = 0.9 /\n" + OUTPUT.format("")],
-        {"rough": ()},
-    ),
-    ([BULK + "&contact restitution = 0.9 /\n" + OUTPUT.format("")], {"haff": ()}),
+    ([MIXTURE.split("&contact")[0] + SHORT], dict.fromkeys(GENERIC, ()) | {"mixture": SOON}),
+    ([FALLING + SHORT], FROM_HEIGHT | {"equipartition": (), "fields": ()}),
+    ([CRATER + SHORT], {"crater": (), "crater_scan": ()}),
+    ([PAIR.format(0.3) + TARGET + LONGER], {"scattering": ()}),
+    ([BULK + OUTPUT.format(LOG)], dict.fromkeys(SETTLED, ())),
+    ([BULK + ROUGH + SHORT], {"rough": ()}),
+    ([BULK + "&contact restitution = 0.9 /\n" + SHORT], {"haff": ()}),
     ([PAIR.format(x) + LONGER for x in (0.3, 0.300001)], {"lyapunov": ("--largest", "0.1")}),
-    ([FALLING + OUTPUT.format(""), FALLING + STEPS + OUTPUT.format("")], {"missed": SOON[:2]}),
+    ([FALLING + SHORT, FALLING + STEPS + SHORT], {"missed": SOON[:2]}),
 ]
 ENDINGS = {"animate": "gif", "export": "xyz", "player": "html"}
 

@@ -25,10 +25,7 @@ PAUSE = "static int n; if (!n++) raise(SIGSTOP); return 0;"
 
 def everything_in(folder) -> dict[str, object]:
     """Paths below a folder with what they hold, or where they lead."""
-    return {
-        str(path): path.readlink() if path.is_symlink() else path.is_file() and path.read_bytes()
-        for path in Path(folder).rglob("*")
-    }
+    return {str(path): what_stands(path) for path in Path(folder).rglob("*")}
 
 
 @pytest.mark.parametrize("place", ["gas.h5", "gas.h5.lock", "gas.h5.part", "gas.h5.part_new"])
