@@ -188,18 +188,6 @@ def test_folders_are_made_and_nothing_is_left_beside_the_result(ricochet, tmp_pa
     assert [path.name for path in (tmp_path / "some/where").iterdir()] == ["gas.h5"]
 
 
-def test_a_finished_file_is_replaced_by_force_only(ricochet, tmp_path):
-    path, input_file = tmp_path / "gas.h5", write_input(tmp_path)
-    ricochet(input_file, "-o", path)
-    before = path.read_bytes()
-    run = ricochet(input_file, "-o", path, "--set", "run.seed=8")
-    assert run.returncode == FILES and "--force" in one_line(run)
-    assert path.read_bytes() == before
-    run = ricochet(input_file, "-o", path, "--set", "run.seed=8", "--force")
-    assert run.returncode == FINISHED
-    assert contents(path)["/parameters/seed"] == 8
-
-
 def test_a_run_that_is_over_before_it_begins_says_why(ricochet, tmp_path):
     rest = ["--set", "species.light.velocities='rest'", "--set", "species.heavy.velocities='rest'"]
     rest += ["--set", "species.light.temperature=", "--set", "species.heavy.temperature="]

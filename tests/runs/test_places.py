@@ -259,6 +259,10 @@ def test_force_means_what_is_there_when_it_is_said(ricochet, tmp_path):
     assert ricochet(*COMMAND, *AT_ONCE).returncode == STOPPED
     assert ricochet("gas.nml", "-o", "other.h5", *EARLY).returncode == FINISHED
     (tmp_path / "other.h5").rename(tmp_path / "gas.h5")
+    before = everything_in(tmp_path)
+    run = ricochet(*COMMAND)
+    assert run.returncode == FILES and "--force" in one_line(run)
+    assert everything_in(tmp_path) == before
     assert ricochet(*COMMAND, "--force").returncode == FINISHED
     assert frames_in(tmp_path / "gas.h5") == 11 and not (tmp_path / "gas.h5.part").exists()
 
