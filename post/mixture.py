@@ -103,6 +103,11 @@ def main() -> None:
         if run.names != runs[0].names or len(run.names) < 2:
             raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
         allow(run, "its species do not come to one temperature", *SETTLED)
+        tracks = [run.observable(f"{name}/kinetic_energy").value for name in run.names]
+        if not any(np.ptp(track) > 1e-9 * np.max(track) for track in tracks):
+            raise RunError(
+                f"{run.path}: its species have not met: each has the energy of its start"
+            )
     frames = [late_frames(run, args) for run in runs]
     result = table(runs, frames, args.skip)
     report(args, draw(runs, frames, result), result)

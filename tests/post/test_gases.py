@@ -542,6 +542,10 @@ WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1"}
 MIXED = {"packing": "0.1 temperature = 2 / &species name = 'b' count = 9 packing_fraction = 0.1"}
 ROUND = {"sides": "'wall', 'wall' / &obstacle centre = 0.5, 0.5 radius = 0.5 side = 'inside'"}
+APART = {"sides": "'wall', 'wall' / &wall from = 0.5, 0 to = 0.5, 1"}
+APART |= {
+    "packing": MIXED["packing"].replace("/", "region = 0, 0.5, 0, 1 /") + " region = 0.5, 1, 0, 1"
+}
 UNEVEN = {
     "sides": "'wall', 'periodic' / &side name = 'left' temperature = 1 / "
     "&side name = 'right' temperature = 2"
@@ -560,6 +564,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (LOSSY | {"log": ".false."}, {"rates": "not elastic", "correlations": "draw them"}),
         (LOSSY | MIXED, {"mixture": "not elastic"}),
         (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
+        (APART, {"mixture": "have not met"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
         (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
         (MIXED, {"correlations": "not equal disks", "equation_of_state": "not of one radius"}),

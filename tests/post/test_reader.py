@@ -282,14 +282,12 @@ def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name
     kinds = {"species": [1, 1, 2], "names": ("a", "b")} if note else {}  # whose legend lies there
     run = tiny(tmp_path / name, 4, 3, provenance={"git_commit": "abc", "note": note}, **kinds)
     texts = []
-    monkeypatch.setattr(
-        "ricochet.script.save",
-        lambda figure, *_: texts.append(
-            (figure.legends[0].get_title().get_text() if note else figure.get_supxlabel()).replace(
-                "\n", " "
-            )
-        ),
-    )
+
+    def shown(figure, *_):
+        below = figure.legends[0].get_title().get_text() if note else figure.get_supxlabel()
+        texts.append(below.replace("\n", " "))
+
+    monkeypatch.setattr("ricochet.script.save", shown)
     assert run_script("snapshot", run) == 0
     warned = capsys.readouterr().err
     assert said in warned and said in texts[0] and bool(said) == bool(warned) == bool(texts[0])
