@@ -73,7 +73,6 @@ contains
     free = free_bytes(self%path)
     if (self%unsaved <= 0 .or. free == huge(free)) return
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
-    if (free > self%unsaved) error%message = error%message//": is there a quota, or a limit (ulimit -f)?"
   end subroutine report
 
   !> The version of the HDF5 library, for the provenance.
