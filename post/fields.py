@@ -22,7 +22,8 @@ import argparse
 
 from ricochet import Run
 from ricochet.drawing import band, draw_box, plt, titled
-from ricochet.fields import SIDES, fields, has_theory, places, prediction
+from ricochet.fields import ACROSS, fields, has_theory, places, prediction
+from ricochet.reader import SIDES
 from ricochet.script import command_line, launch, measured, report, spread
 from ricochet.statistics import Estimate
 
@@ -91,12 +92,11 @@ def with_ends(run: Run, axis: int, x: np.ndarray) -> np.ndarray:
 
 def walls(run: Run, axis: int) -> list[dict]:
     """The two sides across an axis that are kept at a temperature: where, kT and flow."""
-    sides = run.parameters.get("side", {})
+    each = zip(SIDES, run.sides, np.stack([run.lower, run.upper], axis=1).ravel(), strict=True)
     return [
         {"wall": name, "x": x, "kT": float(own["temperature"]), "flow": own.get("speed", 0.0)}
-        for name, x in zip(SIDES[axis], (run.lower[axis], run.upper[axis]), strict=True)
-        for own in [sides.get(name, {})]
-        if "temperature" in own
+        for name, own, x in each
+        if name in ACROSS[axis] and "temperature" in own
     ]
 
 
@@ -104,7 +104,7 @@ def at_walls(run: Run, axis: int, law: dict) -> list[dict]:
     """Rows: kT and flow of the walls, and of the gas next to them by the law."""
     rows = []
     for wall in walls(run, axis):
-        end = 0 if wall["wall"] == SIDES[axis][0] else -1
+        end = 0 if wall["wall"] == ACROSS[axis][0] else -1
         row = {"wall": wall["wall"], "kT_of_wall": wall["kT"]}
         row |= measured("kT_of_gas", law["temperature"], end)
         row |= {"flow_of_wall": wall["flow"]} | measured("flow_of_gas", law["flow"], end)

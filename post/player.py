@@ -87,8 +87,7 @@ def in_room(run: Run, place: np.ndarray) -> np.ndarray:
 def sides(run: Run) -> list[dict]:
     """Of each side its place, and how it moves about it; nothing of the latter if it stays."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
-    own = [run.parameters.get("side", {}).get(name, {}) for name in SIDES]
-    moves = [{k: side[k] for k in MOTION} if amplitude(side) else {} for side in own]
+    moves = [{k: side[k] for k in MOTION} if amplitude(side) else {} for side in run.sides]
     return [{"place": float(at), **move} for at, move in zip(places, moves, strict=True)]
 
 

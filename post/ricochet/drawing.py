@@ -71,8 +71,7 @@ def numbers_of(run: Run) -> dict[str, float]:
         if "packing_fraction" in own:
             own = {name: value for name, value in own.items() if name != "radius"}
         found |= {prefix * (len(run.names) > 1) + name: value for name, value in own.items()}
-    for name in SIDES:
-        own = run.parameters.get("side", {}).get(name, {})
+    for name, own in zip(SIDES, run.sides, strict=True):
         found |= {f"{name} {variable}": value for variable, value in own.items()}
     found |= {f"drive {name}": value for name, value in run.parameters.get("drive", {}).items()}
     found["dt"] = run.time_step
@@ -181,10 +180,9 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
 def name_walls(axes: plt.Axes, run: Run) -> None:
     """Along each side and wall its temperature, and how fast and where to it slides."""
     (x0, y0), (x1, y1) = run.room
-    sides = [run.parameters.get("side", {}).get(name, {}) for name in SIDES]
     shown = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
     shown += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
-    shown = [*zip(sides, shown, strict=True)]
+    shown = [*zip(run.sides, shown, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
     shown += [(own, (*ends, 1)) for own, ends in zip(walls, run.walls, strict=False)]
     for own, (start, end, side) in shown:

@@ -16,7 +16,7 @@ import scipy
 
 from . import hard_disks
 from .drawing import periods
-from .reader import Run, RunError
+from .reader import SIDES, Run, RunError
 from .statistics import Estimate, memory, student
 from .thermodynamics import after_start, free_disks
 
@@ -24,7 +24,7 @@ MOST_BLOCKS = 16  # of a run
 FEWEST_BLOCKS = 3  # of all runs, for an error
 LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
-SIDES = (("left", "right"), ("bottom", "top"))
+ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
 #: What a gas between two walls may be to have a theory.
 LAWFUL = {"walled", "thermal", "uneven", "sliding"}
 Cells = tuple[int, int]
@@ -311,7 +311,7 @@ def gained(block: Block, name: str) -> np.ndarray:
 
 def fluxes(blocks: list[Block], axis: int) -> Members:
     """(G, 3) `Fluxes` from what both walls have received."""
-    run, (near, far) = blocks[0].run, SIDES[axis]
+    run, (near, far) = blocks[0].run, ACROSS[axis]
     length = 2 * run.edges[1 - axis]
     parts = []
     for block in blocks:

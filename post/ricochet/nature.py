@@ -1,7 +1,8 @@
 """What kind of run this is: the one place that says it, and in which words a law refuses a run.
 
     run.nature                      # Nature({'lossy', 'walled', ...}), what sets it apart from
-    run.nature.closed               # equal smooth elastic disks in an empty periodic box
+                                    # equal smooth elastic disks in an empty periodic box
+    run.nature.closed               # whether no energy comes or goes but what collisions lose
     allow(run, "Haff's law", "lossy", "mixture")   # refuses a run with any other trait
 
 A trait is found from the parameters of a run and from its balance of energy, by a pure function of

@@ -191,16 +191,20 @@ class Run:
         """(2,) upper right corner of the box."""
         return self.lower + self.edges
 
+    @property
+    def sides(self) -> list[dict]:
+        """What the input says of each side, in the order of `SIDES`; empty if nothing."""
+        return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
+
     def sides_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(..., 2) lower left and upper right corner of the box at a time; its sides may move."""
-        sides = [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
-        inwards = np.stack([displaced(side, np.asarray(time)) for side in sides], axis=-1)
+        inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
         return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
 
     @cached_property
     def room(self) -> tuple[np.ndarray, np.ndarray]:
         """(2,) corners of what sides that move never leave: the box with their amplitudes."""
-        swings = [amplitude(self.parameters.get("side", {}).get(name, {})) for name in SIDES]
+        swings = [amplitude(side) for side in self.sides]
         return self.lower - swings[::2], self.upper + swings[1::2]
 
     @cached_property

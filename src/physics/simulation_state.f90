@@ -310,6 +310,7 @@ contains
       v = self%velocity(i)
       energy = energy + 0.5_real64*self%mass_of(i)*dot_product(v, v)
     end do
+    if (.not. self%with%rotation) return
     do i = 1, self%n_disks()
       energy = energy + 0.5_real64*self%inertia_of(i)*self%spin(i)**2
     end do
