@@ -78,9 +78,9 @@ contains
     end if
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
-    if (.not. allocated(error)) call run%output%finish(run%sim, cost(run), note(run), error)
+    if (.not. allocated(error)) call run%output%finish(run%sim, [seconds() - run%started, run%rate], note(run), error)
     if (allocated(error)) then
-      if (error%code == exit_broken) call run%output%break_off(run%sim, cost(run), error%message)
+      if (error%code == exit_broken) call run%output%break_off(run%sim, [seconds() - run%started, run%rate], error%message)
       if (error%code == exit_files) error%message = error%message//"; --resume goes on from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
@@ -278,13 +278,5 @@ contains
     end if
     text = text//": the run ended before its stop rule was met"
   end function note
-
-  !> Wall time since the start or the last resume [s], and collisions per processor time [1/s].
-  function cost(run)
-    type(run_t), intent(in) :: run
-    real(real64) :: cost(2)
-
-    cost = [seconds() - run%started, run%rate]
-  end function cost
 
 end module run

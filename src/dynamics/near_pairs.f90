@@ -6,6 +6,7 @@ module near_pairs
   use box_geometry, only: box_t, obstacle_gap
   use partners, only: n_sides
   use shapes, only: spare
+  use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
   implicit none
@@ -45,7 +46,8 @@ contains
     if (self%known) self%from(i, :) = self%from(i, :) + dx
   end subroutine shift
 
-  !> Lists the pairs anew unless no disk has moved by half the skin since. `all_pairs`: without skin or bins, every time.
+  !> Lists the pairs anew unless no disk has moved by half the skin since. `all_pairs`: every time, and without bins; a
+  !> request to stop ends that, and then the list is not complete.
   subroutine update(self, sim, x, step, all_pairs)
     class(near_pairs_t), intent(inout) :: self
     type(simulation_t), intent(in) :: sim
@@ -53,14 +55,20 @@ contains
     real(real64), intent(in) :: step           !! [time]
     logical, intent(in) :: all_pairs
     real(real64) :: width                      ! of a bin: a mean disk and the skin; more in a vast box [length]
-    integer(int32) :: bins(2), i, k
+    integer(int32) :: bins(2), i, k, still     ! those that have not
 
     if (self%known) then
-      if (n_farther(size(x, 1), x, self%from, 0.5_real64*self%skin*(1 - spare)) == 0) return
+      still = 0
+      !GCC$ VECTOR
+      do i = 1, size(x, 1, kind=int32)
+        still = still + merge(1, 0, (x(i, 1) - self%from(i, 1))**2 + (x(i, 2) - self%from(i, 2))**2 &
+          < (0.5_real64*self%skin*(1 - spare))**2)
+      end do
+      if (still == size(x, 1)) return
     end if
     self%known = .not. all_pairs
     self%from = x
-    self%skin = merge(0.0_real64, wanted_skin(), all_pairs)
+    self%skin = wanted_skin()
     self%n = 0
     if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100), self%hit(100))
     do k = n_sides + 1, size(sim%box%surface)
@@ -69,12 +77,13 @@ contains
       end do
     end do
     self%n_obstacles = self%n
-    bins = 1
-    if (.not. all_pairs) then
-      width = max(self%skin + 2*sum(sim%disk%radius)/sim%n_disks(), &
-        sqrt(product(sim%box%edges())/(cells_per_disk*sim%n_disks())))
-      bins = int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32)
+    if (all_pairs) then
+      call test_all_pairs(self, x, sim%disk%radius, sim%box%periods())
+      return
     end if
+    width = max(self%skin + 2*sum(sim%disk%radius)/sim%n_disks(), &
+      sqrt(product(sim%box%edges())/(cells_per_disk*sim%n_disks())))
+    bins = int(max(min(sim%box%edges()/width, cells_per_disk*sim%n_disks()), 1.0_real64), int32)
     call list_disks(self, sim, x, bins)
   contains
 
@@ -92,19 +101,6 @@ contains
       skin = max(min(2*steps_per_list*step*sqrt(fastest), reach - diameter), least_skin*diameter)
     end function wanted_skin
   end subroutine update
-
-  !> How many disks have moved by some length or more.
-  pure function n_farther(n, x, from, length) result(n_far)
-    integer, intent(in) :: n
-    real(real64), intent(in) :: x(n, 2), from(n, 2), length    !! [length]
-    integer :: n_far, i
-
-    n_far = 0
-    !GCC$ VECTOR
-    do i = 1, n
-      n_far = n_far + merge(0, 1, (x(i, 1) - from(i, 1))**2 + (x(i, 2) - from(i, 2))**2 < length**2)
-    end do
-  end function n_farther
 
   !> Marks with 1 those in the list that overlap, with 0 the others.
   pure subroutine mark_overlaps(self, box, x, radius)
@@ -185,6 +181,30 @@ contains
       end do
     end subroutine add_run
   end subroutine list_disks
+
+  !> Adds the pairs of disks, by a test of each. A request to stop ends it.
+  subroutine test_all_pairs(self, x, radius, period)
+    type(near_pairs_t), intent(inout) :: self
+    real(real64), contiguous, intent(in) :: x(:, :), radius(:)   !! [length]
+    real(real64), intent(in) :: period(2)                        !! [length]
+    integer(int32) :: near_i(64), i, j, k, n
+
+    do i = 1, size(radius, kind=int32)
+      if (stop_requested()) return
+      do j = i, size(radius, kind=int32) - 1, size(near_i)
+        n = min(size(near_i, kind=int32), size(radius, kind=int32) - j)
+        !GCC$ VECTOR
+        do k = 1, n
+          near_i(k) = near(x(j + k, 1) - x(i, 1), x(j + k, 2) - x(i, 2), radius(i) + radius(j + k) + self%skin, &
+            period(1), period(2))
+        end do
+        if (sum(near_i(:n)) == 0) cycle
+        do k = 1, n
+          if (near_i(k) > 0) call append(self, i, j + k)
+        end do
+      end do
+    end do
+  end subroutine test_all_pairs
 
   !> 1 if the nearest images of two points in the box are nearer to each other than sigma, else 0.
   elemental function near(dx, dy, sigma, period_x, period_y) result(yes)

@@ -15,6 +15,7 @@ module time_stepped
   use free_flight, only: flight, slowest
   use near_pairs, only: near_pairs_t
   use partners, only: axis_of, n_sides, nothing, sense_of
+  use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use texts, only: about
   implicit none
@@ -100,9 +101,8 @@ contains
         return
       end if
       k = k + 1
-      sim%now = k*self%dt
-      call take_step(self, sim, error, log)
-      if (allocated(error)) return
+      call take_step(self, sim, k*self%dt, error, log)
+      if (allocated(error) .or. sim%now < k*self%dt) return
       self%turns_left = self%turns_left - 1
     end do
   end subroutine advance
@@ -131,21 +131,27 @@ contains
     end do
   end function at_rest
 
-  !> All collisions at `sim%now`: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
-  !> result does not depend on how they are found.
-  subroutine take_step(self, sim, error, log)
+  !> All collisions at time t: first sides, then obstacles, then pairs of disks, each in ascending order, so that the
+  !> result does not depend on how they are found. A request to stop ends a long search, before anything has changed.
+  subroutine take_step(self, sim, t, error, log)
     class(time_stepped_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: t
     type(error_t), allocatable, intent(inout) :: error
     type(event_log_t), intent(inout), optional :: log
     integer(int32) :: i, k
 
     do i = 1, sim%n_disks()
       associate (d => sim%disk(i), g => sim%box%gravity)
-        self%x(i, 1) = flight(d%x(1), d%v(1), g(1), sim%now - d%clock)
-        self%x(i, 2) = flight(d%x(2), d%v(2), g(2), sim%now - d%clock)
+        self%x(i, 1) = flight(d%x(1), d%v(1), g(1), t - d%clock)
+        self%x(i, 2) = flight(d%x(2), d%v(2), g(2), t - d%clock)
       end associate
     end do
+    call self%near%update(sim, self%x, self%dt, self%every_pair)
+    if (self%every_pair) then
+      if (stop_requested()) return
+    end if
+    sim%now = t
     call mark_outside(self, sim)
     i = next_marked(self%outside, 0)
     do while (i > 0)
@@ -156,7 +162,6 @@ contains
       call meet_sides()
       i = next_marked(self%outside, i)
     end do
-    call self%near%update(sim, self%x, self%dt, self%every_pair)
     call self%near%mark_overlaps(sim%box, self%x, self%radius)
     k = next_marked(self%near%hit(:self%near%n), 0)
     do while (k > 0)

@@ -5,6 +5,7 @@ module progress_line
   use status_line, only: status_line_t
   use stop_rules, only: stop_rule_t
   use system, only: seconds
+  use texts, only: about
   implicit none
   private
   public :: progress_line_t
@@ -56,7 +57,7 @@ contains
     left = never
     if (self%share(last) > self%share(first)) left = (1 - self%share(last))*span/(self%share(last) - self%share(first))
     write (line, "(""t "",g0.6,""  "",f5.1,"" %  "",i0,"" collisions  "",a,"" per s  ETA "",a)") sim%time(), &
-      100*self%share(last), sim%tally%collisions, short_number(rate), clock_text(left)
+      100*self%share(last), sim%tally%collisions, about(max(rate, 1.0_real64)), clock_text(left)
     call self%show(trim(line))
   end subroutine report
 
@@ -74,23 +75,7 @@ contains
     self%n = self%n + 1
   end subroutine remember
 
-  !> A rate with a unit that keeps it short.
-  pure function short_number(x) result(text)
-    real(real64), intent(in) :: x
-    character(len=:), allocatable :: text
-    character(len=20) :: line
-
-    if (x >= 1.0e6_real64) then
-      write (line, "(f8.2,"" M"")") x/1.0e6_real64
-    else if (x >= 1.0e3_real64) then
-      write (line, "(f8.1,"" k"")") x/1.0e3_real64
-    else
-      write (line, "(f8.0)") x
-    end if
-    text = trim(adjustl(line))
-  end function short_number
-
-  !> Seconds as h:mm:ss or m:ss.
+  !> Seconds as h:mm:ss.
   pure function clock_text(s) result(text)
     real(real64), intent(in) :: s
     character(len=:), allocatable :: text
@@ -100,11 +85,7 @@ contains
     text = "?"
     if (.not. s < 3.6e6_real64) return
     whole = nint(s)
-    if (whole < 3600) then
-      write (line, "(i0,"":"",i2.2)") whole/60, modulo(whole, 60)
-    else
-      write (line, "(i0,"":"",i2.2,"":"",i2.2)") whole/3600, modulo(whole/60, 60), modulo(whole, 60)
-    end if
+    write (line, "(i0,"":"",i2.2,"":"",i2.2)") whole/3600, modulo(whole/60, 60), modulo(whole, 60)
     text = trim(line)
   end function clock_text
 
