@@ -87,8 +87,15 @@ class Nature(frozenset):
         return not self & UNSETTLED
 
 
-def nature_of(parameters: Mapping, mass: np.ndarray, radius: np.ndarray, lost: float) -> Nature:
-    """The nature of a run, from the parameters that it uses and what its disks are.
+def nature_of(
+    parameters: Mapping,
+    mass: np.ndarray,
+    radius: np.ndarray,
+    lost: float,
+    turning: bool,
+    collapsed: bool,
+) -> Nature:
+    """The nature of a run, from the parameters that it uses and what its disks are and do.
 
     `lost` is the share of its largest energy that was lost in collisions so far: a simulation can
     be asked at any time.
@@ -110,6 +117,7 @@ def nature_of(parameters: Mapping, mass: np.ndarray, radius: np.ndarray, lost: f
     inelastic = len(mass) > 1 and (pairs.min() < 1 or -1 < beta < 1)
     found = {
         "changed": bool(parameters.get("changes")),
+        "collapsed": collapsed,
         "stepped": parameters.get("run", {}).get("dynamics") == "steps",
         "sheared": box.get("shear_rate", 0.0) != 0,
         "noisy": kind == "noise",
@@ -122,8 +130,10 @@ def nature_of(parameters: Mapping, mass: np.ndarray, radius: np.ndarray, lost: f
         "falling": bool(np.any(box.get("gravity", 0.0))),
         "lossy": inelastic or lost > ROUNDING,
         "rough": beta > -1,
+        "turning": turning,
         "obstructed": "obstacle" in parameters or "wall" in parameters,
         "unlike": len(pairs) > 1,
+        "walled": any(kind == "wall" for kind in box.get("boundary", ())),
         "mixture": bool(np.ptp(mass) > 0 or np.ptp(radius) > 0),
     }
     torques = ("thermal", "falling", "noisy", "active", "bathed", "lossy", "rough")

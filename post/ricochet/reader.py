@@ -368,13 +368,14 @@ class Run:
         """What kind of run this is: see `ricochet.nature`."""
         lost = self.observable("dissipated_energy").value[-1]
         most = self.kinetic_energy([0, -1]).sum(axis=1).max()
-        found = nature_of(self.parameters, self.mass, self.radius, lost / most if most else 0.0)
-        more = {
-            "turning": "angular_velocity" in self.elements,
-            "walled": not self.periodic.all(),
-            "collapsed": "collapse" in str(self.provenance.get("note", "")),
-        }
-        return Nature(found | {name for name, there in more.items() if there})
+        return nature_of(
+            self.parameters,
+            self.mass,
+            self.radius,
+            lost=lost / most if most else 0.0,
+            turning="angular_velocity" in self.elements,
+            collapsed="collapse" in str(self.provenance.get("note", "")),
+        )
 
     @property
     def shortcoming(self) -> str:

@@ -63,13 +63,13 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     """The time after `skip` collisions per disk, or else that from which nothing drifts.
 
     Looked at are the collision rate and the energies of each species, where they can change, at the
-    observables or, if there are more of these, at the frames.  Speeds get `SPEEDS_FORGET`, as those
+    observables or, if these are few, at the frames.  Speeds get `SPEEDS_FORGET`, as those
     series say nothing of their distribution; a gas that cools gets no more.  A run too short for
     all that counts from its middle.
     """
     if skip is not None or run.nature.cooling:
         return after_start(run, skip)
-    few = len(run.collisions_per_disk.time) < run.frames
+    few = has_few_observables(run)
     time = run.time if few else run.collisions_per_disk.time
     if len(time) < 2 * FEWEST:
         return max(float(time[-1] / 2), after_start(run))
@@ -156,10 +156,15 @@ def kt_at_start(run: Run) -> float:
     return float(kt_of(run, run.kinetic_energy(0).sum()))
 
 
+def has_few_observables(run: Run) -> bool:
+    """Whether frames are to tell how a run went, as they are more, and observables too few."""
+    return len(run.collisions_per_disk.time) < min(run.frames, 2 * FEWEST)
+
+
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
-    """Times and kT of the observables, or of the frames if there are too few of those."""
-    time, energy = run.observable("all/kinetic_energy")
-    if len(time) >= min(run.frames, 2 * FEWEST):
+    """Times and kT of the observables, or of the frames if those are few."""
+    if not has_few_observables(run):
+        time, energy = run.observable("all/kinetic_energy")
         return "observables", time, kt_of(run, run.count * energy)
     energy = np.array([run.kinetic_energy(k).sum() for k in range(run.frames)])
     return "frames", run.time, kt_of(run, energy)
