@@ -75,6 +75,8 @@ def write_run(
         disks["committed"] = np.int64(frames if committed is None else committed)
         write_observables(file, time if observable_time is None else observable_time, observables)
         write_parameters(file, parameters, names, species, obstacles, walls)
+        sides = [text("periodic" if p else "wall") for p in periodic]
+        file.require_group("parameters/box").attrs["boundary"] = sides
         file.create_group("provenance").attrs.update(provenance or {"git_commit": text("abc1234")})
     return Path(path)
 
