@@ -9,7 +9,7 @@ module hdf5_handle
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
-    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5gcreate_f, h5gclose_f, h5ocopy_f, &
+    h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5gcreate_f, h5gclose_f, &
     h5lcreate_hard_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
@@ -36,7 +36,6 @@ module hdf5_handle
     procedure :: flush => flush_file
     procedure :: close => close_file
     procedure :: make_group
-    procedure :: copy
     procedure :: link
     procedure :: check
     procedure :: report
@@ -208,18 +207,6 @@ contains
     call self%check(status, "make group "//name)
     if (status >= 0) call h5gclose_f(group, closed)
   end subroutine make_group
-
-  !> Copies a dataset, or a group with all that is in it, from another file.
-  subroutine copy(self, name, source)
-    class(hdf5_handle_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    class(hdf5_handle_t), intent(in) :: source
-    integer :: status
-
-    if (allocated(self%failure)) return
-    call h5ocopy_f(source%id, name, self%id, name, status)
-    call self%check(status, "copy "//name)
-  end subroutine copy
 
   !> Gives an object a second name.
   subroutine link(self, name, second_name)

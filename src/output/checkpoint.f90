@@ -135,13 +135,15 @@ contains
   subroutine copy_checkpoints(file, source)
     type(hdf5_file_t), intent(inout) :: file
     type(hdf5_file_t), intent(inout) :: source
+    character(len=:), allocatable :: text
     type(series_t) :: words
     integer :: k
 
-    call file%make_group(checkpoint_group)
-    call file%copy(checkpoint_group//"program", source)
-    call file%copy(checkpoint_group//"input", source)
-    call file%copy(current, source)
+    call source%fetch_text(checkpoint_group//"program", text)
+    call file%put(checkpoint_group//"program", text)
+    call source%fetch_text(checkpoint_group//"input", text)
+    call file%put(checkpoint_group//"input", text)
+    call file%put(current, scalar, [int(checkpoint_number(source), int64)])
     do k = 1, 2
       words = series_t(slots(k), long_integer)
       call words%find(source)
