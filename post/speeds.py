@@ -21,7 +21,7 @@ a2 = <v^4> / (2 <v^2>^2) - 1.
 
 from ricochet import Run, RunError
 from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
-from ricochet.nature import TRAITS, allow
+from ricochet.nature import TRAITS, Refused, allow
 from ricochet.script import command_line, grouped, late_frames, launch, measured, report
 from ricochet.speeds import all_move, exact_law, independent_frames, kt_of_frames
 from ricochet.speeds import reduced_speeds, relaxation
@@ -40,6 +40,8 @@ UNSTEADY = "No steady kT yet: each frame at its own"
 
 def state_of(run: Run) -> str:
     """That of the late frames, if nothing drifts."""
+    if run.count < 3:
+        raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
     known = set(TRAITS) - {"changed", "collapsed", "sliding"}
     allow(run, "its speeds are of no single state; see fields.py", *known)
     if run.nature.cooling or "moving" in run.nature:
