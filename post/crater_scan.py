@@ -52,8 +52,8 @@ class Point(NamedTuple):
     values: dict[str, float]  # of AXES
     runs: int
     sizes: dict[str, Estimate]
-    energy_left: float
-    wall_collisions: float  # per run
+    energy_left: Estimate
+    wall_collisions: Estimate  # per run
     by_time: bool  # some runs ended before the energy fraction was reached
     free: bool  # neither time nor walls cut it short
 
@@ -76,12 +76,12 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
-        np.array([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
+        estimate([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
     )
     by_time = any(ended_by_time(*one) for one in zip(runs, craters, strict=True))
-    free = not by_time and not box_takes_part(runs[0], hits.mean())
+    free = not by_time and not box_takes_part(runs[0], hits.mean)
     values = dict(zip(AXES, key, strict=True))
-    return Point(values, len(runs), sizes, left.mean(), hits.mean(), by_time, free)
+    return Point(values, len(runs), sizes, left, hits, by_time, free)
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
@@ -220,8 +220,8 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
             row = {"scan": axis, **p.values, "runs": p.runs}
             for name, size in p.sizes.items():
                 row |= measured(name, size)
-            row |= {"energy_left": float(p.energy_left)}
-            row |= {"wall_collisions": float(p.wall_collisions)}
+            row |= measured("energy_left", p.energy_left)
+            row |= measured("wall_collisions", p.wall_collisions)
             rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
         for size in ALL:
             if fit := fit_of(axis, curve, size):

@@ -96,6 +96,15 @@ def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path
     np.testing.assert_allclose(tau, np.arange(17))
 
 
+@pytest.mark.parametrize(("power", "exact"), [(1, np.sqrt(np.pi) / 2), (4, 2)])
+def test_moments_of_speeds_hold_those_of_maxwell(rng, power, exact):
+    """In units of the sample: these take away 0.71 and 0.55 of the scatter."""
+    gases = np.sqrt(rng.exponential(size=(1000, 500)))
+    gases /= np.sqrt(np.mean(gases**2, axis=1, keepdims=True))
+    mean, error = np.array([speeds.moment(u, power, 500) for u in gases]).T
+    assert np.mean(np.abs(mean - exact) < error) == pytest.approx(0.6827, abs=0.06)
+
+
 @pytest.mark.parametrize(
     ("system", "exact"),
     [
