@@ -3,8 +3,8 @@
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
 Disks in an empty box, without gravity.  Runs are combined by packing fraction; lines are means over
-the runs, bands are errors, those of a single run for the structure alone, from blocks of
-its frames. Frames must be equally far apart in time; lags are logarithmic, every frame is an
+the runs, bands are errors, those of a single run for the structure alone, whose frames remember
+each other. Frames must be equally far apart in time; lags are logarithmic, every frame is an
 origin. Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Times
 are in units of the mean free time 1/w, lengths of the mean diameter.  Of runs that have no
 equilibrium only a2 and the structure are found, the latter in the frames after --skip, or else
@@ -42,7 +42,6 @@ from ricochet.thermodynamics import FLUID, all_settle, later, mean_free_time
 import numpy as np
 
 MOST_FRAMES = 50  # for the structure
-BLOCKS = 8  # of the frames of a single run
 PLAIN = {"walled"}  # what equal smooth elastic disks may be
 #: What has no equilibrium, but a structure.
 RESTLESS = ("lossy", "unlike", "uneven", "noisy", "active", "sliding")
@@ -83,16 +82,15 @@ def bins(run: Run) -> dict[str, np.ndarray]:
 
 
 def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Curve]]:
-    """psi6 of each run, and the means of the curves; of a single run over blocks of its frames."""
-    members, forms = {"psi6_local": [], "psi6_global": []}, []
+    """psi6 of each run, and the means of the curves; of a single run over its frames."""
+    members, forms, alone = {"psi6_local": [], "psi6_global": []}, [], len(runs) == 1
     for run, own in zip(runs, frames, strict=True):
         some = np.unique(np.linspace(own.start, own.stop - 1, MOST_FRAMES).astype(int)).tolist()
         psi = [bond_order(run, k) for k in some]
         members["psi6_local"].append(series_mean([np.abs(one).mean() for one in psi]))
         members["psi6_global"].append(series_mean([abs(one.mean()) for one in psi]))
-        blocks = min(BLOCKS, len(some)) if len(runs) == 1 else 1
         edges = bins(run)
-        for part in np.array_split(np.arange(len(some)), blocks):
+        for part in np.array_split(np.arange(len(some)), len(some) if alone else 1):
             these, order = [some[k] for k in part], [psi[k] for k in part]
             form = {"g": pair_correlation(run, these, edges["g"])}
             form["g6"] = bond_correlation(run, these, order, edges["g6"])
@@ -101,9 +99,12 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
             forms.append(form)
     curves = {}
     for name, edges in bins(runs[0]).items():
-        y, error = estimate([form[name] for form in forms])
-        known = np.isfinite(y)
-        curves[name] = Curve(((edges[1:] + edges[:-1]) / 2)[known], y[known], error[known])
+        values = np.array([form[name] for form in forms])
+        known = np.isfinite(values).all(axis=0)
+        columns = values[:, known]
+        each = [series_mean(one)[:2] for one in columns.T] if alone else []
+        mean = np.transpose(each) if alone else estimate(columns)
+        curves[name] = Curve(((edges[1:] + edges[:-1]) / 2)[known], *mean)
     return members, curves
 
 
@@ -242,10 +243,15 @@ def draw_group(
 def draw(
     groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict], cool: bool
 ) -> plt.Figure:
-    """Motion above, structure below; of gases that cool a2 and the structure."""
-    shown = {name: AXES[name] for name in AXES if not cool or name in ("a2", "g", "S", "g6")}
-    figure, axes = plt.subplots(2, len(shown) // 2, figsize=(4.5 * len(shown) // 2, 8.5))
-    panels = dict(zip(shown, axes.flat, strict=True))
+    """Motion above, structure below, as far as there is any."""
+    found = set().union(*(one.curves for one in results))
+    of = {"tail": "vacf", "D": "D_displacement(t)"}
+    shown = {name: style for name, style in AXES.items() if of.get(name, name) in found}
+    columns = (len(shown) + 1) // 2
+    figure, axes = plt.subplots(2, columns, figsize=(4.5 * columns, 8.5))
+    panels = dict(zip(shown, axes.flat, strict=False))
+    for spare in axes.flat[len(shown) :]:
+        spare.remove()
     shades = colours(len(rows))
     for (_, runs), found, row, colour in zip(groups, results, rows, shades, strict=True):
         draw_group(panels, found, row, colour, sum(run.count for run in runs))
@@ -257,12 +263,13 @@ def draw(
         if known:
             panels["vacf"].plot(wt, np.exp(-wt), color="black", ls="--", lw=1, label="$e^{-wt}$")
             panels["tail"].plot([], [], color="black", ls="--", lw=1, label="mode coupling, $1/t$")
-        else:
+        panels["tail"].set_ylim(1e-4, 1.2)
+    if "D" in panels:
+        if not known:
             panels["D"].set_ylabel("$D(t)$ / its largest value")
         panels["D"].plot([], [], color="black", marker=".", label="from displacements")
-        if any("D_velocities(t)" in found.curves for found in results):
+        if "D_velocities(t)" in found:
             panels["D"].plot([], [], color="black", marker="x", label="from velocities")
-        panels["tail"].set_ylim(1e-4, 1.2)
     start = min(found.curves["a2"].y[0] for found in results)
     if start < -0.4 and known:
         dilute_limit(panels["a2"], RELAXATION)

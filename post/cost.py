@@ -39,7 +39,7 @@ def fits(measured: dict, low: float, high: float) -> dict[str, PowerLaw]:
     for search, (n, cost) in measured.items():
         inside = (n >= low) & (n <= high)
         x, y = n[inside], cost[inside]
-        law = fit_power_law(x, y, 1e-3 * y)  # all alike: the scatter makes the error
+        law = fit_power_law(x, y)
         if law:
             laws[search] = law
     return laws

@@ -7,8 +7,9 @@ it; there is a curve for every combination of the other three, and a panel for e
 varies so.  A run without such a partner is named, in print and on the figure.  Points: means over
 the runs, bars: errors.  Lines: weighted fits of size = A x^p (x = 1 - xi^2 for the
 restitution, the fraction of normal energy lost in a collision); the exponents are printed, with
-chi^2 per degree of freedom, and a fit that misses its points says so.  Open symbols are left out of
-the fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
+chi^2 per degree of freedom, and a fit that misses its points says so.  With fewer than four runs a
+point all points weigh alike, and their scatter makes the error.  Open symbols are left out of the
+fit: the box takes part (wall hits are more than 1 % of the number of disks), or some of the
 runs ended by time, with more energy left than `stop.energy_fraction`.
 """
 
@@ -20,7 +21,14 @@ from ricochet.crater import bed, box_takes_part, crater, ended_by_time, energy_f
 from ricochet.drawing import COLOURS, colours, panel_grid, plt
 from ricochet.reader import span
 from ricochet.script import command_line, grouped, launch, measured, report
-from ricochet.statistics import Estimate, PowerLaw, estimate, fit_power_law, to_error
+from ricochet.statistics import (
+    FEWEST_RUNS,
+    Estimate,
+    PowerLaw,
+    estimate,
+    fit_power_law,
+    to_error,
+)
 
 import numpy as np
 
@@ -33,7 +41,9 @@ AXES = {
 SYMBOLS = {"mass": "M", "speed": "v", "radius": "R", "restitution": "(1-ξ^2)"}  # fitted against
 SIZES = {"hit": "disks hit", "displaced": "displaced by more than r"}
 EXTENTS = {"width": "width of the displaced", "depth": "depth of the displaced"}
+EXTENTS |= {"hole_width": "width of the hole", "hole_depth": "depth of the hole"}
 ALL = SIZES | EXTENTS
+MARKERS = "osDv"
 
 
 class Point(NamedTuple):
@@ -42,8 +52,8 @@ class Point(NamedTuple):
     values: dict[str, float]  # of AXES
     runs: int
     sizes: dict[str, Estimate]
-    energy_left: float
-    wall_collisions: float  # per run
+    energy_left: Estimate
+    wall_collisions: Estimate  # per run
     by_time: bool  # some runs ended before the energy fraction was reached
     free: bool  # neither time nor walls cut it short
 
@@ -66,12 +76,12 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
-        np.array([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
+        estimate([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
     )
     by_time = any(ended_by_time(*one) for one in zip(runs, craters, strict=True))
-    free = not by_time and not box_takes_part(runs[0], hits.mean())
+    free = not by_time and not box_takes_part(runs[0], hits.mean)
     values = dict(zip(AXES, key, strict=True))
-    return Point(values, len(runs), sizes, left.mean(), hits.mean(), by_time, free)
+    return Point(values, len(runs), sizes, left, hits, by_time, free)
 
 
 def others(axis: str, curve: list[Point]) -> dict[str, float]:
@@ -117,10 +127,12 @@ def abscissa(axis: str, x: np.ndarray) -> np.ndarray:
 
 
 def fit_of(axis: str, curve: list[Point], name: str) -> PowerLaw | None:
-    """A power law for a size."""
+    """A power law for a size; few runs say too little of their errors to weigh by."""
     free = [p for p in curve if p.free]
     x = abscissa(axis, [p.values[axis] for p in free])
-    return fit_power_law(x, *np.array([p.sizes[name] for p in free]).reshape(-1, 2).T)
+    y, error = np.array([p.sizes[name] for p in free]).reshape(-1, 2).T
+    few = min((p.runs for p in free), default=0) < FEWEST_RUNS
+    return fit_power_law(x, y, None if few else error)
 
 
 def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
@@ -153,7 +165,7 @@ def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, 
     shared = [others(axis, curve) for curve in scan]
     varying = [name for name in shared[0] if len({values[name] for values in shared}) > 1]
     for curve, values, shade in zip(scan, shared, colours(len(scan)), strict=True):
-        for (name, title), colour, marker in zip(names.items(), own, "os", strict=True):
+        for (name, title), colour, marker in zip(names.items(), own, MARKERS, strict=False):
             fit = fit_of(axis, curve, name)
             label = "" if varying else title + power(axis, curve, fit)
             style = {"color": shade if varying else colour, "marker": marker, "label": label}
@@ -161,7 +173,7 @@ def draw_sizes(axes: plt.Axes, axis: str, scan: list[list[Point]], names: dict, 
         if varying:
             axes.plot([], [], color=shade, label=listed({n: values[n] for n in varying}))
     if varying:
-        for title, marker in zip(names.values(), "os", strict=True):
+        for title, marker in zip(names.values(), MARKERS, strict=False):
             axes.plot([], [], ls="", color="0.4", marker=marker, label=title)
 
 
@@ -176,7 +188,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
         numbers = figure.add_subplot(grid[row, column])
         lengths = figure.add_subplot(grid[row + 1, column], sharex=numbers)
         draw_sizes(numbers, axis, scan, SIZES, COLOURS[:2])
-        draw_sizes(lengths, axis, scan, EXTENTS, COLOURS[2:4])
+        draw_sizes(lengths, axis, scan, EXTENTS, COLOURS[2:6])
         if axis == "mass":
             x = np.array(sorted({p.values["mass"] for p in chain(*scan)}))
             label = f"least number hit, $M\\,(1/f - 1)$, $f = {fraction:g}$"
@@ -186,8 +198,8 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
         numbers.set(ylabel="number of disks", title=title)
         numbers.tick_params(labelbottom=False)
         lengths.set(xlabel=AXES[axis], ylabel="length (box = 1)")
-        for axes in (numbers, lengths):
-            axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
+        for axes, room in ((numbers, 1.5), (lengths, 1.9)):
+            axes.set_ylim(0, room * axes.get_ylim()[1])
             axes.legend(loc="upper left", fontsize=8, ncols=1 + (len(scan) > 2))
     points = [p for scan in scans.values() for p in chain(*scan)]
     number = "-".join(map(str, sorted({f([p.runs for p in points]) for f in (min, max)})))
@@ -208,8 +220,8 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
             row = {"scan": axis, **p.values, "runs": p.runs}
             for name, size in p.sizes.items():
                 row |= measured(name, size)
-            row |= {"energy_left": float(p.energy_left)}
-            row |= {"wall_collisions": float(p.wall_collisions)}
+            row |= measured("energy_left", p.energy_left)
+            row |= measured("wall_collisions", p.wall_collisions)
             rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
         for size in ALL:
             if fit := fit_of(axis, curve, size):

@@ -21,9 +21,9 @@ a2 = <v^4> / (2 <v^2>^2) - 1.
 
 from ricochet import Run, RunError
 from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
-from ricochet.nature import TRAITS, allow
+from ricochet.nature import TRAITS, Refused, allow
 from ricochet.script import command_line, grouped, late_frames, launch, measured, report
-from ricochet.speeds import all_move, exact_law, independent_frames, kt_of_frames
+from ricochet.speeds import all_move, exact_law, independent_frames, kt_of_frames, moment
 from ricochet.speeds import reduced_speeds, relaxation
 from ricochet.statistics import Estimate, SeriesMean, binned, combined, drifts, estimate, grows
 from ricochet.statistics import hold_against, series_mean, to_error
@@ -40,6 +40,8 @@ UNSTEADY = "No steady kT yet: each frame at its own"
 
 def state_of(run: Run) -> str:
     """That of the late frames, if nothing drifts."""
+    if run.count < 3:
+        raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
     known = set(TRAITS) - {"changed", "collapsed", "sliding"}
     allow(run, "its speeds are of no single state; see fields.py", *known)
     if run.nature.cooling or "moving" in run.nature:
@@ -78,8 +80,8 @@ def pooled(
         **(measured("kT", kts[0]) if state != COOLING else {}),
         "kT_first": kts[1][0],
         "kT_last": kts[1][1],
-        "mean_u": float(np.mean(u)),
-        "kurtosis": float(np.mean(u**4)),
+        **measured("mean_u", moment(u, 1, n)),
+        **measured("kurtosis", moment(u, 4, n)),
         "KS_D": maxwell.ks,
         "KS_limit_1%": 1.63 / n**0.5,
         "KS_p": maxwell.ks_p,

@@ -43,6 +43,13 @@ def reduced_speeds(run: Run, frames: list[int], each: bool = False) -> np.ndarra
     return np.sqrt(energy).ravel()
 
 
+def moment(u: np.ndarray, power: int, independent: int) -> Estimate:
+    """Mean of a power of speeds whose mean square is 1, which is measured with them."""
+    mean = np.mean(u**power)
+    rest = u**power - power / 2 * mean * u**2
+    return Estimate(mean, np.std(rest) / np.sqrt(independent))
+
+
 def all_move(run: Run, frame: int) -> bool:
     """Whether each species has speeds in a frame."""
     energy = run.kinetic_energy(frame)

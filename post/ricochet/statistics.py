@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 MOST_WINDOWS = 10**6
+FEWEST_RUNS = 4  # for an error of their error, and so to weigh by
 Law = Callable[[np.ndarray], np.ndarray]
 
 
@@ -50,7 +51,7 @@ class PowerLaw(NamedTuple):
 
     def misses(self, runs: int) -> bool:
         """Whether points are farther off than errors over so many runs explain (Welch 1951)."""
-        if self.free < 1 or runs < 4:  # too few for an error of the error
+        if self.free < 1 or runs < FEWEST_RUNS:
             return False
         own, few = student(runs) ** 2 * self.chi2, (self.free + 2) * (runs - 1) / 3
         ratio = own / (1 + 2 / (runs - 1))
@@ -286,12 +287,16 @@ def kurtosis_noise(count: int) -> float:
     return 1 / np.sqrt(count)
 
 
-def fit_power_law(x: np.ndarray, y: np.ndarray, y_error: np.ndarray) -> PowerLaw | None:
+def fit_power_law(
+    x: np.ndarray, y: np.ndarray, y_error: np.ndarray | None = None
+) -> PowerLaw | None:
     """Weighted straight line through ln y against ln x; None with fewer than three points.
 
     If the points scatter by more than their errors, the errors of the fit are enlarged to match.
+    Without errors all points weigh alike, and their scatter is all that makes the error.
     """
-    x, y, y_error = (np.asarray(a, dtype=float) for a in (x, y, y_error))
+    alike = y_error is None
+    x, y, y_error = (np.asarray(a, dtype=float) for a in (x, y, y if alike else y_error))
     good = (x > 0) & (y > 0) & (y_error > 0)
     if len(np.unique(x[good])) < 3:
         return None
@@ -299,5 +304,7 @@ def fit_power_law(x: np.ndarray, y: np.ndarray, y_error: np.ndarray) -> PowerLaw
     line, covariance = np.polyfit(log_x, log_y, 1, w=weight, cov="unscaled")
     free = int(good.sum()) - 2
     chi2 = float(np.sum((weight * (log_y - np.polyval(line, log_x))) ** 2) / free)
-    error = np.sqrt(covariance[0, 0] * max(1.0, chi2))
-    return PowerLaw(float(np.exp(line[1])), float(line[0]), error, chi2, free)
+    wider = student(free + 1) ** 2 * chi2 if alike else max(1.0, chi2)
+    error = float(np.sqrt(covariance[0, 0] * wider))
+    factor, exponent = np.exp(line[1]), line[0]
+    return PowerLaw(float(factor), float(exponent), error, np.nan if alike else chi2, free)

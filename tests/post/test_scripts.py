@@ -10,6 +10,7 @@ import crater_scan
 import equation_of_state
 import equipartition
 import gravity
+import haff
 import lyapunov
 import missed
 import mixture
@@ -95,6 +96,15 @@ def test_reduced_speeds_do_not_know_units_and_relax_from_minus_one_half(tmp_path
     np.testing.assert_allclose(tau, np.arange(17))
 
 
+@pytest.mark.parametrize(("power", "exact"), [(1, np.sqrt(np.pi) / 2), (4, 2)])
+def test_moments_of_speeds_hold_those_of_maxwell(rng, power, exact):
+    """In units of the sample: these take away 0.71 and 0.55 of the scatter."""
+    gases = np.sqrt(rng.exponential(size=(1000, 500)))
+    gases /= np.sqrt(np.mean(gases**2, axis=1, keepdims=True))
+    mean, error = np.array([speeds.moment(u, power, 500) for u in gases]).T
+    assert np.mean(np.abs(mean - exact) < error) == pytest.approx(0.6827, abs=0.06)
+
+
 @pytest.mark.parametrize(
     ("system", "exact"),
     [
@@ -168,13 +178,14 @@ def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, fig
         assert "Steady state" in words and "energy" not in words
 
 
-def test_speeds_of_disks_at_rest_or_on_sliding_walls_are_refused(tmp_path, rng, capsys):
+def test_speeds_of_few_disks_or_at_rest_or_on_sliding_walls_are_refused(tmp_path, rng, capsys):
     slides = {"parameters": {"side/top": {"speed": 1.0}}, "names": ("disk",)}
     said = refusal(capsys, "speeds", gas(tmp_path / "a.h5", rng, **slides), code=1)
     assert "a.h5: has surfaces that slide;" in said
-    x = np.zeros((3, 2, 2))
-    still = write_run(tmp_path / "b.h5", x, x, observables={"collisions": [0, 0, 0]})
-    assert "'disk' is at rest (kT = 0)" in refusal(capsys, "speeds", still, code=1)
+    for count, words in ((2, "needs three disks"), (3, "'disk' is at rest (kT = 0)")):
+        x = np.zeros((3, count, 2))
+        still = write_run(tmp_path / f"{count}.h5", x, x, observables={"collisions": [0, 0, 0]})
+        assert words in refusal(capsys, "speeds", still, code=1)
 
 
 def words_on(figure):
@@ -258,6 +269,8 @@ def test_the_cooling_rate_is_that_of_the_homogeneous_state(rng, end):
     assert rate.error == pytest.approx(0.01 * true / np.sqrt(20), rel=0.5)
     assert curves["rate"].mean[100] == pytest.approx(true * (0.5 if end else 1), rel=0.01)
     assert until == pytest.approx(end, abs=1) if end else np.isnan(until)
+    said = " ".join(haff.apart(0.9, curves, until))
+    assert not said if end else "here K is 0.8" in said and "after 60 coll" in said
 
 
 def test_the_steady_ratio_has_forgotten_its_start(monkeypatch, tmp_path):
@@ -402,12 +415,15 @@ def test_every_run_of_a_grid_is_on_a_curve_or_named(tmp_path, capsys):
     assert slow[1].sizes["displaced"] == (11.5, 0.5 * TWO) and slow[1].runs == 2
     assert [p.free for p in slow] == [True, True, False]
     assert crater_scan.fit_of("mass", slow, "displaced") is None, "two free points"
+    three = crater_scan.fit_of("mass", [p._replace(free=True) for p in slow], "displaced")
+    assert np.isnan(three.chi2), "two runs a point do not say how far they scatter"
     figure = crater_scan.draw(runs, scans)
     legends = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert {"speed 2", "speed 5", "mass 5", "mass 10", "mass 15"} <= set(legends)
     assert figure.axes[0].get_title("left") == "radius 5,  restitution 0.5"
     rows = drawn(tmp_path, "crater_scan", *paths)
     assert len(rows) == 6 + 6 and {row["speed"] for row in rows} == {"2.0", "5.0"}
+    assert {"hole_width", "hole_depth_error"} <= set(rows[0])
     said = capsys.readouterr().err.splitlines()
     for line, mass, xi, count in zip(said, (30, 40), (0.6, 0.5), (2, 1), strict=True):
         assert f"mass {mass},  speed 7,  radius 5,  restitution {xi} (runs: {count})" in line

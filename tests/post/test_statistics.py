@@ -86,6 +86,15 @@ def test_power_law_is_found_with_its_error(rng):
     assert statistics.fit_power_law([1, 2], [1, 2], [0.1, 0.1]) is None
 
 
+@pytest.mark.parametrize("points", [3, 5, 10])
+def test_68_of_100_exponents_hold_the_true_one_where_scatter_makes_the_error(rng, points):
+    x = np.linspace(1, 30, points)
+    samples = x * np.exp(0.05 * rng.normal(size=(2000, points)))
+    fits = [statistics.fit_power_law(x, y) for y in samples]
+    held = np.mean([abs(fit.exponent - 1) < fit.exponent_error for fit in fits])
+    assert held == pytest.approx(0.6827, abs=0.04)
+
+
 @pytest.mark.parametrize("runs", [4, 8])
 def test_a_fit_says_that_it_misses_its_points_as_seldom_as_it_should(rng, runs):
     x, missed = np.linspace(1, 30, 10), np.zeros((2, 1000), int)

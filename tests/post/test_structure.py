@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import correlations
 import snapshot
 from ricochet import structure, transport
 from ricochet import hard_disks as hd
@@ -40,6 +41,17 @@ def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, 
     edges = first + np.array([-0.3, -0.01, 0.01])
     between, peak = structure.structure_factor(lattice, [0], edges)
     assert between == pytest.approx(0, abs=1e-9) and peak == pytest.approx(len(x))
+
+
+def test_the_structure_of_one_run_knows_that_its_frames_remember(tmp_path, rng):
+    """Of two places, each for half of the time: worth two frames, not as many as there are."""
+    places = rng.uniform(size=(2, 200, 2))
+    run = written(tmp_path / "run.h5", *[np.repeat(places, 16, axis=0)] * 2, periodic=PERIODIC)
+    parts = [slice(0, 16), slice(16, 32), slice(0, 32)]
+    one, other, both = (correlations.structure([run], [part])[1] for part in parts)
+    for name in ("g", "S"):
+        apart = np.abs(one[name].y - other[name].y)
+        assert np.all(both[name].error >= 0.35 * apart), name
 
 
 def triangular(columns, rows):
