@@ -98,7 +98,7 @@ contains
     !> Takes the option of argument k, and the next argument if it is the option's value.
     subroutine take_option(name)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: value
+      type(text_t) :: override
 
       if (name /= arguments(k)%text .and. any(switches == name)) then
         call refuse("option "//name//" takes no value")
@@ -108,8 +108,8 @@ contains
       case ("-o", "--output")
         call take_value(name, command%output)
       case ("--set")
-        call take_value(name, value)
-        command%overrides = [command%overrides, text_t(value)]
+        call take_value(name, override%text)
+        command%overrides = [command%overrides, override]    ! of a `text_t(...)` gfortran 12 would lose the memory
       case ("--explain")
         command%question = "explain"
         call take_value(name, command%topic)
