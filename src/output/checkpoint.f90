@@ -79,6 +79,7 @@ contains
     character(len=*), intent(in) :: output                       !! path
     type(text_t), allocatable, intent(inout) :: overrides(:)     !! GROUP.VARIABLE=VALUE of now; then those of both
     type(hdf5_file_t) :: file
+    type(text_t) :: override
     type(text_t), allocatable :: given(:)
     character(len=:), allocatable :: text, line
     integer :: k
@@ -93,7 +94,8 @@ contains
       line = line_at(text, 1)
       text = text(min(len(line) + 1, len(text)) + 1:)
       if (free_to_change(variable_of(line)) .or. any([(variable_of(given(k)%text) == variable_of(line), k=1, size(given))])) cycle
-      overrides = [overrides, text_t(line)]
+      override%text = line
+      overrides = [overrides, override]           ! see `command_line: take_option`
     end do
     overrides = [overrides, given]
   end subroutine recall_overrides
