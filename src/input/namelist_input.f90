@@ -124,6 +124,8 @@ contains
 
     !> Reads the whole text.
     subroutine read_text()
+      logical :: ended
+
       opened = 0
       do while (problems%count < most_problems)
         if (opened == 0) then
@@ -137,7 +139,9 @@ contains
           at = at + 1
           opened = 0
         case ("&", ending)
-          if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
+          ended = follow("&"//word)
+          if (ended) ended = lower_case(content(source, token(at + 1))) == "end"
+          if (ended) then
             call problems%add(token(at)%line, own, "a group ends with /, not with &end")
             at = at + 2
           else if (.not. quote_open) then                 ! else it may have swallowed the end
