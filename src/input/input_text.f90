@@ -129,7 +129,7 @@ contains
       end if
       at = last + 1
     end do
-    tokens(n + 1:n + 5) = token_t(ending, at, at, line, 1)
+    tokens(n + 1:n + 5) = token_t(ending, at, at - 1, line, 1)
     tokens = tokens(:n + 5)
 
   contains

@@ -124,8 +124,6 @@ contains
 
     !> Reads the whole text.
     subroutine read_text()
-      logical :: ended
-
       opened = 0
       do while (problems%count < most_problems)
         if (opened == 0) then
@@ -139,9 +137,7 @@ contains
           at = at + 1
           opened = 0
         case ("&", ending)
-          ended = follow("&"//word)
-          if (ended) ended = lower_case(content(source, token(at + 1))) == "end"
-          if (ended) then
+          if (follow("&"//word) .and. lower_case(content(source, token(at + 1))) == "end") then
             call problems%add(token(at)%line, own, "a group ends with /, not with &end")
             at = at + 2
           else if (.not. quote_open) then                 ! else it may have swallowed the end
