@@ -103,7 +103,7 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
         known = np.isfinite(values).all(axis=0)
         columns = values[:, known]
         each = [series_mean(one)[:2] for one in columns.T] if alone else []
-        mean = np.transpose(each) if alone else estimate(columns)
+        mean = np.reshape(each, (-1, 2)).T if alone else estimate(columns)
         curves[name] = Curve(((edges[1:] + edges[:-1]) / 2)[known], *mean)
     return members, curves
 
@@ -244,9 +244,9 @@ def draw(
     groups: list[tuple[float, list[Run]]], results: list[Found], rows: list[dict], cool: bool
 ) -> plt.Figure:
     """Motion above, structure below, as far as there is any."""
-    found = set().union(*(one.curves for one in results))
+    there = set().union(*(one.curves for one in results))
     of = {"tail": "vacf", "D": "D_displacement(t)"}
-    shown = {name: style for name, style in AXES.items() if of.get(name, name) in found}
+    shown = {name: style for name, style in AXES.items() if of.get(name, name) in there}
     columns = (len(shown) + 1) // 2
     figure, axes = plt.subplots(2, columns, figsize=(4.5 * columns, 8.5))
     panels = dict(zip(shown, axes.flat, strict=False))
@@ -268,7 +268,7 @@ def draw(
         if not known:
             panels["D"].set_ylabel("$D(t)$ / its largest value")
         panels["D"].plot([], [], color="black", marker=".", label="from displacements")
-        if "D_velocities(t)" in found:
+        if "D_velocities(t)" in there:
             panels["D"].plot([], [], color="black", marker="x", label="from velocities")
     start = min(found.curves["a2"].y[0] for found in results)
     if start < -0.4 and known:
