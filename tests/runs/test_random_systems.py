@@ -136,10 +136,11 @@ class Case:
         return [f"--set=output.{word}" for word in words]
 
     def nearly_stands_still(self) -> bool:
-        """Whether walls stop disks until squares of their speeds vanish: then units matter."""
+        """Whether walls stop disks or spins until their squares vanish: then units matter."""
         self.whole("often", *self.samples(500), "--set=output.precision='double'")
-        speed = np.abs(contents(self.result("often"))["/particles/disks/velocity/value"])
-        return bool(np.any((speed > 0) & (speed < 1e-120)))
+        found = contents(self.result("often"))
+        sizes = np.abs(np.concatenate([found[path].ravel() for path in UNITS if path in found]))
+        return bool(np.any((sizes > 0) & (sizes < 1e-120)))
 
     def in_other_units(self, name: str, _seconds: float) -> End:
         """Lengths, velocities and masses times powers of two, which change no digit."""
@@ -150,9 +151,9 @@ class Case:
         table = table_of(self.program)
         lines = [rescaled(line, self.units, table) for line in lines]
         (self.folder / "other.nml").write_text("\n".join(lines) + "\n")
-        columns, table = self.system.columns, self.system.table
-        factors = [eval(COLUMNS[column], {}, self.units) for column in columns]
-        (self.folder / "other.txt").write_text(starting_file(columns, table * factors))
+        factors = [eval(COLUMNS[name], {}, self.units) for name in self.system.columns]
+        text = starting_file(self.system.columns, self.system.table * factors)
+        (self.folder / "other.txt").write_text(text)
         return self.whole(name, *self.way(), text="other.nml")
 
 
