@@ -21,7 +21,7 @@ module run
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
-  use texts, only: counted, legible, size_text, written
+  use texts, only: counted, eol, legible, size_text, written
   use timeline, only: advance_once, passed_collapse
   implicit none
   private
@@ -30,7 +30,6 @@ module run
   real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
   integer, parameter :: most_unwritten = 4096              !! collisions in the event log
   integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
-  character(len=1), parameter :: eol = new_line("a")
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
 
   type :: run_t

@@ -29,6 +29,7 @@ module texts
 
   character(len=*), parameter :: upper_letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
   character(len=*), parameter :: lower_letters = "abcdefghijklmnopqrstuvwxyz"
+  character(len=1), parameter, public :: eol = new_line("a")      !! ends a line
   character(len=*), parameter, public :: letters = lower_letters//upper_letters, digits = "0123456789"
 
 contains

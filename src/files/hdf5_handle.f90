@@ -4,10 +4,10 @@
 !> call: `report` says at the end whether all went well.
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
-  use hdf5, only: hid_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
+  use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
     h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
-    h5pset_sieve_buf_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
+    h5pset_sieve_buf_size_f, h5pset_small_data_block_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
     h5f_acc_rdwr_f, h5f_scope_global_f, h5lis_registered_f, h5l_type_external_f, h5gcreate_f, h5gclose_f, &
     h5lcreate_hard_f
@@ -112,6 +112,7 @@ contains
     if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
     if (status >= 0) call h5pset_file_locking_f(access, .false., .true., status)
     if (status >= 0) call h5pset_sieve_buf_size_f(access, sieve, status)
+    if (status >= 0) call h5pset_small_data_block_size_f(access, 0_hsize_t, status)
     if (status >= 0) call h5pcreate_f(h5p_link_create_f, self%links, status)
     if (status >= 0) call h5pset_create_inter_group_f(self%links, 1, status)
     if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, self%storage, status)

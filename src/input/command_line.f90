@@ -6,7 +6,7 @@ module command_line
   use hdf5_handle, only: hdf5_version
   use run_files, only: output_of
   use system, only: print_text
-  use texts, only: nearest_word, shown, text_t
+  use texts, only: eol, nearest_word, shown, text_t
   use version, only: program_version
   use variable_help, only: defaults_text, explain, variables_text
   implicit none
@@ -29,7 +29,6 @@ module command_line
   character(len=17), parameter :: switches(*) = [character(len=17) :: "--resume", "--check", "--quiet", "--force", &
     "--help", "--version", "--print-defaults", "--print-variables", "--print-input"]
   character(len=17), parameter :: options(*) = [character(len=17) :: "--output", "--set", "--explain", switches]
-  character(len=1), parameter :: eol = new_line("a")
 
 contains
 

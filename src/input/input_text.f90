@@ -7,8 +7,8 @@
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
-  use system, only: file_size, is_folder, opening_problem, read_bytes
-  use texts, only: digits, letters, shown, written
+  use system, only: file_size, is_folder, read_lines
+  use texts, only: digits, eol, letters, shown, written
   implicit none
   private
   public :: read_text, unix_lines, byte_order_mark
@@ -21,7 +21,7 @@ module input_text
 
   !> Kinds of tokens, besides quotes and what is a token by itself, as & and =.
   character(len=1), parameter :: word = "w", unclosed = "u", junk = "?", ending = "e"
-  character(len=*), parameter :: eol = new_line("a"), blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
+  character(len=*), parameter :: blanks = " "//achar(9), quotes = "'""", marks = "&/=,()"
   character(len=*), parameter :: word_characters = digits//".+-"//letters//"_*%#:$@?<>|[]{}~^`\"
 
   !> `first` and `last` are its place in the text, with its quotes.
@@ -46,7 +46,8 @@ contains
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: bytes, n
+    character(len=:), allocatable :: problem
+    integer(int64) :: bytes
     integer :: odd
 
     bytes = file_size(path)
@@ -61,13 +62,11 @@ contains
         " bytes; an input file has at most "//written(largest_file))
     end if
     if (allocated(error)) return
-    allocate (character(len=bytes) :: text)
-    call read_bytes(path, text, n)
-    if (n < 0) then
-      call fail(error, exit_files, path//": cannot be read: "//opening_problem(path, writable=.false.))
+    call read_lines(path, text, problem)
+    if (problem /= "") then
+      call fail(error, exit_files, path//": cannot be read: "//problem)
       return
     end if
-    text = text(:n)
     odd = scan(text, transfer(control, repeat(" ", size(control))))
     if (odd > 0) call fail(error, exit_usage, path//": is not a text file: byte "//written(odd)// &
       " is a control character, code "//written(iachar(text(odd:odd))))

@@ -4,14 +4,13 @@ module namelist_input
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
   use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
-  use texts, only: digits, joined, lower_case, shown, suggestion, text_t, written
+  use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none
   private
   public :: read_groups
 
   integer, parameter :: most_instances = 5000, most_repeats = 10000000   !! of a repeated group; of the value in 3*value
-  character(len=*), parameter :: eol = new_line("a")
 
 contains
 

@@ -5,13 +5,12 @@ module variable_help
   use input_groups, only: group_t, json_text
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
     wall_groups, words_of
-  use texts, only: growing_text_t, joined, lower_case, shown, suggestion, written
+  use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, written
   implicit none
   private
   public :: defaults_text, explain, groups_text, variables_text
 
   integer, parameter :: comment_column = 40                !! of the reference file
-  character(len=1), parameter :: eol = new_line("a")
 
 contains
 

@@ -21,7 +21,7 @@ module checkpoint
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: last_problem, synchronize
-  use texts, only: growing_text_t, legible, lower_case, text_t, written
+  use texts, only: eol, growing_text_t, legible, lower_case, text_t, written
   use variables, only: free_to_change
   use version, only: program_version
   implicit none
@@ -30,7 +30,7 @@ module checkpoint
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides
 
   integer, parameter :: layout = 7                !! of the checkpoints; another one is not understood
-  character(len=*), parameter :: eol = new_line("a"), slots(2) = checkpoint_group//["1", "2"]
+  character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
   integer, parameter :: none = 0
 

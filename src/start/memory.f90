@@ -4,7 +4,8 @@ module memory
   use kinds, only: int64
   use input_problems, only: problem_list_t
   use settings, only: settings_t
-  use texts, only: size_text, written
+  use system, only: read_lines
+  use texts, only: eol, size_text, written
   implicit none
   private
   public :: check_memory, free_memory, room_for_domains
@@ -39,48 +40,45 @@ contains
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! of the file system; empty but for tests
     integer(int64) :: bytes
-    character(len=:), allocatable :: folder
-    character(len=1024) :: line                           ! number:controllers:group; version 2 has no controllers
-    integer :: unit, status, top, colon
+    character(len=:), allocatable :: lines                ! number:controllers:group; version 2 has no controllers
+    character(len=:), allocatable :: folder, unread
+    integer :: top, first, last, colon
 
     bytes = number_after("MemAvailable:", root//"/proc/meminfo")
     if (bytes < huge(bytes)) bytes = 1024*bytes
-    open (newunit=unit, file=root//"/proc/self/cgroup", status="old", action="read", iostat=status)
-    if (status /= 0) return
-    do while (status == 0)
-      read (unit, "(a)", iostat=status) line
-      colon = index(line, ":", back=.true.)
-      folder = root//"/sys/fs/cgroup"
-      if (index(line(:colon), "memory") > 0) folder = folder//"/memory"
-      top = len(folder)
-      if (status /= 0 .or. index(line(:colon), "memory") + index(line, "::") == 0) cycle
-      folder = folder//trim(line(colon + 1:))
+    call read_lines(root//"/proc/self/cgroup", lines, unread)
+    last = 0
+    do while (last < len(lines))
+      first = last + 1
+      last = last + index(lines(first:), eol)
+      associate (line => lines(first:last - 1))
+        colon = index(line, ":", back=.true.)
+        folder = root//"/sys/fs/cgroup"
+        if (index(line(:colon), "memory") > 0) folder = folder//"/memory"
+        top = len(folder)
+        if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
+        folder = folder//line(colon + 1:)
+      end associate
       do while (len(folder) >= top)                       ! the group, and those around it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
       end do
     end do
-    close (unit)
   end function free_memory
 
   !> The number that follows a label at the beginning of a line of a file; huge if there is none.
   function number_after(label, path) result(number)
     character(len=*), intent(in) :: label, path
     integer(int64) :: number
-    character(len=80) :: line
-    integer :: unit, status
+    character(len=:), allocatable :: lines, unread
+    integer :: first, status
 
     number = huge(number)
-    open (newunit=unit, file=path, status="old", action="read", iostat=status)
-    if (status /= 0) return
-    do while (status == 0)
-      read (unit, "(a)", iostat=status) line
-      if (status /= 0 .or. index(line, label) /= 1) cycle
-      read (line(len(label) + 1:), *, iostat=status) number
-      if (status /= 0) number = huge(number)
-      exit
-    end do
-    close (unit)
+    call read_lines(path, lines, unread)
+    first = index(eol//lines, eol//label) + len(label)
+    if (first == len(label) .or. len(lines) == 0) return
+    read (lines(first:first - 1 + index(lines(first:), eol)), *, iostat=status) number
+    if (status /= 0) number = huge(number)
   end function number_after
 
 end module memory

@@ -6,8 +6,8 @@ module position_file
   use input_text, only: byte_order_mark
   use input_words, only: read_real
   use settings, only: disks_in_file_t
-  use system, only: opening_problem
-  use texts, only: counted, joined, lower_case, place_of, shown, suggestion, written
+  use system, only: read_lines
+  use texts, only: counted, eol, joined, lower_case, place_of, shown, suggestion, written
   implicit none
   private
   public :: angle_row, column_names, mass_row, radius_row, read_positions, spin_row
@@ -29,29 +29,27 @@ contains
     integer, intent(in) :: s                                !! number of the species
     type(disks_in_file_t), intent(inout) :: disks
     character(len=longest_line) :: line
-    character(len=256) :: reason
-    character(len=:), allocatable :: problem
+    character(len=:), allocatable :: text, problem
     real(real64), allocatable :: table(:, :)                ! (column_names,n)
     integer, allocatable :: lines(:)                        ! (n) in which the disks stand
     integer, allocatable :: column(:)                       ! of the file, as places in `known_names`; none: not known yet
     integer :: first(longest_line), last(longest_line)      ! of each word of the line
-    integer :: unit, status, number, n, n_words
+    integer(int64) :: begin, past                           ! of a line, in the text
+    integer :: number, n, n_words
 
     allocate (table(size(column_names), 64), lines(64), column(0))
     n = 0
-    problem = opening_problem(path, writable=.false.)
-    if (problem == "") then
-      open (newunit=unit, file=path, status="old", action="read", iostat=status, iomsg=reason)
-      if (status /= 0) problem = trim(reason)
-    end if
+    call read_lines(path, text, problem)
     if (problem /= "") then
       call fail(disks%error, exit_files, path//": cannot be read: "//problem)
       return
     end if
     number = 0
-    do
-      read (unit, "(a)", iostat=status, iomsg=reason) line
-      if (status /= 0) exit
+    past = 1
+    do while (past <= len(text, int64))
+      begin = past
+      past = past + index(text(begin:), eol, kind=int64)
+      line = text(begin:past - 2)
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
       if (n == size(lines)) then
@@ -62,15 +60,10 @@ contains
       call read_line()
       if (problem /= "") exit
     end do
-    close (unit)
     disks%there = [(any(column == number), number=1, size(column_names))]
     disks%table = table(:, :n)
     disks%rows = lines(:n)
-    if (problem /= "") then
-      call fail(disks%error, exit_usage, path//":"//written(number)//": "//problem)
-    else if (.not. is_iostat_end(status)) then
-      call fail(disks%error, exit_files, path//": "//trim(reason))
-    end if
+    if (problem /= "") call fail(disks%error, exit_usage, path//":"//written(number)//": "//problem)
 
   contains
 

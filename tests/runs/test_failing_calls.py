@@ -16,7 +16,7 @@ from whole_runs import committed, differences, is_beginning, one_line, ran, writ
 #: Few calls, but of every kind: frames of a planned number, observables and events of an unknown
 #: one, so that the file is rebuilt at the end, and two checkpoints.
 SMALL = """&box boundary = 'periodic', 'wall' /
-&species name = 'gas' count = 60 radius = 0.03 temperature = 1 /
+&species name = 'gas' file = 'gas.txt' radius = 0.03 temperature = 1 /
 &stop events = 2 /
 &output observables_every_collisions = 2 event_log = .true. checkpoint_every = 1e-6 /
 """
@@ -58,6 +58,7 @@ def stage(program, tmp_path_factory):
         folder = stage / option
         folder.mkdir()
         write_input(folder, SMALL)
+        (folder / "gas.txt").write_text("".join(f"{k / 12} 0.5\n" for k in range(12)))
         run = started(program, *COMMAND, *change, folder=folder)
         assert run.returncode == code, run.stderr
     for option in OPTIONS:
@@ -82,9 +83,8 @@ def started(*command, folder):
 
 def traced(program, folder, option, *what):
     """The run under strace, which writes to the file `trace`."""
-    strace = ["strace", "-f", "-y", "-o", "trace", *what]
-    if not any(":signal=" in word for word in what):  # with it strace 6.1 sends none
-        strace.insert(1, "--seccomp-bpf")
+    fast = [] if ":signal=" in "".join(what) else ["--seccomp-bpf"]  # with it strace 6.1 sends none
+    strace = ["strace", *fast, "-f", "-y", "-o", "trace", *what]
     return started(*strace, program, *COMMAND, *option.split(), folder=folder)
 
 
@@ -186,7 +186,7 @@ def check_after_signal(program, stage, folder, option, call, inject):
         assert run.returncode == FINISHED
     left = contents_of(folder)
     if run.returncode == FINISHED:
-        assert set(left) == {"gas.nml", "gas.h5"}
+        assert set(left) == {"gas.nml", "gas.txt", "gas.h5"}
         assert same_results(stage, folder / "gas.h5")
         return
     assert run.returncode == STOPPED, (run.returncode, run.stderr)
