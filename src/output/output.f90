@@ -81,6 +81,8 @@ contains
     if (.not. allocated(error)) call check_places(path, error)
     if (.not. allocated(error)) call remove_file(path//unfinished_new)      ! a run that was killed has left it half made
     self%replaced = identity_of(path)
+    if (is_file(path) .and. all(self%replaced == 0) .and. .not. allocated(error)) &
+      call fail(error, exit_files, path//": cannot be looked at: "//last_problem())
   end subroutine claim
 
   !> Opens the output of a new run, which has been claimed, and writes the first samples.
