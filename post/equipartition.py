@@ -3,9 +3,9 @@
     python post/equipartition.py runs/gravity_v0/*.h5 -o equipartition.png --csv times.csv
 
 Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
-windows of --window.  T_therm is the middle of the first window from which the two agree within
---within for three windows, and are known so well: their difference with twice its error.  A single
-run has no error and no T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in
+windows of --window.  T_therm is when their difference enters --within, to stay for three windows:
+between where it does so less its error, and where with it.  A single run has no error and no
+T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in
 equilibrium, so take many.  K_light and K_heavy in the table are means in equilibrium, which is
 found or begins after --skip.
 """
@@ -17,7 +17,7 @@ from ricochet import Run
 from ricochet.drawing import caption, colours, plt
 from ricochet.nature import SETTLED, allow
 from ricochet.script import command_line, grouped, launch, measured, report
-from ricochet.statistics import Estimate, estimate, windows
+from ricochet.statistics import Estimate, estimate, to_error, when, windows
 from ricochet.thermodynamics import lightest_and_heaviest, start_of_equilibrium
 
 import numpy as np
@@ -30,17 +30,16 @@ class Approach(NamedTuple):
     light: Estimate  # (W,)
     heavy: Estimate
     gap: Estimate  # (W,) heavy / light - 1
-    thermalisation: float  # NaN if they never agree, or are not known so well
+    thermalisation: Estimate  # NaN if they never agree, or are not known so well
 
 
-def thermalisation_time(
-    time: np.ndarray, gap: Estimate, within: float = 0.1, lasting: int = 3
-) -> float:
-    """First time from which |gap| and twice its error are <= within for `lasting` windows."""
-    close = (np.abs(gap.mean) <= within) & (2 * gap.error <= within)
+def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int = 3) -> float:
+    """When a gap (W,) enters `within`, on the line between its windows, to stay for `lasting`."""
+    close = gap <= within
     for k in range(len(time) - lasting + 1):
         if close[k : k + lasting].all():
-            return float(time[k])
+            part = (gap[k - 1] - within) / (gap[k - 1] - gap[k]) if k else 1
+            return float(time[k] - (1 - part) * (time[k] - time[k - 1]))
     return float("nan")
 
 
@@ -55,7 +54,8 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     light, heavy = map(estimate, both)
     difference = estimate(both[1] - both[0])
     gap = Estimate(difference.mean / light.mean, difference.error / light.mean)
-    return Approach(time, light, heavy, gap, thermalisation_time(time, gap, within))
+    agreed = when(lambda curve: entry(time, curve, within), gap._replace(mean=np.abs(gap.mean)))
+    return Approach(time, light, heavy, gap, agreed)
 
 
 def late(runs: list[Run], name: str, skip: float | None) -> Estimate:
@@ -84,10 +84,10 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
         for k, energy in zip(order, (found.light, found.heavy), strict=True):
             style = {"color": shades[k], "marker": ".", "label": first.names[k]}
             axes.errorbar(found.time, *energy, **style)
-        if np.isfinite(found.thermalisation):
+        if np.isfinite(found.thermalisation.mean):
             label = f"means differ by less than {100 * within:g} % for three windows from t = "
-            label += f"{found.thermalisation:.3g}"
-            axes.axvline(found.thermalisation, color="0.5", ls="--", lw=1, label=label)
+            label += " ± ".join(to_error(*found.thermalisation))
+            axes.axvline(found.thermalisation.mean, color="0.5", ls="--", lw=1, label=label)
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)
         axes.legend(ncols=3, loc="lower right")
@@ -106,14 +106,14 @@ def main() -> None:
     groups, rows, notes = grouped(args.runs, start_width), [], []
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):
-        row = {"v0": v0, "runs": len(runs), "T_therm": found.thermalisation}
+        row = {"v0": v0, "runs": len(runs), **measured("T_therm", found.thermalisation)}
         total = late(runs, "total_energy", args.skip)
         row |= measured("energy", Estimate(*(part / runs[0].count for part in total)))
         for which, kind in zip(("light", "heavy"), lightest_and_heaviest(runs[0]), strict=True):
             name = f"{runs[0].names[kind]}/kinetic_energy"
             row |= measured(f"K_{which}", late(runs, name, args.skip))
         rows.append(row)
-        if np.isnan(found.thermalisation):
+        if np.isnan(found.thermalisation.mean):
             known, share = 2 * np.median(found.gap.error) <= args.within, f"{100 * args.within:g} %"
             why = f"the difference of the energies is not known to {share}, take more runs"
             why = f"the energies never agree within {share}" if known else why

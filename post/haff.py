@@ -11,10 +11,11 @@ both laws take all sizes to be at one temperature: not so for very different mas
 
 The cooling rate is -d ln K / d tau, tau collisions per disk.  The homogeneous state ends where its
 mean over two collisions per disk and over the runs falls below 90 % of the law for good; from there
-on the curves are pale.  `rate` is the slope of a line through ln K from two collisions per disk on,
-when speeds have their shape, until half of that end, or to the end of a run without one; its error
-is from the scatter of the runs.  What a rate a little below the law adds up to in a run without
-that end is said, if K ends more than 10 % from the law.
+on the curves are pale, and of several runs it is printed with its error.  `rate` is the slope of a
+line through ln K from two collisions per disk on, when speeds have their shape, until half of that
+end, or to the end of a run without one; its error is from the scatter of the runs.  What a rate a
+little below the law adds up to in a run without that end is said, if K ends more than 10 % from the
+law.
 """
 
 from ricochet import Run
@@ -35,7 +36,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
     figure, panels = plt.subplots(
         2, 2, sharex="col", sharey="row", figsize=(10, 7), height_ratios=(2, 1)
     )
-    for (xi, _), (found, rate, end), colour in zip(
+    for (xi, _), (found, rate, end, _), colour in zip(
         groups, results, colours(len(groups)), strict=True
     ):
         tau, by_time, by_tau = (found[name] for name in ("collisions_per_disk", "K_by_time", "K"))
@@ -89,9 +90,9 @@ def rates(groups: list, results: list) -> list[dict]:
             "runs": len(members),
             **measured("rate", rate),
             "expected": haff_rate(xi),
-            "homogeneous_until": None if np.isnan(end) else end,
+            **measured("homogeneous_until", end if np.isfinite(end.error) else None),
         }
-        for (xi, members), (_, rate, end) in zip(groups, results, strict=True)
+        for (xi, members), (_, rate, _, end) in zip(groups, results, strict=True)
     ]
 
 
@@ -111,7 +112,7 @@ def main() -> None:
     data = spread({f"_xi{xi:g}": own for (xi, _), (own, *_) in zip(groups, results, strict=True)})
     tables = energies(groups, results), rates(groups, results)
     each = zip(groups, results, strict=True)
-    notes = [note for (xi, _), (own, _, end) in each for note in apart(xi, own, end)]
+    notes = [note for (xi, _), (own, _, end, _) in each for note in apart(xi, own, end)]
     report(args, draw(args.runs, groups, results), *tables, data=data, notes=notes)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from . import hard_disks, theory
 from .nature import SOURCES, TRAITS, Refused, allow
 from .reader import Run
-from .statistics import Estimate, estimate
+from .statistics import Estimate, estimate, when
 from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
 
 Curves = dict[str, np.ndarray | Estimate]
@@ -96,12 +96,12 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def haff(
     tracks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], xi: float, points: int = 200
-) -> tuple[Curves, Estimate, float]:
+) -> tuple[Curves, Estimate, float, Estimate]:
     """What runs with the same restitution say, each as w0 t, collisions per disk, K / K0.
 
     Curves: K / K0 against w0 t, in logarithmic steps, and against collisions per disk, each with
     its law, and the local cooling rate.  Then the cooling rate, and where the homogeneous state
-    ends, in collisions per disk: NaN if it does not.
+    ends, in collisions per disk, alone and with its error: NaN if it does not.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -109,7 +109,8 @@ def haff(
     low, high = (np.clip(tau + shift, 0, tau[-1]) for shift in (-WINDOW / 2, WINDOW / 2))
     falls = [np.interp(low, tau, y) - np.interp(high, tau, y) for y in logs]
     local = estimate(np.array(falls) / (high - low))
-    end = homogeneous_until(tau, local.mean, hard_disks.haff_rate(xi))
+    law = hard_disks.haff_rate(xi)
+    end = homogeneous_until(tau, local.mean, law)
     part = (tau >= WINDOW) & (tau <= (tau[-1] if np.isnan(end) else end / 2))
     slopes = [-np.polyfit(tau[part], y[part], 1)[0] if part.sum() > 2 else np.nan for y in logs]
     curves = {
@@ -121,7 +122,7 @@ def haff(
         "law": hard_disks.haff_by_collisions(tau, xi),
         "rate": local,
     }
-    return curves, estimate(slopes), end
+    return curves, estimate(slopes), end, when(lambda c: homogeneous_until(tau, c, law), local)
 
 
 def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float) -> float:

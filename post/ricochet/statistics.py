@@ -98,6 +98,16 @@ def estimate(values: np.ndarray, axis: int = 0) -> Estimate:
     return Estimate(mean, student(count) * values.std(axis=axis, ddof=1) / np.sqrt(count))
 
 
+def when(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
+    """When something happens to a curve: the middle and half the width between its two limits.
+
+    They are those of the curves an error below and above.  NaN if it never happens to one of them,
+    or if there are no errors.
+    """
+    first, last = (of(curve.mean + sign * curve.error) for sign in (-1, 1))
+    return Estimate((first + last) / 2, abs(last - first) / 2)
+
+
 # --- series in time ---
 
 FINE, COARSE = 64, 16  # cells of a series: in their means fast noise fades, and slow modes show

@@ -331,7 +331,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     contact = (hd.simulated(eta) - 1) / (2 * eta)  # a path does not know how fast it is flown
     enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
-    found, rate, _ = cool.haff([cool.energy_left(run)], 0.9)
+    found, rate, *_ = cool.haff([cool.energy_left(run)], 0.9)
     for y, law in (("K_by_time", "haff"), ("K", "law")):
         early = found[law] > 0.1
         np.testing.assert_allclose(found[y].mean[early], found[law][early], rtol=0.2)
