@@ -39,8 +39,8 @@ TEXTS = {
   disks pass through each other unnoticed. {missed_0.001} % are missed at dt = 0.001,
   {missed_0.002} % at 0.002 and {missed_0.004} % at 0.004 (expected {expected_0.001},
   {expected_0.002} and {expected_0.004} %; 32 pairs of runs of 520 time units).
-- ⟨K⟩ of the two species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: the
-  fall from a mean height of 4 gives far more energy than v₀. This is the mean of 100 seeds;
+- ⟨K⟩ of both species agrees within 10 % from t = {T_first} to {T_last} on, for every v₀: the
+  fall from a mean height of 4 gives far more energy than v₀. Means of 100 seeds;
   single runs fluctuate too much.
 - The slopes of the logarithm of both histograms agree with kT = ⟨K⟩. Relative to the exponential
   laws, seed 1 (500 time units) gives {speed_A} and {speed_B} for v² of the light and the heavy
@@ -97,9 +97,8 @@ def crater() -> Numbers:
 def gravity() -> Numbers:
     """Energy, missed collisions, equipartition, laws."""
     changes = [float(row["largest_change"]) for row in table("gravity_energy")]
-    times = [float(row["T_therm"]) for row in table("gravity_equipartition")]
-    found = {"energy_change": (max(changes), None)}
-    found |= {"T_first": (min(times), None), "T_last": (max(times), None)}
+    times = [value(row, "T_therm") for row in table("gravity_equipartition")]
+    found = {"energy_change": (max(changes), None), "T_first": min(times), "T_last": max(times)}
     for row in table("gravity_missed")[1:]:
         found[f"missed_{row['dt']}"] = value(row, "missed_percent")
         found[f"expected_{row['dt']}"] = value(row, "expected_percent")
