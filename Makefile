@@ -33,10 +33,10 @@ hot := -flto=auto -finline-limit=1000 -fipa-cp-clone --param=ipa-cp-eval-thresho
 CHECKS := $(if $(DEBUG),-fcheck=all$(comma)no-array-temps -finit-real=snan -ffpe-trap=invalid$(comma)zero$(comma)overflow)
 FFLAGS ?= $(if $(gnu),-std=f2008 -Wall -Wextra -Wno-compare-reals -Wno-unused-dummy-argument) -g $(OPT)
 # Contraction off, whatever FFLAGS says: only then do all builds give the same bits.
-flags = $(FFLAGS) -ffp-contract=off $(if $(gnu),-fopenmp) $(if $(gnu),$(CHECKS) -ffpe-summary=none)
+flags = $(FFLAGS) $(PIC) -ffp-contract=off $(if $(gnu),-fopenmp) $(if $(gnu),$(CHECKS) -ffpe-summary=none)
 # gfortran compiles C, too, so that link-time optimisation can make an instruction of a prefetch.
 c_compiler = $(if $(gnu),$(FC),$(CC))
-c_flags = -Wall -Wextra $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
+c_flags = -Wall -Wextra $(PIC) $(filter -O% -g -march=% -flto% -fsanitize% -fno-sanitize% --coverage -pedantic -Werror,$(flags))
 wrapped := -Wl,--wrap=malloc,--wrap=realloc
 hints = $(if $(HINTS),$(wrapped))
 
@@ -46,7 +46,7 @@ Q := $(if $(V),,@)
 sources := $(wildcard src/*.f90 src/*/*.f90)
 vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
-modules := $(filter-out main,$(notdir $(sources:.f90=))) build_info
+modules := $(filter-out main library library_files,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.
@@ -67,7 +67,7 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
+targets := all library demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
   uninstall dist set-up clean distclean help
 .PHONY: $(targets) FORCE
 
@@ -85,6 +85,16 @@ endef
 
 $(BUILD)/ricochet: $(BUILD)/main.o $(objects)
 	$(call link,$(LDFLAGS),$^)
+
+# The program calls none of it, and nothing else is to be seen: then the compiler may inline as it does in the program.
+as_library = -shared -Wl,--version-script=src/library.map -Wl,-z,defs
+$(BUILD)/libricochet.so: hdf5_libs :=
+$(BUILD)/libricochet.so: $(filter-out $(BUILD)/main.o,$(without_hdf5)) $(filter %_c.o,$(objects))
+	$(call link,$(as_library),$(filter %.o,$^))
+
+$(BUILD)/libricochet_files.so: hdf5_libs = $(filter-out -I%,$(wordlist 2,99,$(shell $(H5FC) -shlib -show)))
+$(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_files.o $(objects)
+	$(call link,$(as_library),$^)
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
@@ -156,8 +166,14 @@ jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write to $(BUILD); BUILD=folder takes another' >&2; exit 2; }; \
   $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE)
 
-all:  ## builds the program (default)
+all:  ## builds the program (default); library: libricochet.so, ricochet.h
 	@+$(build) $(BUILD)/ricochet
+
+# Position independent, and without hints about memory, which are for the allocations of a whole process.
+library:
+	@$(MAKE) $(jobs) BUILD=$(BUILD)/library HINTS= PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
+	  $(BUILD)/library/libricochet_files.so
+	@cp $(BUILD)/library/*.so src/ricochet.h $(BUILD)
 
 unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)
@@ -206,6 +222,7 @@ test:  ## sets up, then unit tests and whole runs (four minutes)
 	@.ci/set-up demo test
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked all
+	@$(MAKE) library
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto --dist worksteal tests
 
 .PHONY: checked

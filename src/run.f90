@@ -22,12 +22,11 @@ module run
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
   use texts, only: counted, eol, legible, size_text, written
-  use timeline, only: advance_once, passed_collapse
+  use timeline, only: adapted, advance_once, passed_collapse
   implicit none
   private
   public :: perform_run
 
-  real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
   integer, parameter :: most_unwritten = 4096              !! collisions in the event log
   integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
   character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
@@ -222,19 +221,6 @@ contains
     end do
     call run%line%clear()
   end subroutine main_loop
-
-  !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
-  !> would have any number of them, and when the samples cease it would not look up for hours.
-  pure function adapted(turns, elapsed, cut_short) result(n)
-    integer(int64), intent(in) :: turns
-    real(real64), intent(in) :: elapsed               !! for these turns, or some of them [s]
-    logical, intent(in) :: cut_short                  !! something was due before they were over
-    integer(int64) :: n
-
-    n = turns
-    if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*turns, 2_int64**40)
-    if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
-  end function adapted
 
   !> The results, as lines `key = value`.
   function summary(run) result(text)

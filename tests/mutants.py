@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRATCH = ROOT / "build" / "mutants"
 UNIT_BUILD = "DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=build/tests"
 UNIT_TESTS = ("make -j{jobs} {unit_build}/unit_tests", "make checked")
-PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all"
+PROGRAM = "make -j{jobs} {unit_build}/four_disks && make -j{jobs} all library"
 PYTEST = ".venv/bin/python -m pytest -q -x -n {jobs} --dist worksteal -p no:randomly "
 MUTANT = re.compile(r"^([\w-]+): .*\n--- (.*)\n((?:.*\n)+?)(?=\n[\w-]+: |\Z)", re.MULTILINE)
 FAILURE = re.compile(r"^(?:Failure in: |FAILED |ERROR |unit tests: )(.*?)(?: - .*)?$", re.MULTILINE)

@@ -17,6 +17,7 @@ from . import packages as packages  # first
 from .bridges import mdanalysis_universe
 from .program import ProgramError, run
 from .reader import Events, Obstacle, Run, RunError, Series, read_run
+from .simulation import Simulation
 from .starting import write_start
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Run",
     "RunError",
     "Series",
+    "Simulation",
     "mdanalysis_universe",
     "read_run",
     "run",

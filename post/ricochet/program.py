@@ -4,9 +4,11 @@ Its standard error is a terminal to the program, which tells a terminal how far 
 """
 
 import atexit
+import ctypes
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -21,6 +23,7 @@ from .reader import Run, read_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
+LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
@@ -85,13 +88,17 @@ def find_program() -> str:
 def watched(command: list[str]) -> tuple[int, list[str]]:
     """Run the command with a progress bar; its exit code, and its messages.
 
-    If Python is interrupted, the program writes a checkpoint and ends.
+    If Python is interrupted, or killed, the program writes a checkpoint and ends.
     """
     import pty  # not on Windows, where files can be read nevertheless
 
     ours, its = pty.openpty()
     process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=its,
+        preexec_fn=end_with_parent if LIBC else None,  # noqa: PLW1509
     )
     os.close(its)
     lines = []
@@ -114,6 +121,14 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
         process.wait()
         os.close(ours)
     return process.returncode, lines
+
+
+def end_with_parent() -> None:
+    """Let this process be stopped, with a checkpoint, when Python ends however it ends.
+
+    After a fork only what was found before may be called: one function of the system.
+    """
+    LIBC.prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
 
 
 def lines_from(terminal: int) -> Iterator[str]:

@@ -13,7 +13,9 @@ module timeline
   use texts, only: about, counted, written
   implicit none
   private
-  public :: advance, advance_once, next_kick, passed_collapse
+  public :: adapted, advance, advance_once, next_kick, passed_collapse
+
+  real(real64), parameter :: pause_interval = 0.05_real64  !! between looks at signals and clocks [s]
 
 contains
 
@@ -97,6 +99,19 @@ contains
       end if
     end subroutine end_epoch
   end subroutine advance_once
+
+  !> The number of turns that take about `pause_interval`. They grow only if all were used: else a run with many samples
+  !> would have any number of them, and when the samples cease it would not look up for hours.
+  pure function adapted(turns, elapsed, cut_short) result(n)
+    integer(int64), intent(in) :: turns
+    real(real64), intent(in) :: elapsed               !! for these turns, or some of them [s]
+    logical, intent(in) :: cut_short                  !! something was due before they were over
+    integer(int64) :: n
+
+    n = turns
+    if (elapsed < 0.5_real64*pause_interval .and. .not. cut_short) n = min(2*turns, 2_int64**40)
+    if (elapsed > 2*pause_interval) n = max(turns/2, 1_int64)
+  end function adapted
 
   !> When disks are kicked next: after all collisions of that moment, and before anything else is done at it.
   pure function next_kick(evolution, sim) result(t)

@@ -13,11 +13,12 @@ module output
   use evolution, only: limits_t
   use h5md_layout, only: event_counter, frame_counter, replaced_file, sample_counter, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
+  use moments, only: frame_sample, observable_sample
   use observables, only: observed
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, is_file, lock, source_of, take_final_name, unfinished, unfinished_new
   use sample_track, only: track_t
-  use samples, only: check_counts, event_series, frame_sample, frame_series, observable_sample, observable_series
+  use samples, only: check_counts, event_series, frame_series, observable_series
   use settings, only: run_input_t
   use signals, only: record_signals
   use simulation_state, only: simulation_t

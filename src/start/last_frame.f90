@@ -3,32 +3,21 @@ module last_frame
   use kinds, only: int64, real64
   use box_geometry, only: box_t
   use errors, only: exit_usage, fail
-  use h5md_layout, only: angular_velocity, box_group, disk_mass, disk_radius, disk_species, frame_counter, orientation, &
-    position, species_names, value_of, velocity
+  use h5md_layout, only: box_group, disk_species, frame_counter, species_names
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
   use variables, only: largest, most_disks, smallest
   use position_file, only: mass_row, radius_row, spin_row
   use settings, only: disks_in_file_t
+  use starting_disks, only: datasets
   use texts, only: joined, written
   implicit none
   private
-  public :: datasets, is_run, read_last_frame
+  public :: read_last_frame
 
   integer, parameter :: name_length = 64
-  !> Where each of `position_file: column_names` is in the file of a run; what stands before the radius is in frames.
-  character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
-    velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
 contains
-
-  !> Whether a path is that of the output of a run, finished or not.
-  pure function is_run(path) result(yes)
-    character(len=*), intent(in) :: path
-    logical :: yes
-
-    yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
-  end function is_run
 
   !> Reads the disks of the species with this name.
   subroutine read_last_frame(path, name, disks, box)

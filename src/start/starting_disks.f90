@@ -6,18 +6,43 @@ module starting_disks
   use box_geometry, only: box_t
   use disks, only: names_of
   use errors, only: exit_usage, fail
-  use last_frame, only: datasets, is_run, read_last_frame
+  use h5md_layout, only: angular_velocity, disk_mass, disk_radius, orientation, position, value_of, velocity
   use position_file, only: column_names, mass_row, radius_row, read_positions, spin_row
-  use settings, only: species_settings_t
+  use settings, only: disks_in_file_t, species_settings_t
   use texts, only: counted, written
   use variables, only: largest, smallest
   implicit none
   private
-  public :: origin, read_disks, resolution
+  public :: datasets, origin, read_disks, read_run, resolution
 
   real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
+  !> Where each of `position_file: column_names` is in the file of a run; what stands before the radius is in frames.
+  character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
+    velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
+
+  abstract interface
+    !> Reads the disks of the species with this name from the file of a run.
+    subroutine read_run_disks(path, name, disks, box)
+      import :: box_t, disks_in_file_t
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: name
+      type(disks_in_file_t), intent(inout) :: disks
+      type(box_t), intent(in), optional :: box                !! to which the positions are stretched
+    end subroutine read_run_disks
+  end interface
+
+  !> Set by who has HDF5 at hand: the engine needs none to run.
+  procedure(read_run_disks), pointer :: read_run => null()
 
 contains
+
+  !> Whether a path is that of the output of a run, finished or not.
+  pure function is_run(path) result(yes)
+    character(len=*), intent(in) :: path
+    logical :: yes
+
+    yes = index(path//"|", ".h5|") > 0 .or. index(path//"|", ".h5.part|") > 0
+  end function is_run
 
   !> Reads the disks of species s. Radii and masses are those of the input where it has them.
   subroutine read_disks(species, s, box)
@@ -29,8 +54,10 @@ contains
 
     associate (me => species(s))
       if (me%scale_positions) new_box = box
-      if (is_run(me%file)) then
-        call read_last_frame(me%file, me%name, me%in_file, new_box)
+      if (is_run(me%file) .and. .not. associated(read_run)) then
+        call refuse(me, me%file//": files of runs cannot be read here")
+      else if (is_run(me%file)) then
+        call read_run(me%file, me%name, me%in_file, new_box)
       else if (me%scale_positions) then
         call refuse(me, me%file//": is not the file of a run (.h5), which scale_positions needs: it says how large the box was")
       else

@@ -90,7 +90,9 @@ class Notebook(io.StringIO):
         return super().write(text)
 
 
-def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch, number):
+    """As a notebook interrupts Python alone; the program ends with Python, however that ends."""
     (tmp_path / "gas.nml").write_text(TEXT)
     code = "import ricochet; ricochet.run('gas.nml', {'stop.collisions': 10**12}, 'long.h5')"
     paths = environment(PYTHONPATH=ROOT / "post")
@@ -99,8 +101,9 @@ def test_progress_is_shown_and_an_interrupted_run_goes_on(tmp_path, monkeypatch)
     )
     try:
         wait_for(lambda: (tmp_path / "long.h5.part").exists() and is_asleep(python.pid))
-        python.send_signal(signal.SIGINT)  # as a notebook does, to Python alone
-        assert "KeyboardInterrupt" in python.communicate()[1]
+        python.send_signal(number)
+        assert ("KeyboardInterrupt" in python.communicate()[1]) == (number == signal.SIGINT)
+        wait_for(lambda: not (tmp_path / "long.h5.lock").exists())
     finally:
         python.kill()
     monkeypatch.setattr(sys, "stderr", Notebook())

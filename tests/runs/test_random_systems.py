@@ -2,12 +2,13 @@
 
 Each runs plainly; on several threads; with another search and queue; in parts, that end by the
 clock, by TERM and by kill -9, each resumed in another way; to an earlier end, from which it is
-continued; with other samples; and in other units. All must end alike: with the same exit code, the
-same message and the same bytes; and what the plain run has written obeys `run_laws`.
+continued; with other samples; in memory; and in other units. All must end alike: with the same exit
+code, the same message and the same bytes; and what the plain run has written obeys `run_laws`.
 
 `SYSTEMS=200 SEED=20270131` takes other systems and more of them, as `make check` does each day.
 """
 
+import contextlib
 import functools
 import itertools
 import json
@@ -23,6 +24,8 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 import pytest
+
+from ricochet import ProgramError, Simulation
 
 from random_systems import CADENCES, System, numbers, random_system, starting_file
 from run_laws import laws_broken
@@ -123,6 +126,28 @@ class Case:
                 return end
             resume = ["--resume"]
         return self.whole(name, *self.way(), *resume)
+
+    def in_memory(self, name: str, _seconds: float) -> End:
+        """In slices of time in this process, saved and loaded; to its end by the program."""
+        with h5py.File(self.result("plain")) as file:
+            last = float(file["particles/disks/position/time"][-1])
+        pairs = (word.removeprefix("--set=").split("=") for word in self.way())
+        ways = {key: int(word) if word.isdigit() else word for key, word in pairs}
+        path = self.folder / f"{name}.h5"
+        with contextlib.chdir(self.folder):
+            try:
+                simulation = Simulation("case.nml", ways)
+                for part in sorted(self.rng.uniform(0, 0.99) * last for _ in range(PARTS)):
+                    simulation.advance(time=part)
+                    if self.rng.random() < 0.3:
+                        simulation.next_events(3)
+                        simulation.save(path, force=True)
+                        simulation.close()
+                        simulation = Simulation.load(path)
+                simulation.save(path, force=True)
+            except ProgramError as error:
+                return End(error.code, str(error))
+        return self.whole(name, *self.way(), "--resume")
 
     def with_other_samples(self, name: str, _seconds: float) -> End:
         return self.whole(name, *self.way(), *self.samples(self.rng.randint(3, 20)))
@@ -245,7 +270,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
     said = [f"breaks a law: {law}" for law in laws_broken(found)]
     ways = [case.on_threads, case.another_way, case.in_parts, case.with_other_samples]
     if plain.code == FINISHED:
-        ways += [case.continued, case.in_other_units]
+        ways += [case.continued, case.in_memory, case.in_other_units]
     for way in ways:
         name = way.__name__
         end = way(name, seconds)
@@ -257,7 +282,7 @@ def faults(program: Path, folder: Path, seed: str) -> str:
         notes = {bytes(file["/provenance@note"]).split(b", the first")[0] for file in (own, other)}
         if len(notes) > 1:
             said.append(f"notes otherwise: {name} {notes}")
-        if way == case.with_other_samples:
+        if way in (case.with_other_samples, case.in_memory):
             own, other = last_samples(own), last_samples(other)
         elif way == case.in_other_units:
             scales = {path: eval(unit, {}, case.units) for path, unit in UNITS.items()}

@@ -1,0 +1,295 @@
+"""The engine in this process: a simulation to step, look at, save and load.
+
+    with ricochet.Simulation("input/gas.nml", {"run.seed": 2}) as gas:
+        gas.advance(time=1.0)
+        gas.position, gas.observable("all/kinetic_energy"), gas.next_events(3)
+
+It is the program's own engine (`make library`), with its bits: in whatever steps a simulation goes
+on, its state is that of `build/ricochet` with the same input.
+"""
+
+import ctypes
+import functools
+import math
+import os
+import sys
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from .files import RunError
+from .program import ProgramError, namelist, value_text
+
+ROOM = 100_000  # bytes for a message
+PATIENCE = 0.05  # s, between two looks whether Python wants something
+NEVER = 2**63 - 1
+#: The arrays of a simulation, and their numbers.
+COLUMNS = {
+    "position": float,
+    "velocity": float,
+    "angular_velocity": float,
+    "orientation": float,
+    "image": np.int64,
+    "radius": float,
+    "mass": float,
+    "species": np.int32,
+}
+
+
+class Simulation:
+    """A simulation in memory, at its start.
+
+    `system` is the path of an input file, its text, or its groups as for `ricochet.run`;
+    `overrides` as there.  `threads` are those of the input, or one.
+    """
+
+    def __init__(
+        self,
+        system: str | Path | Mapping,
+        overrides: Mapping[str, object] | None = None,
+        threads: int | None = None,
+    ):
+        """Problems with the input raise `ProgramError`, with the program's own lines."""
+        text = namelist(system) if isinstance(system, Mapping) else read_input(system)
+        lines = [f"{name}={value_text(name, value)}\n" for name, value in (overrides or {}).items()]
+        words = text.encode(), "".join(lines).encode()
+        for word in words:
+            if b"\0" in word:
+                raise ValueError("an input has no zero bytes")
+        engine = library(files=b".h5" in b"".join(words))
+        self._take(opened(engine.ricochet_open, *words, int(threads or 0)))
+
+    def _take(self, handle: int) -> None:
+        self._handle, self._lock = handle, threading.RLock()
+
+    @classmethod
+    def load(cls, path: str | Path, threads: int | None = None) -> Self:
+        """The simulation of the last checkpoint of a run, finished or not."""
+        self = cls.__new__(cls)
+        where = os.fsencode(Path(path))
+        self._take(opened(library(files=True).ricochet_load, where, int(threads or 0)))
+        return self
+
+    def save(self, path: str | Path, force: bool = False) -> Path:
+        """Write `path`.part, from which `ricochet INPUT -o path --resume` goes on; its path.
+
+        It has the samples of the start, and the state of now.
+        """
+        path = Path(path)
+        with self._open() as handle:
+            called(library(files=True).ricochet_save, handle, os.fsencode(path), int(force))
+        return path.with_name(f"{path.name}.part")
+
+    def close(self) -> None:
+        """Give its memory back; nothing can be asked afterwards."""
+        handle = getattr(self, "_handle", None)
+        if handle:
+            with self._lock:
+                self._handle = None
+                library().ricochet_close(handle)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if not sys.is_finalizing():
+            self.close()
+
+    def __reduce__(self):
+        raise TypeError("a simulation cannot be copied or sent; save it, and load it there")
+
+    def _open(self) -> "Held":
+        return Held(self)
+
+    def advance(
+        self,
+        time: float | None = None,
+        collisions: int | None = None,
+        events: int | None = None,
+    ) -> Self:
+        """Go on until the first of these values is reached, counted from the start of the run.
+
+        Without any it is the stop rule of the input that counts.  An interrupt (Ctrl-C) leaves
+        the simulation where it is then.
+        """
+        limits = (
+            math.inf if time is None else float(time),
+            NEVER if collisions is None else int(collisions),
+            NEVER if events is None else int(events),
+        )
+        if math.isnan(limits[0]):
+            raise ValueError("time: nan is no time")
+        if limits[0] < self.time:
+            raise ValueError(f"time: {time} is past; it is {self.time:.6g}")
+        going_on = True
+        while going_on:
+            with self._open() as handle:
+                going_on = called(library().ricochet_advance, handle, *limits, PATIENCE)
+        return self
+
+    @property
+    def time(self) -> float:
+        """Since the start of the run."""
+        with self._open() as handle:
+            return library().ricochet_time(handle)
+
+    def _counts(self) -> list[int]:
+        counts = (ctypes.c_int64 * 3)()
+        with self._open() as handle:
+            library().ricochet_count(handle, counts)
+        return list(counts)
+
+    @property
+    def count(self) -> int:
+        """How many disks there are."""
+        return self._counts()[0]
+
+    @property
+    def collisions(self) -> int:
+        """Of pairs of disks, since the start."""
+        return self._counts()[1]
+
+    @property
+    def events(self) -> int:
+        """Collisions of pairs, and with walls and obstacles, since the start."""
+        return self._counts()[2]
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """An array of `COLUMNS`, (N,) or (N, 2): a copy, disks in the order of the input."""
+        if name not in COLUMNS:
+            raise AttributeError(f"a simulation has no {name}")
+        values = np.empty((self.count, 2))
+        with self._open() as handle:
+            width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
+        if width == 0:
+            raise AttributeError(f"these disks have no {name}")
+        values = values.reshape(-1)[: width * len(values)].astype(COLUMNS[name])
+        return values.reshape(-1, 2) if width == 2 else values
+
+    def _observed(self) -> dict[str, np.ndarray]:
+        room = ROOM
+        with self._open() as handle:
+            while True:
+                names, values = ctypes.create_string_buffer(room), np.empty(4 * room // 8)
+                length = library().ricochet_observables(handle, names, room, values.ctypes.data)
+                if length < room:
+                    break
+                room = length + 1
+        found, first = {}, 0
+        for line in names.value.decode().splitlines():
+            name, width = line.rsplit(" ", 1)
+            part = values[first : first + abs(int(width))]
+            found[name] = part.astype(np.int64 if int(width) < 0 else float)
+            first += len(part)
+        return found
+
+    @property
+    def observables(self) -> list[str]:
+        """The names of what can be observed, as in the output file."""
+        return list(self._observed())
+
+    def observable(self, name: str) -> float | int | np.ndarray:
+        """The value of an observable now: a number, or an array of its components."""
+        found = self._observed()
+        if name not in found:
+            raise RunError(f"there is no observable {name}; there are {', '.join(found)}")
+        return found[name].item() if len(found[name]) == 1 else found[name]
+
+    def next_events(self, most: int) -> list[tuple[float, int, int]]:
+        """The next collisions in order: time, i, j as in the event log."""
+        records = np.empty((max(int(most), 0), 6))
+        with self._open() as handle:
+            n = library().ricochet_next_events(handle, len(records), records.ctypes.data)
+        return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
+
+
+class Held:
+    """A simulation that nobody else steps or closes meanwhile."""
+
+    def __init__(self, simulation: Simulation):
+        """To be held in a `with`, which gives its handle."""
+        self.simulation = simulation
+
+    def __enter__(self) -> int:
+        self.simulation._lock.acquire()
+        if not self.simulation._handle:
+            self.simulation._lock.release()
+            raise ValueError("the simulation is closed")
+        return self.simulation._handle
+
+    def __exit__(self, *_: object) -> None:
+        self.simulation._lock.release()
+
+
+# --- the library ---
+
+
+def read_input(system: str | Path) -> str:
+    """The text of an input: of the file of that path, or the words themselves."""
+    if isinstance(system, str) and ("&" in system or "\n" in system):
+        return system
+    try:
+        return Path(system).read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError as error:
+        raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
+
+
+def opened(make, *arguments: object) -> int:
+    """A new handle, by a function of the library."""
+    message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
+    handle = make(*arguments, message, ROOM, ctypes.byref(code))
+    if not handle:
+        raise ProgramError(message.value.decode(errors="replace"), code.value)
+    return handle
+
+
+def called(function, *arguments: object) -> bool:
+    """Call a function that answers with a code; whether it wants to be called again."""
+    message = ctypes.create_string_buffer(ROOM)
+    code = function(*arguments, message, ROOM)
+    if code > 1:
+        raise ProgramError(message.value.decode(errors="replace"), code)
+    return code == 1
+
+
+@functools.cache
+def library(files: bool = False) -> ctypes.CDLL:
+    """The engine; with the functions for files it needs the HDF5 of the system."""
+    name = "libricochet_files.so" if files else "libricochet.so"
+    root = Path(__file__).resolve().parents[2]
+    wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
+    path = (Path(wish) if wish else root / "build") / name
+    if not path.is_file():
+        raise ProgramError(f"no {name} in {path.parent}: run make library in a clone", 3)
+    engine = ctypes.CDLL(str(path))  # its symbols are its own: no clash with the HDF5 of h5py
+    p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
+    long, real = ctypes.c_int64, ctypes.c_double
+    answer = [ctypes.c_char_p, n]
+    kinds = {
+        "open": (p, text, text, n, *answer, p),
+        "close": (None, p),
+        "advance": (n, p, real, long, long, real, *answer),
+        "time": (real, p),
+        "count": (None, p, p),
+        "column": (n, p, text, p),
+        "observables": (n, p, text, n, p),
+        "next_events": (n, p, n, p),
+    }
+    if files:
+        kinds |= {
+            "save": (n, p, text, n, *answer),
+            "load": (p, text, n, *answer, p),
+            "enable_files": (None,),
+        }
+    for function, (result, *arguments) in kinds.items():
+        it = getattr(engine, f"ricochet_{function}")
+        it.restype, it.argtypes = result, arguments
+    if files:
+        engine.ricochet_enable_files()
+    return engine

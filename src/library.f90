@@ -1,0 +1,319 @@
+!> The engine for other programs, in C: `ricochet.h` is the contract, and says what each function does. A handle is a
+!> simulation at work. Nothing here prints, ends the process, or is shared by two handles.
+module library
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
+  use disks, only: columns, image_column, n_columns
+  use errors, only: error_t
+  use event_log, only: event_log_t
+  use evolution, only: evolution_t, limits_t
+  use kinds, only: int64, never, real64
+  use moments, only: frame_sample, in_frames
+  use observables, only: observable_list_t, observed
+  use run_setup, only: choose_evolution, input_from_text, new_simulation, start_threads
+  use settings, only: run_input_t
+  use simulation_state, only: simulation_t
+  use status_line, only: status_line_t
+  use stop_rules, only: stop_rule_t
+  use system, only: seconds
+  use team, only: make_team
+  use texts, only: text_t, written
+  use timeline, only: adapted, advance_once
+  implicit none
+  private
+  public :: answer, begin, lines_of, session_of, session_t, text_of
+
+  integer(c_int), parameter :: going_on = 1          !! the answer of `advance` that is no exit code
+  integer, parameter :: longest_look = 100000        !! ahead, for what may never come [parts of the timeline]
+
+  type :: session_t
+    type(run_input_t) :: input
+    type(simulation_t) :: sim
+    class(evolution_t), allocatable :: evolution
+    type(stop_rule_t) :: rule
+    integer(int64) :: turns = 1                       !! between two looks at the clock
+  end type session_t
+
+contains
+
+  !> See ricochet.h.
+  function open_simulation(text, overrides, threads, message, room, code) bind(C, name="ricochet_open") result(handle)
+    character(kind=c_char), intent(in) :: text(*), overrides(*)
+    integer(c_int), value :: threads, room
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), intent(out) :: code
+    type(c_ptr) :: handle
+    type(session_t), pointer :: session
+    type(status_line_t) :: silent
+    type(error_t), allocatable :: error
+
+    allocate (session)
+    call input_from_text(text_of(text), "input", lines_of(text_of(overrides)), session%input, error)
+    if (.not. allocated(error)) call new_simulation(session%input, silent, session%sim, error)
+    handle = begin(session, threads, error)
+    code = answer(error, message, room)
+  end function open_simulation
+
+  !> Starts the engine of a simulation that is there, and hands it over; after an error it takes it away.
+  function begin(session, threads, error) result(handle)
+    type(session_t), pointer, intent(inout) :: session
+    integer(c_int), intent(in) :: threads             !! 0: as in the input, or one
+    type(error_t), allocatable, intent(in) :: error
+    type(c_ptr) :: handle
+    character(len=:), allocatable :: warning
+
+    handle = c_null_ptr
+    if (allocated(error)) then
+      deallocate (session)
+      return
+    end if
+    associate (wanted => session%input%settings%run%threads)
+      if (threads > 0) wanted = threads
+      wanted = max(wanted, 1)
+    end associate
+    call start_threads(session%input%settings, warning)
+    call choose_evolution(session%input%settings, session%evolution)
+    session%rule = stop_rule_t(session%input%settings%stop, session%sim)
+    call session%evolution%start(session%sim)
+    handle = c_loc(session)
+  end function begin
+
+  !> See ricochet.h.
+  subroutine close_simulation(handle) bind(C, name="ricochet_close")
+    type(c_ptr), value :: handle
+    type(session_t), pointer :: session
+
+    session => session_of(handle)
+    deallocate (session)
+  end subroutine close_simulation
+
+  !> See ricochet.h.
+  function advance(handle, time, collisions, events, patience, message, room) bind(C, name="ricochet_advance") result(code)
+    type(c_ptr), value :: handle
+    real(c_double), value :: time, patience
+    integer(c_int64_t), value :: collisions, events
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), value :: room
+    integer(c_int) :: code
+    type(session_t), pointer :: session
+    type(stop_rule_t) :: rule
+    type(limits_t) :: limits
+    type(error_t), allocatable :: error
+    real(real64) :: began, looked                     ! [s]
+
+    session => session_of(handle)
+    rule = session%rule
+    if (time < never .or. min(collisions, events) < huge(events)) then
+      rule = stop_rule_t()
+      rule%limits%time = min(time, never)
+      rule%limits%collisions = collisions
+      rule%limits%events = events
+    end if
+    call make_team(session%input%settings%run%threads)
+    began = seconds()
+    code = going_on
+    do while (.not. rule%is_over(session%sim, session%evolution))
+      looked = seconds()
+      if (looked - began > patience) return
+      limits = rule%limits
+      limits%turns = session%turns
+      call advance_once(session%evolution, session%sim, limits, error)
+      if (allocated(error)) exit
+      session%turns = adapted(session%turns, seconds() - looked, session%evolution%turns_left > 0)
+    end do
+    code = answer(error, message, room)
+  end function advance
+
+  !> See ricochet.h.
+  function time_of(handle) bind(C, name="ricochet_time") result(time)
+    type(c_ptr), value :: handle
+    real(c_double) :: time
+    type(session_t), pointer :: session
+
+    session => session_of(handle)
+    time = session%sim%time()
+  end function time_of
+
+  !> See ricochet.h.
+  subroutine count_all(handle, counts) bind(C, name="ricochet_count")
+    type(c_ptr), value :: handle
+    integer(c_int64_t), intent(out) :: counts(3)
+    type(session_t), pointer :: session
+
+    session => session_of(handle)
+    counts = [int(session%sim%n_disks(), int64), session%sim%tally%collisions, session%sim%tally%events]
+  end subroutine count_all
+
+  !> See ricochet.h.
+  function copy_column(handle, name, values) bind(C, name="ricochet_column") result(width)
+    type(c_ptr), value :: handle
+    character(kind=c_char), intent(in) :: name(*)
+    real(c_double), intent(inout) :: values(*)
+    integer(c_int) :: width
+    type(session_t), pointer :: session
+    real(real64), allocatable :: sample(:, :)
+    integer :: n, k, last
+
+    session => session_of(handle)
+    associate (sim => session%sim)
+      n = sim%n_disks()
+      width = 1
+      select case (text_of(name))
+      case ("radius")
+        values(sim%tag%id) = sim%disk%radius
+      case ("mass")
+        values(sim%tag%id) = sim%masses()
+      case ("species")
+        values(sim%tag%id) = sim%tag%species
+      case default
+        width = 0
+      end select
+      if (width > 0) return
+      call make_team(session%input%settings%run%threads)
+      sample = frame_sample(sim, 0_int64)
+      last = 2                                        ! behind its step and time
+      call find("position", 2, .true.)
+      call find("velocity", 2, .true.)
+      call find("collisions", 1, .true.)
+      call find("image", 2, sim%row(image_column) > 0)
+      do k = 1, n_columns
+        call find(trim(columns(k)%name), 1, in_frames(sim, k))
+      end do
+    end associate
+  contains
+
+    !> Passes the part of the frame that comes next, if it is there, and copies it if it is the one that is wanted.
+    subroutine find(part, its_width, there)
+      character(len=*), intent(in) :: part
+      integer, intent(in) :: its_width
+      logical, intent(in) :: there
+
+      if (.not. there) return
+      if (part == text_of(name)) then
+        width = its_width
+        values(:width*n) = sample(last + 1:last + width*n, 1)
+      end if
+      last = last + its_width*n
+    end subroutine find
+  end function copy_column
+
+  !> See ricochet.h.
+  function copy_observables(handle, names, room, values) bind(C, name="ricochet_observables") result(length)
+    type(c_ptr), value :: handle
+    character(kind=c_char), intent(inout) :: names(*)
+    integer(c_int), value :: room
+    real(c_double), intent(inout) :: values(*)
+    integer(c_int) :: length
+    type(session_t), pointer :: session
+    type(observable_list_t) :: list
+    character(len=:), allocatable :: text
+    integer :: k
+
+    session => session_of(handle)
+    list = observed(session%sim)
+    text = ""
+    do k = 1, list%n
+      text = text//trim(list%row(k)%name)//" "//written(merge(-1, 1, list%row(k)%is_count)*list%row(k)%width)//new_line("a")
+    end do
+    length = len(text)
+    if (room <= length) return
+    call give(text, names, room)
+    associate (now => list%values())
+      values(:size(now)) = now
+    end associate
+  end function copy_observables
+
+  !> See ricochet.h. What comes is found by a copy that goes on: a disk may collide twice, and a kick may come between.
+  function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
+    type(c_ptr), value :: handle
+    integer(c_int), value :: most
+    real(c_double), intent(inout) :: records(6, *)
+    integer(c_int) :: n
+    type(session_t), pointer :: session
+    type(simulation_t) :: ahead
+    class(evolution_t), allocatable :: evolution
+    type(event_log_t) :: log
+    type(limits_t) :: limits
+    type(error_t), allocatable :: error
+    integer :: k
+
+    session => session_of(handle)
+    ahead = session%sim
+    allocate (evolution, source=session%evolution)
+    call evolution%start(ahead)
+    log%most = most
+    limits%turns = 1000
+    do k = 1, longest_look
+      if (log%n >= most .or. allocated(error) .or. (k > 1 .and. evolution%idle)) exit
+      call advance_once(evolution, ahead, limits, error, log)
+    end do
+    n = min(log%n, most)
+    if (n > 0) records(:, :n) = log%record(:, :n)
+  end function next_events
+
+  !> The simulation of a handle.
+  function session_of(handle) result(session)
+    type(c_ptr), intent(in) :: handle
+    type(session_t), pointer :: session
+
+    call c_f_pointer(handle, session)
+  end function session_of
+
+  !> The exit code of an error, with its message; 0 if there is none.
+  function answer(error, message, room) result(code)
+    type(error_t), allocatable, intent(in) :: error
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), intent(in) :: room
+    integer(c_int) :: code
+
+    code = 0
+    call give("", message, room)
+    if (.not. allocated(error)) return
+    code = error%code
+    call give(error%message, message, room)
+  end function answer
+
+  !> Hands a text over, cut if there is no room for it.
+  subroutine give(text, buffer, room)
+    character(len=*), intent(in) :: text
+    character(kind=c_char), intent(inout) :: buffer(*)
+    integer(c_int), intent(in) :: room                !! with the end mark [bytes]
+    integer :: k
+
+    do k = 1, min(len(text), room - 1)
+      buffer(k) = text(k:k)
+    end do
+    buffer(min(len(text), room - 1) + 1) = c_null_char
+  end subroutine give
+
+  !> A text of C.
+  function text_of(bytes) result(text)
+    character(kind=c_char), intent(in) :: bytes(*)
+    character(len=:), allocatable :: text
+    integer :: k, n
+
+    n = 0
+    do while (bytes(n + 1) /= c_null_char)
+      n = n + 1
+    end do
+    allocate (character(len=n) :: text)
+    do k = 1, n
+      text(k:k) = bytes(k)
+    end do
+  end function text_of
+
+  !> The lines of a text, each with its end.
+  function lines_of(text) result(lines)
+    character(len=*), intent(in) :: text
+    type(text_t), allocatable :: lines(:)
+    integer :: first, last
+
+    allocate (lines(0))
+    first = 1
+    do while (first <= len(text))
+      last = first - 1 + index(text(first:)//new_line("a"), new_line("a"))
+      lines = [lines, text_t(text(first:last - 1))]
+      first = last + 1
+    end do
+  end function lines_of
+
+end module library

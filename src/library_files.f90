@@ -1,0 +1,86 @@
+!> The files of simulations in memory: those of runs, which the program goes on from, and the reverse. See `ricochet.h`.
+module library_files
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
+  use cadence, only: progress_t
+  use checkpoint, only: read_checkpoint
+  use errors, only: error_t
+  use h5md_layout, only: parameters_group
+  use hdf5_objects, only: hdf5_file_t
+  use initial_state, only: describe_system
+  use last_frame, only: read_last_frame
+  use library, only: answer, begin, lines_of, session_of, session_t, text_of
+  use output, only: output_t
+  use run_files, only: output_of, source_of
+  use run_setup, only: input_from_text, new_simulation
+  use settings, only: run_input_t
+  use simulation_state, only: simulation_t
+  use starting_disks, only: read_run
+  use status_line, only: status_line_t
+  implicit none
+  private
+
+contains
+
+  !> See ricochet.h.
+  subroutine enable_files() bind(C, name="ricochet_enable_files")
+    read_run => read_last_frame
+  end subroutine enable_files
+
+  !> See ricochet.h. The file has the first samples of a run of this input, and the state of now.
+  function save(handle, path, force, message, room) bind(C, name="ricochet_save") result(code)
+    type(c_ptr), value :: handle
+    character(kind=c_char), intent(in) :: path(*)
+    integer(c_int), value :: force, room
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int) :: code
+    type(session_t), pointer :: session
+    type(run_input_t) :: input
+    type(simulation_t) :: first
+    type(output_t) :: output
+    type(status_line_t) :: silent
+    type(error_t), allocatable :: error
+
+    session => session_of(handle)
+    call enable_files()
+    call input_from_text(session%input%text, session%input%path, session%input%overrides, input, error)
+    if (.not. allocated(error)) call new_simulation(input, silent, first, error)
+    if (.not. allocated(error)) call output%claim(text_of(path), error)
+    if (.not. allocated(error)) call output%open(input, first, force /= 0, error)
+    if (.not. allocated(error)) call output%save(session%sim, error)
+    call output%release()
+    code = answer(error, message, room)
+  end function save
+
+  !> See ricochet.h.
+  function load(path, threads, message, room, code) bind(C, name="ricochet_load") result(handle)
+    character(kind=c_char), intent(in) :: path(*)
+    integer(c_int), value :: threads, room
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), intent(out) :: code
+    type(c_ptr) :: handle
+    type(session_t), pointer :: session
+    type(hdf5_file_t) :: file
+    type(progress_t) :: progress
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: output, text, overrides
+    logical :: finished
+
+    allocate (session)
+    output = output_of(text_of(path))
+    if (output == "") output = text_of(path)
+    call enable_files()
+    call file%open(source_of(output), writable=.false.)
+    call file%fetch_text(parameters_group//"input", text)
+    call file%fetch_text(parameters_group//"overrides", overrides)
+    call file%close()
+    call file%report(error)
+    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines_of(overrides), session%input, error)
+    if (.not. allocated(error)) then
+      call describe_system(session%input%settings, session%sim)
+      call read_checkpoint(output, session%input, session%sim, progress, finished, error)
+    end if
+    handle = begin(session, threads, error)
+    code = answer(error, message, room)
+  end function load
+
+end module library_files
