@@ -2,13 +2,15 @@
 !> simulation at work. Nothing here prints, ends the process, or is shared by two handles.
 module library
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
+  use changes, only: change_system, change_velocities
   use disks, only: columns, image_column, n_columns
-  use errors, only: error_t
+  use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
   use moments, only: frame_sample, in_frames
   use observables, only: observable_list_t, observed
+  use partners, only: n_sides, side_name
   use run_setup, only: choose_evolution, input_from_text, new_simulation, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
@@ -16,14 +18,16 @@ module library
   use stop_rules, only: stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: text_t, written
-  use timeline, only: adapted, advance_once
+  use texts, only: eol, growing_text_t, text_t, written, written_exactly
+  use timeline, only: adapted, advance_once, passed_collapse
+  use variable_help, only: input_of
+  use variables, only: may_change_at_work
   implicit none
   private
   public :: answer, begin, lines_of, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the answer of `advance` that is no exit code
-  integer, parameter :: longest_look = 100000        !! ahead, for what may never come [parts of the timeline]
+  integer(int64), parameter :: longest_look = 2000000 !! ahead, for what may never come [events, kicks of a disk]
 
   type :: session_t
     type(run_input_t) :: input
@@ -45,9 +49,11 @@ contains
     type(session_t), pointer :: session
     type(status_line_t) :: silent
     type(error_t), allocatable :: error
+    type(text_t), allocatable :: lines(:)
 
     allocate (session)
-    call input_from_text(text_of(text), "input", lines_of(text_of(overrides)), session%input, error)
+    call lines_of(text_of(overrides), lines)
+    call input_from_text(text_of(text), "input", lines, session%input, error)
     if (.not. allocated(error)) call new_simulation(session%input, silent, session%sim, error)
     handle = begin(session, threads, error)
     code = answer(error, message, room)
@@ -122,6 +128,83 @@ contains
     end do
     code = answer(error, message, room)
   end function advance
+
+  !> See ricochet.h. The input of now has a text of its own: the next change, and a file, begin from that.
+  function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
+    type(c_ptr), value :: handle
+    character(kind=c_char), intent(in) :: overrides(*)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), value :: room
+    integer(c_int) :: code
+    type(session_t), pointer :: session
+    type(run_input_t) :: input
+    type(error_t), allocatable :: error
+    type(text_t), allocatable :: lines(:)
+    character(len=:), allocatable :: problem, side, text, list
+    integer :: i, k
+
+    session => session_of(handle)
+    call lines_of(text_of(overrides), lines)
+    list = changes_of(session)
+    text = session%input%text
+    do k = 1, n_sides                                 ! of a side that the input does not name, as it were in it
+      side = trim(side_name(k))
+      associate (groups => session%input%groups)
+        if (any([(index(lines(i)%text, "side."//side//".") == 1, i=1, size(lines))]) .and. &
+          .not. any(groups%name == "side" .and. groups%instance == side)) text = text//eol//"&side name = '"//side//"' /"
+      end associate
+    end do
+    do k = 1, size(lines)
+      associate (line => lines(k)%text)
+        if (.not. may_change_at_work(line(:index(line, "=") - 1)) .and. .not. allocated(error)) &
+          call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a simulation at work")
+        list = list//written_exactly(session%sim%time())//" "//line//eol
+      end associate
+    end do
+    if (.not. allocated(error)) call input_from_text(text, session%input%path, [session%input%overrides, lines], input, error)
+    if (.not. allocated(error)) then
+      call change_system(session%sim, input%settings%system_t, problem)
+      if (problem /= "") call fail(error, exit_usage, problem)
+    end if
+    if (.not. allocated(error)) call renew(session, input_of(input%groups), list)
+    code = answer(error, message, room)
+  end function change
+
+  !> See ricochet.h.
+  subroutine set_velocities(handle, values) bind(C, name="ricochet_set_velocities")
+    type(c_ptr), value :: handle
+    real(c_double), intent(in) :: values(*)
+    type(session_t), pointer :: session
+
+    session => session_of(handle)
+    call change_velocities(session%sim, reshape(values(:2*session%sim%n_disks()), [2, int(session%sim%n_disks())]))
+    call renew(session, session%input%text, changes_of(session)//written_exactly(session%sim%time())//" velocity"//eol)
+  end subroutine set_velocities
+
+  !> The changes so far.
+  function changes_of(session) result(list)
+    type(session_t), intent(in) :: session
+    character(len=:), allocatable :: list
+
+    list = ""
+    if (allocated(session%input%changes)) list = session%input%changes
+  end function changes_of
+
+  !> Goes on with a text as the input, that of now, after a change.
+  subroutine renew(session, text, changes)
+    type(session_t), intent(inout) :: session
+    character(len=*), intent(in) :: text, changes
+    type(error_t), allocatable :: error
+    type(text_t) :: none(0)
+    type(run_input_t) :: input
+
+    call input_from_text(text, session%input%path, none, input, error)
+    input%settings%run%threads = session%input%settings%run%threads
+    input%changes = changes
+    session%input = input
+    call choose_evolution(session%input%settings, session%evolution)
+    call session%evolution%start(session%sim)
+  end subroutine renew
 
   !> See ricochet.h.
   function time_of(handle) bind(C, name="ricochet_time") result(time)
@@ -212,7 +295,7 @@ contains
     list = observed(session%sim)
     text = ""
     do k = 1, list%n
-      text = text//trim(list%row(k)%name)//" "//written(merge(-1, 1, list%row(k)%is_count)*list%row(k)%width)//new_line("a")
+      text = text//trim(list%row(k)%name)//" "//written(merge(-1, 1, list%row(k)%is_count)*list%row(k)%width)//eol
     end do
     length = len(text)
     if (room <= length) return
@@ -221,6 +304,40 @@ contains
       values(:size(now)) = now
     end associate
   end function copy_observables
+
+  !> See ricochet.h.
+  function copy_text(handle, what, text, room) bind(C, name="ricochet_text") result(length)
+    type(c_ptr), value :: handle
+    character(kind=c_char), intent(in) :: what(*)
+    character(kind=c_char), intent(inout) :: text(*)
+    integer(c_int), value :: room
+    integer(c_int) :: length
+    type(session_t), pointer :: session
+    type(growing_text_t) :: growing
+    character(len=:), allocatable :: words
+    integer :: g, k
+
+    session => session_of(handle)
+    associate (groups => session%input%groups)
+      select case (text_of(what))
+      case ("input")
+        call growing%add(input_of(groups))
+      case ("parameters")
+        do g = 1, size(groups)
+          do k = 1, size(groups(g)%values)
+            if (groups(g)%values(k)%is_set()) call growing%add(groups(g)%value_line(k)//eol)
+          end do
+        end do
+      case ("changes")
+        call growing%add(changes_of(session))
+      case ("note")
+        call growing%add(passed_collapse(session%sim))
+      end select
+    end associate
+    words = growing%text()
+    length = len(words)
+    if (room > length) call give(words, text, room)
+  end function copy_text
 
   !> See ricochet.h. What comes is found by a copy that goes on: a disk may collide twice, and a kick may come between.
   function next_events(handle, most, records) bind(C, name="ricochet_next_events") result(n)
@@ -234,17 +351,21 @@ contains
     type(event_log_t) :: log
     type(limits_t) :: limits
     type(error_t), allocatable :: error
-    integer :: k
+    integer(int64) :: looked
 
     session => session_of(handle)
+    n = -1
+    if (session%input%settings%run%dynamics == "steps") return
     ahead = session%sim
     allocate (evolution, source=session%evolution)
     call evolution%start(ahead)
     log%most = most
-    limits%turns = 1000
-    do k = 1, longest_look
-      if (log%n >= most .or. allocated(error) .or. (k > 1 .and. evolution%idle)) exit
+    looked = 0
+    do while (log%n < most .and. looked < longest_look + 100_int64*most)
+      limits%turns = 1000
       call advance_once(evolution, ahead, limits, error, log)
+      if (allocated(error) .or. evolution%idle) exit
+      looked = looked + max(limits%turns - evolution%turns_left, int(ahead%n_disks(), int64))
     end do
     n = min(log%n, most)
     if (n > 0) records(:, :n) = log%record(:, :n)
@@ -301,19 +422,21 @@ contains
     end do
   end function text_of
 
-  !> The lines of a text, each with its end.
-  function lines_of(text) result(lines)
+  !> The lines of a text, without their ends.
+  subroutine lines_of(text, lines)
     character(len=*), intent(in) :: text
-    type(text_t), allocatable :: lines(:)
+    type(text_t), allocatable, intent(out) :: lines(:)
+    type(text_t) :: line
     integer :: first, last
 
     allocate (lines(0))
     first = 1
     do while (first <= len(text))
-      last = first - 1 + index(text(first:)//new_line("a"), new_line("a"))
-      lines = [lines, text_t(text(first:last - 1))]
+      last = first - 1 + index(text(first:)//eol, eol)
+      line%text = text(first:last - 1)
+      lines = [lines, line]                           ! see `command_line: take_option`
       first = last + 1
     end do
-  end function lines_of
+  end subroutine lines_of
 
 end module library

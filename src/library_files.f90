@@ -4,7 +4,7 @@ module library_files
   use cadence, only: progress_t
   use checkpoint, only: read_checkpoint
   use errors, only: error_t
-  use h5md_layout, only: parameters_group
+  use h5md_layout, only: changes_at_work, parameters_group
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
   use last_frame, only: read_last_frame
@@ -16,6 +16,7 @@ module library_files
   use simulation_state, only: simulation_t
   use starting_disks, only: read_run
   use status_line, only: status_line_t
+  use texts, only: text_t
   implicit none
   private
 
@@ -44,6 +45,8 @@ contains
     call enable_files()
     call input_from_text(session%input%text, session%input%path, session%input%overrides, input, error)
     if (.not. allocated(error)) call new_simulation(input, silent, first, error)
+    first%changes = session%sim%changes               ! which makes work an observable
+    if (first%changes > 0) input%changes = session%input%changes
     if (.not. allocated(error)) call output%claim(text_of(path), error)
     if (.not. allocated(error)) call output%open(input, first, force /= 0, error)
     if (.not. allocated(error)) call output%save(session%sim, error)
@@ -62,7 +65,8 @@ contains
     type(hdf5_file_t) :: file
     type(progress_t) :: progress
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: output, text, overrides
+    character(len=:), allocatable :: output, text, overrides, list
+    type(text_t), allocatable :: lines(:)
     logical :: finished
 
     allocate (session)
@@ -72,13 +76,16 @@ contains
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"input", text)
     call file%fetch_text(parameters_group//"overrides", overrides)
+    if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, list)
     call file%close()
     call file%report(error)
-    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines_of(overrides), session%input, error)
+    call lines_of(overrides, lines)
+    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines, session%input, error)
     if (.not. allocated(error)) then
       call describe_system(session%input%settings, session%sim)
       call read_checkpoint(output, session%input, session%sim, progress, finished, error)
     end if
+    if (allocated(list)) session%input%changes = list
     handle = begin(session, threads, error)
     code = answer(error, message, room)
   end function load

@@ -34,8 +34,20 @@ int ricochet_column(ricochet *, const char *name, double *values);
    negative width. Returns the bytes of the names without the zero at their end; without room for all nothing is copied. */
 int ricochet_observables(ricochet *, char *names, int room, double *values);
 
+/* Changes, now, what acts on disks: GROUP.VARIABLE=VALUE, a line for each, of box.gravity, drive, and the laws of contacts,
+   surfaces and their motions. What the change does to the total energy counts as work. Nothing changes after a code. */
+int ricochet_change(ricochet *, const char *overrides, char *message, int room);
+
+/* Gives the disks other velocities, now: x and y of one disk after the other. Likewise. */
+void ricochet_set_velocities(ricochet *, const double *velocities);
+
+/* Copies a text about this moment: `input`, a file with overrides and changes; `parameters`, GROUP.VARIABLE = JSON for each
+   that has a value; `changes`, TIME GROUP.VARIABLE=VALUE for each; `note`, of a collapse that was passed. Returns its bytes
+   without the zero at its end; without room for all nothing is copied. */
+int ricochet_text(ricochet *, const char *what, char *text, int room);
+
 /* The next collisions, at most `most`, as in the event log: time, i, j, size and components of the change of momentum.
-   Returns how many there are. The simulation stays as it is. */
+   Returns how many there are, fewer if nothing happens for long; -1: time steps do not know. The simulation stays as it is. */
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- libricochet_files.so --- */

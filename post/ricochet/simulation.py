@@ -10,6 +10,7 @@ on, its state is that of `build/ricochet` with the same input.
 
 import ctypes
 import functools
+import json
 import math
 import os
 import sys
@@ -21,11 +22,14 @@ from typing import Self
 import numpy as np
 
 from .files import RunError
+from .nature import Nature, nature_of
 from .program import ProgramError, namelist, value_text
 
 ROOM = 100_000  # bytes for a message
 PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
+ROUNDING = 1e-14  # of a time
+FASTEST = 1e100  # that an input can name
 #: The arrays of a simulation, and their numbers.
 COLUMNS = {
     "position": float,
@@ -64,6 +68,7 @@ class Simulation:
 
     def _take(self, handle: int) -> None:
         self._handle, self._lock = handle, threading.RLock()
+        self._start_energy = self.observable("all/kinetic_energy") * self.count
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
@@ -73,14 +78,17 @@ class Simulation:
         self._take(opened(library(files=True).ricochet_load, where, int(threads or 0)))
         return self
 
-    def save(self, path: str | Path, force: bool = False) -> Path:
+    def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write `path`.part, from which `ricochet INPUT -o path --resume` goes on; its path.
 
-        It has the samples of the start, and the state of now.
+        It has the samples of the start, and the state of now.  After a change INPUT is another than
+        that of the start: the file `input`, which this writes, too.
         """
         path = Path(path)
         with self._open() as handle:
             called(library(files=True).ricochet_save, handle, os.fsencode(path), int(force))
+        if input is not None:
+            Path(input).write_text(self.input, encoding="utf-8", errors="surrogateescape")
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
@@ -104,6 +112,21 @@ class Simulation:
     def __reduce__(self):
         raise TypeError("a simulation cannot be copied or sent; save it, and load it there")
 
+    def __setattr__(self, name: str, value: object) -> None:
+        """Give all disks other velocities (N, 2), now; other arrays are only to be read."""
+        if name in COLUMNS and name != "velocity":
+            raise AttributeError(f"{name} cannot be set in a simulation at work")
+        if name != "velocity":
+            super().__setattr__(name, value)
+            return
+        array = np.ascontiguousarray(value, dtype=float)
+        if array.shape != (self.count, 2):
+            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.count}, 2)")
+        if not np.abs(array).max() < FASTEST:
+            raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
+        with self._open() as handle:
+            library().ricochet_set_velocities(handle, array.ctypes.data)
+
     def _open(self) -> "Held":
         return Held(self)
 
@@ -125,13 +148,83 @@ class Simulation:
         )
         if math.isnan(limits[0]):
             raise ValueError("time: nan is no time")
-        if limits[0] < self.time:
+        if limits[0] < self.time * (1 - ROUNDING):
             raise ValueError(f"time: {time} is past; it is {self.time:.6g}")
         going_on = True
         while going_on:
             with self._open() as handle:
                 going_on = called(library().ricochet_advance, handle, *limits, PATIENCE)
         return self
+
+    def change(self, values: Mapping[str, object]) -> Self:
+        """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
+
+        It may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with their
+        temperatures, speeds and motions.  What this does to the total energy counts as work.  What
+        cannot change raises `ProgramError`, and nothing changes.
+        """
+        lines = "".join(f"{name}={value_text(name, value)}\n" for name, value in values.items())
+        with self._open() as handle:
+            called(library().ricochet_change, handle, lines.encode())
+        return self
+
+    def _text(self, what: str) -> str:
+        room = ROOM
+        with self._open() as handle:
+            while True:
+                text = ctypes.create_string_buffer(room)
+                length = library().ricochet_text(handle, what.encode(), text, room)
+                if length < room:
+                    return text.value.decode(errors="surrogateescape")
+                room = length + 1
+
+    @property
+    def input(self) -> str:
+        """The input as it is now, with overrides and changes, as the text of a file."""
+        return self._text("input")
+
+    @property
+    def changes(self) -> list[tuple[float, str, str]]:
+        """What has changed while it ran: time, name, value."""
+        found = []
+        for line in self._text("changes").splitlines():
+            time, _, rest = line.partition(" ")
+            found.append((float(time), *rest.partition("=")[::2]))
+        return found
+
+    @property
+    def parameters(self) -> dict:
+        """All variables with their values, by groups, as `Run.parameters` has them."""
+        found: dict = {}
+        for line in self._text("parameters").splitlines():
+            name, _, value = line.partition(" = ")
+            *groups, name = name.split(".")
+            place = found
+            for group in groups:
+                place = place.setdefault(group, {})
+            place[name] = json.loads(value) if ", ... " not in value else value
+        for group in {"obstacle", "wall"} & found.keys():  # the file has columns of them
+            rows = list(found[group].values())
+            found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
+            if "side" in found[group]:
+                found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
+        if changes := self.changes:
+            found["changes"] = changes
+        return found
+
+    @property
+    def nature(self) -> Nature:
+        """What kind of run this is so far: see `ricochet.nature`."""
+        energy = self.observable("all/kinetic_energy") * self.count
+        lost = self.observable("dissipated_energy")
+        return nature_of(
+            self.parameters,
+            self.mass,
+            self.radius,
+            lost=lost / max(energy, self._start_energy) if lost else 0.0,
+            turning="all/rotational_energy" in self.observables,
+            collapsed=bool(self._text("note")),
+        )
 
     @property
     def time(self) -> float:
@@ -202,10 +295,15 @@ class Simulation:
         return found[name].item() if len(found[name]) == 1 else found[name]
 
     def next_events(self, most: int) -> list[tuple[float, int, int]]:
-        """The next collisions in order: time, i, j as in the event log."""
+        """The next collisions in order: time, i, j as in the event log; fewer if none come for long.
+
+        Time steps know of none, and raise.
+        """
         records = np.empty((max(int(most), 0), 6))
         with self._open() as handle:
             n = library().ricochet_next_events(handle, len(records), records.ctypes.data)
+        if n < 0:
+            raise RunError("next_events: time steps do not know what comes")
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
 
@@ -280,6 +378,9 @@ def library(files: bool = False) -> ctypes.CDLL:
         "column": (n, p, text, p),
         "observables": (n, p, text, n, p),
         "next_events": (n, p, n, p),
+        "change": (n, p, text, *answer),
+        "set_velocities": (None, p, p),
+        "text": (n, p, text, text, n),
     }
     if files:
         kinds |= {

@@ -20,6 +20,7 @@ module h5md_layout
     disk_species = disks_group//"species", &
     disk_mass = disks_group//"mass", &
     disk_radius = disks_group//"radius", &
+    changes_at_work = parameters_group//"changes", &
     species_names = parameters_group//"species/names", &
     species_counts = parameters_group//"species/counts"
 

@@ -84,6 +84,7 @@ module settings
     character(len=:), allocatable :: path                !! of the input file, for messages
     character(len=:), allocatable :: text                !! the input file as it is
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
+    character(len=:), allocatable :: changes             !! made while the run was at work, a line `TIME VARIABLE=VALUE` for each
     type(group_t), allocatable :: groups(:)    !! every value as used
     type(settings_t) :: settings                         !! the same as typed data
   end type run_input_t

@@ -5,10 +5,10 @@ module variable_help
   use input_groups, only: group_t, json_text
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
     wall_groups, words_of
-  use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, written
+  use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, written, written_exactly
   implicit none
   private
-  public :: defaults_text, explain, groups_text, variables_text
+  public :: defaults_text, explain, groups_text, input_of, variables_text
 
   integer, parameter :: comment_column = 40                !! of the reference file
 
@@ -187,6 +187,56 @@ contains
     end do
     text = "["//growing%text()//eol//"]"
   end function groups_text
+
+  !> An input file that says the same. Sizes of species are as used, and so relative to nothing.
+  pure function input_of(groups) result(text)
+    type(group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: text
+    type(growing_text_t) :: growing
+    integer :: g, k, i
+    logical :: relative
+
+    do g = 1, size(groups)
+      if (.not. any(groups(g)%values%given)) cycle
+      relative = any(groups(g)%values%name == "relative_to" .and. groups(g)%values%given)
+      call growing%add("&"//trim(groups(g)%name)//eol)
+      do k = 1, size(groups(g)%values)
+        associate (value => groups(g)%values(k))
+          if (.not. value%is_set() .or. value%name == "relative_to") cycle
+          if (.not. (value%given .or. (relative .and. any(value%name == ["mass  ", "radius"])))) cycle
+          call growing%add("  "//trim(value%name)//" = ")
+          if (allocated(value%reals)) call growing%add(written_exactly(value%reals(1)))
+          do i = 2, merge(size(value%reals), 0, allocated(value%reals))
+            call growing%add(", "//written_exactly(value%reals(i)))
+          end do
+          do i = 1, merge(size(value%texts), 0, allocated(value%texts))
+            if (i > 1) call growing%add(", ")
+            call growing%add(word(value%kind, value%texts(i)))
+          end do
+          call growing%add(eol)
+        end associate
+      end do
+      call growing%add("/"//eol)
+    end do
+    text = growing%text()
+  contains
+
+    !> A value that is no real number: texts in quotes.
+    pure function word(kind, value)
+      character(len=*), intent(in) :: kind, value
+      character(len=:), allocatable :: word
+      integer :: c
+
+      word = trim(value)
+      if (kind /= "text") return
+      word = "'"
+      do c = 1, len_trim(value)
+        word = word//value(c:c)
+        if (value(c:c) == "'") word = word//"'"
+      end do
+      word = word//"'"
+    end function word
+  end function input_of
 
   !> `, "name": value`, with null instead of a value that is not there.
   pure function member(name, is_there, value) result(text)

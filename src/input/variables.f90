@@ -8,8 +8,8 @@ module variables
   use texts, only: joined, written
   implicit none
   private
-  public :: variable_t, table, free_to_change, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
-  public :: full_names
+  public :: variable_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
+  public :: free_to_change, may_change_at_work, full_names
   public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37
@@ -263,7 +263,22 @@ module variables
   character(len=25), parameter :: free(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
     "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
 
+  !> Those that may be another while a run is at work, but for what says where something is: what acts on disks.
+  character(len=11), parameter :: acting(*) = [character(len=11) :: "box.gravity", "contact.", "side.", "obstacle.", "wall.", &
+    "drive."]
+  character(len=*), parameter :: standing = ".name.centre.radius.side.from.to."
+
 contains
+
+  !> Whether a variable with its full name may be another from one moment on.
+  pure function may_change_at_work(name) result(yes)
+    character(len=*), intent(in) :: name
+    logical :: yes
+    integer :: k
+
+    yes = any([(index(name, trim(acting(k))) == 1, k=1, size(acting))]) &
+      .and. index(standing, name(index(name, ".", back=.true.):)//".") == 0
+  end function may_change_at_work
 
   !> Whether a variable, or a line `variable = value` about one, may be another when a run goes on.
   pure function free_to_change(line) result(yes)

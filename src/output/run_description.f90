@@ -5,7 +5,7 @@ module run_description
   use kinds, only: int32, int64, real64
   use build_info, only: build_flags, git_commit
   use disks, only: names_of
-  use h5md_layout, only: all_disks, box_group, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
+  use h5md_layout, only: all_disks, box_group, changes_at_work, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
     parameters_group, provenance, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
@@ -107,6 +107,7 @@ contains
       end do
       call file%put(parameters_group//"input", input%text)
       call file%put(parameters_group//"overrides", overrides_text(input))
+      if (allocated(input%changes)) call file%put(changes_at_work, input%changes)
     end subroutine describe_input
 
     !> What the thermodynamics module of H5MD requires beside the observables of a group.

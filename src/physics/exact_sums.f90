@@ -20,13 +20,20 @@ module exact_sums
 
 contains
 
-  !> Makes a sum, empty or restored, fine enough for terms up to a bound.
+  !> Makes a sum, empty or restored, fine enough for terms up to a bound; one at work keeps its value.
   elemental subroutine choose_unit(self, bound)
     class(exact_sum_t), intent(inout) :: self
     real(real64), intent(in) :: bound
+    real(real64) :: before
+    integer :: finer                                     ! [binary digits]
 
+    before = self%per_one
     self%per_one = 1
     if (bound > 0) self%per_one = scale(1.0_real64, min(digits_of_bound - exponent(bound), maxexponent(bound) - 1))
+    if (.not. before > 0 .or. self%units == 0) return
+    finer = exponent(self%per_one) - exponent(before)
+    if (finer > 0) self%units = self%units*2_int128**finer
+    if (finer < 0) self%units = self%units/2_int128**(-finer)
   end subroutine choose_unit
 
   !> Adds a term, less what is below a unit.

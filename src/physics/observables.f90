@@ -9,7 +9,7 @@ module observables
   use tally, only: dissipated, drive_energy, gain, heat, impulse, stress, virial, work
   implicit none
   private
-  public :: observable_list_t, observed, own_names, energies
+  public :: observable_list_t, observed, own_names, energies, total_energy
 
   integer, parameter :: most_components = 4
 
@@ -64,7 +64,7 @@ contains
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
     if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
-    if (sim%box%highest_speed() > 0) call list%add("work", [sim%tally%total(work)])
+    if (sim%box%highest_speed() > 0 .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
     if (sim%with%stress) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
     do k = 1, size(sim%box%surface)
       if (.not. sim%box%is_wall(k)) cycle
@@ -74,6 +74,16 @@ contains
       call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
     end do
   end function observed
+
+  !> The energy of all kinds now, so exactly that it can be balanced.
+  pure function total_energy(sim) result(now)
+    type(simulation_t), intent(in) :: sim
+    real(real64) :: now                           !! [energy]
+    real(real64) :: sums(lost, 0:size(sim%species))
+
+    call add_up(sim, sums)
+    now = total(sim, sums(:, 0))
+  end function total_energy
 
   !> Means over a species, per disk. The temperature is kT in two dimensions: the kinetic energy relative to the
   !> common motion, and to the velocity profile of a sheared box.

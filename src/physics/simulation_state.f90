@@ -50,6 +50,7 @@ module simulation_state
     real(real64) :: last_advance = 0.0_real64     !! when time had last advanced by more than that, since the epoch [time]
     integer(int64) :: events_then = 0             !! events at that time
     integer(int64) :: kicks = 0                   !! since the start of the run
+    integer(int64) :: changes = 0                 !! of what acts on disks, or of their velocities, since the start of the run
     type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
   contains

@@ -1,0 +1,97 @@
+!> What may change in a simulation at work: what acts on disks, and their velocities. Both happen now, to all disks at once,
+!> and what they do to the energy is work.
+module changes
+  use box_sides, only: bounds
+  use disks, only: land, mass_column
+  use kinds, only: int32, int64, never, real64
+  use observables, only: total_energy
+  use simulation_state, only: simulation_t, system_t
+  use tally, only: work
+  implicit none
+  private
+  public :: change_system, change_velocities
+
+contains
+
+  !> Lets another box, law and drive act from now on, of an input that describes the same disks. Sides stay where they are.
+  subroutine change_system(sim, system, problem)
+    type(simulation_t), intent(inout) :: sim
+    type(system_t), intent(in) :: system
+    character(len=:), allocatable, intent(out) :: problem    !! why it cannot; empty if it could
+    type(simulation_t) :: other
+    real(real64) :: before, here(2, 2), there(2, 2)          ! [energy], lower and upper sides [length]
+
+    problem = ""
+    other%given_t = sim%given_t
+    other%system_t = system
+    other%with%own_sizes = sim%with%own_sizes
+    call other%make_room(0_int32)
+    other%row(mass_column) = sim%row(mass_column)
+    other%box%epoch = sim%epoch
+    call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
+    call bounds(other%box, sim%now, there(:, 1), there(:, 2))
+    if (any((other%row > 0) .neqv. (sim%row > 0))) then
+      problem = "disks would need other columns: rotation, orientation and contact_time > 0 are there from the start, or never"
+    else if (any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) then
+      problem = "a side would jump; at this moment the new motion must be where the old one is"
+    end if
+    if (problem /= "") return
+    before = total_energy(sim)
+    call land_all(sim)
+    sim%system_t = other%system_t
+    call count_kicks()
+    call book(sim, before)
+  contains
+
+    !> The number of kicks that would have come by now: random numbers of the next one, and its time, follow from that.
+    subroutine count_kicks()
+      if (.not. sim%drive%is_on()) return
+      sim%kicks = int(min(sim%time()/sim%drive%interval, 2.0_real64**62), int64)
+      do while (sim%drive%time_of(sim%kicks + 1) <= sim%time())
+        sim%kicks = sim%kicks + 1
+      end do
+      do while (sim%drive%time_of(sim%kicks) > sim%time())
+        sim%kicks = sim%kicks - 1
+      end do
+    end subroutine count_kicks
+  end subroutine change_system
+
+  !> Gives all disks other velocities.
+  subroutine change_velocities(sim, v)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: v(:, :)                      !! (2,n) by id [length/time]
+    real(real64) :: before                                   ! [energy]
+    integer(int32) :: i
+
+    before = total_energy(sim)
+    call land_all(sim)
+    do i = 1, sim%n_disks()
+      sim%disk(i)%v = v(:, sim%tag(i)%id)
+    end do
+    call book(sim, before)
+  end subroutine change_velocities
+
+  !> Takes all disks to where they are now, as flights under one law.
+  subroutine land_all(sim)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32) :: i
+
+    do i = 1, sim%n_disks()
+      call sim%turn(i, sim%now)
+      call land(sim%disk(i), sim%box%gravity, sim%now)
+    end do
+  end subroutine land_all
+
+  !> Notes the energy that a change has given, in sums as fine as a run with this system has them. Disks may be faster or
+  !> slower now: how long the epoch is, and what a blink, is found anew.
+  subroutine book(sim, before)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), intent(in) :: before                       !! the total energy then [energy]
+
+    sim%changes = sim%changes + 1
+    call sim%choose_units()
+    call sim%tally%sum(work)%add(total_energy(sim) - before)
+    sim%epoch_end = 0
+  end subroutine book
+
+end module changes
