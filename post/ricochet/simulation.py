@@ -159,9 +159,9 @@ class Simulation:
     def change(self, values: Mapping[str, object]) -> Self:
         """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
 
-        It may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with their
-        temperatures, speeds and motions.  What this does to the total energy counts as work.  What
-        cannot change raises `ProgramError`, and nothing changes.
+        It may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with
+        their temperatures, speeds and motions.  What this does to the total energy counts as work.
+        What cannot change raises `ProgramError`, and nothing changes.
         """
         lines = "".join(f"{name}={value_text(name, value)}\n" for name, value in values.items())
         with self._open() as handle:
@@ -295,9 +295,9 @@ class Simulation:
         return found[name].item() if len(found[name]) == 1 else found[name]
 
     def next_events(self, most: int) -> list[tuple[float, int, int]]:
-        """The next collisions in order: time, i, j as in the event log; fewer if none come for long.
+        """The next collisions in order: time, i, j as in the event log.
 
-        Time steps know of none, and raise.
+        There are fewer if none come for long.  Time steps know of none, and raise.
         """
         records = np.empty((max(int(most), 0), 6))
         with self._open() as handle:

@@ -67,6 +67,7 @@ contains
     call land_all(sim)
     do i = 1, sim%n_disks()
       sim%disk(i)%v = v(:, sim%tag(i)%id)
+      sim%tag(i)%met = 0                                     ! what it met last, it may meet again at once, as after a kick
     end do
     call book(sim, before)
   end subroutine change_velocities
@@ -89,6 +90,7 @@ contains
     real(real64), intent(in) :: before                       !! the total energy then [energy]
 
     sim%changes = sim%changes + 1
+    sim%most_energy = max(sim%most_energy, sim%kinetic_energy(), abs(total_energy(sim) - before))
     call sim%choose_units()
     call sim%tally%sum(work)%add(total_energy(sim) - before)
     sim%epoch_end = 0

@@ -363,6 +363,7 @@ contains
     call record%exchange(sim%last_advance)
     call record%exchange(sim%events_then)
     call record%exchange(sim%start_energy)
+    call record%exchange(sim%most_energy)
     call record%exchange(sim%kicks)
     call record%exchange(sim%changes)
     call exchange_tally()

@@ -53,6 +53,7 @@ module simulation_state
     integer(int64) :: changes = 0                 !! of what acts on disks, or of their velocities, since the start of the run
     type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
+    real(real64) :: most_energy = 0.0_real64      !! the largest that it was then and after changes, for the units of sums
   contains
     procedure :: time
     procedure :: has_reached
@@ -331,6 +332,7 @@ contains
 
     if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
+    self%most_energy = self%start_energy
     call self%choose_units()
   end subroutine start_sums
 
@@ -354,7 +356,7 @@ contains
 
     mass = self%species%mass
     kicked = self%drive%speed2([(s, s=1, size(mass))], mass)
-    energy = self%start_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
+    energy = self%most_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
       + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
     impulse = sqrt(8*maxval(mass))*sqrt(energy)
     call self%tally%make_room(size(self%box%surface))

@@ -118,6 +118,12 @@ def test_other_threads_of_python_run_meanwhile():
         (lambda gas: gas.observable("all/pressur"), RunError, "all/temperature"),
         (lambda gas: gas.colour, AttributeError, "colour"),
         (lambda gas: gas.next_events("x"), ValueError, "x"),
+        (lambda gas: gas.change({"species.a.count": 3}), ProgramError, "cannot change"),
+        (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "columns"),
+        (lambda gas: gas.change({"contact.restitution": 2}), ProgramError, "from 0 to 1"),
+        (lambda gas: setattr(gas, "velocity", np.zeros(3)), ValueError, "(3,)"),
+        (lambda gas: setattr(gas, "velocity", gas.velocity * np.nan), ValueError, "below"),
+        (lambda gas: setattr(gas, "mass", gas.mass), AttributeError, "mass"),
         (lambda gas: gas.save("/proc/none/x.h5"), ProgramError, "/proc/none"),
         (copy.copy, TypeError, "save it"),
         (lambda gas: [gas.close(), gas.close(), gas.position], ValueError, "closed"),
@@ -162,6 +168,33 @@ def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, w
     gas = Simulation.load(tmp_path / "gas.h5").advance(collisions=400)
     assert np.array_equal(gas.position, whole.position[-1])
     assert np.array_equal(gas.velocity, whole.velocity[-1])
+
+
+def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
+    """With the input that was saved; that of the start is refused by name."""
+    monkeypatch.chdir(tmp_path)
+    Path("gas.nml").write_text(GAS)
+    gas = Simulation("gas.nml").advance(events=100)
+
+    def balance():
+        flows = [gas.observable(name) for name in ("heat", "work") if name in gas.observables]
+        return gas.observable("total_energy") + gas.observable("dissipated_energy") - sum(flows)
+
+    before = balance()
+    gas.change({"box.gravity": (0, 3), "side.top.temperature": 2, "contact.restitution": 0.7})
+    gas.advance(events=200).velocity = 2 * gas.velocity
+    gas.advance(events=300)
+    assert balance() == pytest.approx(before, rel=1e-12)
+    assert {"changed", "thermal", "falling"} <= gas.nature
+    gas.save("gas.h5", input="changed.nml")
+    told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet")
+    assert told.returncode == 2 and "there box.gravity = [0, 3]" in told.stderr
+    ran(program, "changed.nml", "-o", "gas.h5", "--resume", "--quiet", check=True)
+    whole, gas = read_run("gas.h5"), gas.advance()
+    assert np.array_equal(whole.velocity[-1], gas.velocity)
+    assert whole.nature == gas.nature
+    assert Simulation.load("gas.h5").changes == gas.changes
+    assert [name for _, name, _ in gas.changes][-2:] == ["contact.restitution", "velocity"]
 
 
 def test_the_library_needs_no_hdf5_and_shows_its_functions_only():

@@ -305,6 +305,14 @@ CHANGES = [("contact.restitution", 0.7), ("contact.wall_restitution", 0.8)]
 CHANGES += [(f"side.{name}.restitution", 0.9) for name in ("left", "top")]
 
 
+def balance(simulation: Simulation) -> tuple[float, float]:
+    """The energy with what was lost, less what was given; and the largest of these terms."""
+    terms = [simulation.observable(name) for name in ("total_energy", "dissipated_energy")]
+    given = {"heat", "work", "drive_energy"} & {*simulation.observables}
+    terms += [-simulation.observable(name) for name in given]
+    return sum(terms), max(map(abs, terms))
+
+
 @pytest.mark.parametrize("seed", SEEDS[::4])
 def test_changes_at_work_leave_no_trace_of_slices_and_files(program, tmp_path, monkeypatch, seed):
     """Gravity, laws and velocities change; the state and its sums are the same bytes after all."""
@@ -318,6 +326,7 @@ def test_changes_at_work_leave_no_trace_of_slices_and_files(program, tmp_path, m
 
     def done(parts: int, kept: bool) -> list:
         simulation, said = Simulation("case.nml"), []
+        before = balance(simulation)[0]
         for moment, change in zip(moments, changes, strict=True):
             try:
                 for part in range(1, parts):
@@ -331,6 +340,8 @@ def test_changes_at_work_leave_no_trace_of_slices_and_files(program, tmp_path, m
             if kept:
                 simulation.save("kept.h5", force=True)
                 simulation = Simulation.load("kept.h5")
+        after, largest = balance(simulation)
+        assert after == pytest.approx(before, abs=1e-11 * largest)
         there = [simulation.position, simulation.velocity, simulation.mass]
         return [said, *there, *map(simulation.observable, sorted(simulation.observables))]
 
