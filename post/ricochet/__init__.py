@@ -4,7 +4,8 @@
     run = ricochet.run("input/gas.nml")
     run = ricochet.read_run("runs/gas.h5")
 
-`program` starts simulations, `starting` writes what they start from; `reader` opens files,
+`program` starts simulations, `simulation` has them in memory, `ensembles` makes many; `starting`
+writes what they start from; `reader` opens files,
 `bridges` hands them to other programs; `nature` says what kind of run one is, and so which laws
 are for it; `statistics` finds means and errors, `theory` and `hard_disks` have the laws;
 `thermodynamics`, `transport`, `structure`, `fields`, `speeds`, `cooling` and `crater` measure;
@@ -15,6 +16,7 @@ command-line scripts share, `files` what opens files.
 
 from . import packages as packages  # first
 from .bridges import mdanalysis_universe
+from .ensembles import ensemble, sweep
 from .program import ProgramError, run
 from .reader import Events, Obstacle, Run, RunError, Series, read_run
 from .simulation import Simulation
@@ -28,8 +30,10 @@ __all__ = [
     "RunError",
     "Series",
     "Simulation",
+    "ensemble",
     "mdanalysis_universe",
     "read_run",
     "run",
+    "sweep",
     "write_start",
 ]

@@ -4,11 +4,9 @@ Its standard error is a terminal to the program, which tells a terminal how far 
 """
 
 import atexit
-import ctypes
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -23,7 +21,6 @@ from .reader import Run, read_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
-LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
@@ -94,11 +91,7 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
 
     ours, its = pty.openpty()
     process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=its,
-        preexec_fn=end_with_parent if LIBC else None,  # noqa: PLW1509
+        tied(command), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its
     )
     os.close(its)
     lines = []
@@ -123,12 +116,14 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
     return process.returncode, lines
 
 
-def end_with_parent() -> None:
-    """Let this process be stopped, with a checkpoint, when Python ends however it ends.
+def tied(command: list[str]) -> list[str]:
+    """A command that is stopped, with a checkpoint, when Python ends, however it ends.
 
-    After a fork only what was found before may be called: one function of the system.
+    By setpriv of util-linux, where there is one: a function that runs between fork and exec is not
+    safe beside threads.
     """
-    LIBC.prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+    setpriv = shutil.which("setpriv") if sys.platform == "linux" else None
+    return [setpriv, "--pdeathsig", "TERM", "--", *command] if setpriv else command
 
 
 def lines_from(terminal: int) -> Iterator[str]:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from .files import RunError, Unsound, open_file, tree
+from .files import RunError, Unsound, did_you_mean, open_file, tree
 from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
@@ -272,13 +272,7 @@ class Run:
     def observable(self, name: str) -> Series:
         """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
-            if f"observables/{name}/value" not in file:
-                raise Unsound(f"has no observable '{name}'")
-            count = committed(file, "observables")
-            if count == 0:
-                raise Unsound("holds no observables yet")
-            group = file[f"observables/{name}"]
-            return Series(*(rows(group[part], count) for part in ("time", "value")))
+            return series_of(file, name)
 
     @cached_property
     def observables(self) -> tuple[str, ...]:
@@ -295,8 +289,9 @@ class Run:
         import pandas
 
         columns = {}
-        for name in self.observables:
-            time, value = self.observable(name)
+        with open_file(self.path) as file:
+            series = {name: series_of(file, name) for name in self.observables}
+        for name, (time, value) in series.items():
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T
             if name == "virial_tensor":
@@ -479,6 +474,18 @@ def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
                 yield path + name
             else:
                 yield from series_in(item, f"{path}{name}/")
+
+
+def series_of(file: h5py.File, name: str) -> Series:
+    """An observable of an open file."""
+    if f"observables/{name}/value" not in file:
+        near = did_you_mean(name, series_in(file["observables"]))
+        raise Unsound(f"has no observable '{name}'{near}")
+    count = committed(file, "observables")
+    if count == 0:
+        raise Unsound("holds no observables yet")
+    group = file[f"observables/{name}"]
+    return Series(*(rows(group[part], count) for part in ("time", "value")))
 
 
 def committed(file: h5py.File, group: str) -> int:

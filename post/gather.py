@@ -1,0 +1,46 @@
+"""A table of the members of an ensemble: what each was given, how far it is, and what it measured.
+
+    python post/gather.py runs/scan --csv scan.csv
+
+A row for each member: its name; each override by its full name; seed; state (finished, unfinished,
+failed) with the reason; wall time in s; and the last value of each observable that is one number.
+"""
+
+import argparse
+import csv
+import sys
+from collections import Counter
+from pathlib import Path
+
+from ricochet.ensembles import gathered
+from ricochet.files import destination
+from ricochet.script import launch
+
+
+def main() -> None:
+    summary, _, text = __doc__.partition("\n")
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=summary, epilog=text, formatter_class=raw)
+    parser.add_argument("folder", type=Path, help="of runs/ensemble.sh or ricochet.sweep")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="where the table goes [printed]")
+    args = parser.parse_args()
+    rows = gathered(args.folder)
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    last = ["state", "reason"]  # as the words are long, but for a machine they are where they are
+    if args.csv:
+        with destination(args.csv).open("w", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, columns, restval="")
+            table.writeheader()
+            table.writerows(rows)
+    else:
+        shown = [name for name in columns if "/" not in name and name not in last] + last
+        table = csv.DictWriter(sys.stdout, shown, restval="", extrasaction="ignore", delimiter="\t")
+        table.writeheader()
+        table.writerows(rows)
+    states = Counter(row["state"] for row in rows)
+    told = ", ".join(f"{number} {state}" for state, number in sorted(states.items()))
+    print(f"{args.folder}: {len(rows)} members: {told}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    launch(main)

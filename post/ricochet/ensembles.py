@@ -1,0 +1,268 @@
+"""Many runs of one input: made in parallel, safe to stop and to repeat; and gathered in a table.
+
+    values = {"contact.restitution": [0.8, 0.9], "run.seed": range(8)}
+    table = ricochet.sweep("input/gas.nml", values, "runs/scan")
+    table = ricochet.ensemble("runs/scan")       # a row for each member, also of runs/ensemble.sh
+
+A folder of members is what `runs/ensemble.sh` makes: input.nml, manifest.txt with the overrides of
+each, NAME.h5 and NAME.log.  Each goes on with what the other has left.
+"""
+
+import fcntl
+import itertools
+import os
+import re
+import subprocess
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from .files import RunError, open_file, plain
+from .program import find_program, namelist, tied, value_text
+from .reader import committed, series_in
+from .simulation import Simulation, read_input
+
+BROKE_OFF = ": its run broke off "
+AT_WORK: set[subprocess.Popen] = set()
+GOES_ON = re.compile(r"(stopped.*|.*--resume goes on.*|.*: its run broke off .*|)")
+
+
+def sweep(
+    system: str | Path | Mapping,
+    values: Mapping[str, Iterable],
+    folder: str | Path,
+    executor: Executor | None = None,
+):
+    """Run every combination of values, the first varying slowest; a DataFrame as of `ensemble`.
+
+    `system` is that of `ricochet.run`.  Members that are finished are left out, others go on where
+    they were stopped: repeat the call after an interrupt.  They run on all cores of this machine,
+    or where an `executor` of `concurrent.futures` takes them, which sees the same folder.
+    """
+    text = namelist(system) if isinstance(system, Mapping) else read_input(system)
+    values = {name: list(own) for name, own in values.items()}
+    members = combinations(values)
+    check(text, values)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    overrides = {name: words_of(settings) for name, settings in members.items()}
+    remember(folder, text, overrides)
+    pool = executor or ThreadPoolExecutor(os.cpu_count())
+    waiting = [pool.submit(run_member, folder, name, own) for name, own in overrides.items()]
+    try:
+        for member in waiting:
+            member.result()
+    finally:
+        for member in waiting:
+            member.cancel()
+        for process in [*AT_WORK]:
+            process.terminate()  # with a checkpoint
+        if executor is None:
+            pool.shutdown()
+    return ensemble(folder)
+
+
+def check(text: str, values: Mapping[str, list]) -> None:
+    """Refuse now what a member would refuse: each value, with the first of the other variables."""
+    first = {name: own[0] for name, own in values.items() if own}
+    for name, own in values.items():
+        for value in own:
+            Simulation(text, first | {name: value}).close()
+
+
+def combinations(values: Mapping[str, Iterable]) -> dict[str, dict[str, object]]:
+    """The settings of each member by its name, which is that of runs/ensemble.sh."""
+    choices = [[(name, value) for value in own] for name, own in values.items()]
+    members = {}
+    for settings in map(dict, itertools.product(*choices)):
+        parts = []
+        for variable, value in settings.items():
+            short = variable.removeprefix("species.")
+            if "." not in short.partition(".")[2] and not variable.startswith("species."):
+                short = short.partition(".")[2]
+            word = value_text(variable, value).replace(", ", ",")
+            parts.append(f"{short}_{re.sub('[^A-Za-z0-9.+-]', '_', word)}")
+        members["_".join(parts)] = settings
+    return members
+
+
+def words_of(settings: Mapping[str, object]) -> str:
+    """Overrides as a line of a manifest."""
+    pairs = (
+        f"{name}={value_text(name, value).replace(', ', ',')}" for name, value in settings.items()
+    )
+    return " ".join(f"--set {pair}" for pair in pairs)
+
+
+def read_manifest(folder: Path) -> dict[str, str]:
+    """The overrides of each member that a folder tells of."""
+    path = folder / "manifest.txt"
+    if not path.is_file():
+        return {}
+    lines = path.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
+    return {name: rest for name, _, rest in (line.partition("\t") for line in lines)}
+
+
+def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
+    """Write input.nml and manifest.txt; members with data must mean the same as before."""
+    before = read_manifest(folder)
+    path = folder / "input.nml"
+    old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
+    data = {name for name in before if any(files_of(folder, name))}
+    if old != text and data:
+        raise RunError(
+            f"{folder}: holds members of another input (see {path}); choose another folder"
+        )
+    for name in data & overrides.keys():
+        if before[name] != overrides[name]:
+            raise RunError(
+                f"{folder}: holds a member '{name}' with other settings ({before[name]})"
+            )
+    put(path, text)
+    lines = sorted(f"{name}\t{rest}\n" for name, rest in (before | overrides).items())
+    put(folder / "manifest.txt", "".join(lines))
+
+
+def put(path: Path, text: str) -> None:
+    """A file, whole or not at all."""
+    new = path.with_name(f".new.{os.getpid()}.{path.name}")
+    new.write_text(text, encoding="utf-8", errors="surrogateescape")
+    new.replace(path)
+
+
+def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
+    """The finished and the unfinished file of a member, where there are."""
+    paths = folder / f"{name}.h5", folder / f"{name}.h5.part"
+    return tuple(path if path.is_file() else None for path in paths)
+
+
+def run_member(folder: Path, name: str, overrides: str) -> int:
+    """Run a member to its end, unless it is there or another process is at it; its exit code."""
+    with (folder / f"{name}.log").open("a") as log:
+        try:
+            fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return 0
+        finished, unfinished = files_of(folder, name)
+        if finished:
+            return 0
+        words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
+        output = ["-o", folder / f"{name}.h5", "--quiet", *words]
+        command = [find_program(), folder / "input.nml", *output]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        pipes = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
+        code = finished_with([*command, *["--resume"] * bool(unfinished)], **pipes)
+        if unfinished and BROKE_OFF in last_words(folder, name):
+            code = finished_with(command, **pipes)  # it starts over
+        return code
+
+
+def finished_with(command: list, **pipes: object) -> int:
+    """The exit code of a command, which ends with Python."""
+    process = subprocess.Popen(tied(command), **pipes)
+    AT_WORK.add(process)
+    try:
+        return process.wait()
+    finally:
+        AT_WORK.discard(process)
+
+
+def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
+    """Variables and values of a line of a manifest."""
+    for part in overrides.split("--set ")[1:]:
+        name, _, value = part.strip().partition("=")
+        yield name.strip(), value.strip()
+
+
+def last_words(folder: Path, name: str) -> str:
+    """What a member has said last."""
+    path = folder / f"{name}.log"
+    lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
+    return lines[-1] if lines else ""
+
+
+# --- the table ---
+
+
+def ensemble(folder: str | Path):
+    """A pandas DataFrame (needs that package) of the members of a folder, a row for each.
+
+    Columns: member; one for each override, named in full; seed; state: 'finished', 'unfinished' or
+    'failed'; reason, why it is not finished; wall_time in s; and the last value of each observable
+    that is one number.
+    """
+    import pandas
+
+    return pandas.DataFrame(gathered(Path(folder)))
+
+
+def gathered(folder: Path) -> list[dict]:
+    """The rows of `ensemble`."""
+    if not folder.is_dir():
+        raise RunError(f"{folder}: there is no such folder")
+    overrides = read_manifest(folder)
+    stems = {
+        path.name.partition(".h5")[0] for path in (*folder.glob("*.h5"), *folder.glob("*.h5.part"))
+    }
+    overrides |= dict.fromkeys(stems - overrides.keys(), "")
+    if not overrides:
+        raise RunError(f"{folder}: holds no members: neither manifest.txt nor *.h5")
+    return [row_of(folder, name, overrides[name]) for name in sorted(overrides, key=in_order)]
+
+
+def in_order(name: str) -> list:
+    """Members by their names, numbers in them by size."""
+    parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
+    return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
+
+
+def row_of(folder: Path, name: str, overrides: str) -> dict:
+    """What there is of a member."""
+    row: dict = {"member": name}
+    row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
+    finished, unfinished = files_of(folder, name)
+    said = last_words(folder, name)
+    row |= {"seed": row.get("run.seed"), "state": "finished", "reason": "", "wall_time": np.nan}
+    if not finished:
+        goes_on = GOES_ON.fullmatch(said) and BROKE_OFF not in said
+        row["state"] = "unfinished" if goes_on else "failed"
+        row["reason"] = said or ("" if unfinished else "has not begun")
+    path = finished or unfinished
+    if path:
+        try:
+            row |= last_values(path)
+        except RunError as problem:
+            row |= {"state": "failed", "reason": str(problem)}
+    return row
+
+
+def typed(value: str) -> object:
+    """A value of an override as a number, a truth value, a tuple of numbers, or text."""
+    if value.strip(".").lower() in ("true", "false", "t", "f"):
+        return value.strip(".").lower()[0] == "t"
+    numbers = []
+    for word in value.split(","):
+        for kind in (int, float):
+            try:
+                numbers.append(kind(word.lower().replace("d", "e") if kind is float else word))
+                break
+            except ValueError:
+                continue
+        else:
+            return value.strip("'\"")
+    return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
+def last_values(path: Path) -> dict:
+    """Seed, wall time, and the last value of each scalar observable; the file is opened once."""
+    with open_file(path) as file:
+        row = {"seed": plain(file["parameters/run"].attrs["seed"])}
+        row["wall_time"] = plain(file["provenance"].attrs.get("wall_time", np.nan))
+        count = committed(file, "observables")
+        for name in series_in(file["observables"]) if count else ():
+            data = file[f"observables/{name}/value"]
+            if data.ndim == 1:
+                row[name] = plain(data[count - 1])
+    return row

@@ -1,0 +1,99 @@
+"""Ensembles from Python: each goes on with what the script has left, and tells what there is."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from ricochet import ProgramError, RunError, ensemble, sweep
+from ricochet.ensembles import typed
+from whole_runs import ran
+
+ROOT = Path(__file__).resolve().parents[2]
+GAS = """&box boundary = 'wall', 'wall' /
+&species name = 'a' count = 30 radius = 0.03 temperature = 1 /
+&stop collisions_per_disk = 5 /
+"""
+VALUES = {"contact.restitution": [0.8, 0.95], "species.a.velocity": [(1, -1)], "run.seed": [1, 2]}
+
+
+@pytest.fixture
+def _tools(program, monkeypatch):
+    monkeypatch.setenv("RICOCHET", str(program))
+
+
+@pytest.mark.usefixtures("_tools")
+def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
+    """Members have the same names, inputs and overrides; none is run twice."""
+    text = GAS.replace("temperature = 1", "")
+    table = sweep(text, VALUES, tmp_path)
+    assert table.member[0] == "restitution_0.8_a.velocity_1_-1_seed_1"
+    assert [*table.state] == 4 * ["finished"] and [*table.seed] == [1, 2, 1, 2]
+    assert [*table["contact.restitution"]] == [0.8, 0.8, 0.95, 0.95]
+    assert table["species.a.velocity"][0] == (1, -1) and table["collisions"].min() >= 75
+    script = [ROOT / "runs/ensemble.sh", tmp_path / "input.nml", "-d", tmp_path]
+    scans = ["contact.restitution=0.8,0.95", "species.a.velocity=1,-1;0,1", "run.seed=1,2"]
+    told = ran(*script, *(word for scan in scans for word in ("--scan", scan)))
+    assert told.returncode == 0 and "8 of 8 members finished, 4 of them before" in told.stderr
+    with ProcessPoolExecutor(2) as pool:
+        again = sweep(text, {**VALUES, "species.a.velocity": [(1, -1), (0, 1)]}, tmp_path, pool)
+    assert len(again) == 8 and set(again.state) == {"finished"}
+    with pytest.raises(RunError, match="another input"):
+        sweep(f"{text}! changed", VALUES, tmp_path)
+
+
+@pytest.mark.usefixtures("_tools")
+def test_what_a_member_would_refuse_is_refused_before_any_runs(tmp_path):
+    with pytest.raises(ProgramError, match="from 0 to 1"):
+        sweep(GAS, {"contact.restitution": [1, 2]}, tmp_path)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.usefixtures("_tools")
+def test_members_that_did_not_finish_say_why(tmp_path):
+    sweep(GAS, {"run.seed": [1, 2, 3]}, tmp_path)
+    (tmp_path / "seed_1.h5").rename(tmp_path / "seed_1.h5.part")
+    (tmp_path / "seed_1.log").write_text("stopped at time 1\n")
+    (tmp_path / "seed_2.h5").unlink()
+    (tmp_path / "seed_2.log").write_text("seed_2: no room\n")
+    (tmp_path / "seed_3.h5").write_text("no HDF5")
+    table = ensemble(tmp_path)
+    assert [*table.state] == ["unfinished", "failed", "failed"]
+    assert table.reason[1] == "seed_2: no room" and "not an HDF5 file" in table.reason[2]
+    command = [sys.executable, ROOT / "post/gather.py", tmp_path, "--csv", tmp_path / "a.csv"]
+    told = ran(*command, check=True)
+    assert "3 members: 2 failed, 1 unfinished" in told.stderr
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 4
+
+
+def test_a_killed_python_leaves_checkpoints_and_no_process(program, tmp_path):
+    (tmp_path / "gas.nml").write_text(GAS.replace("collisions_per_disk = 5", "events = 2000000000"))
+    call = "import ricochet; ricochet.sweep('gas.nml', {'run.seed': [1, 2]}, 'runs')"
+    environment = {**os.environ, "RICOCHET": str(program), "PYTHONPATH": str(ROOT / "post")}
+    python = subprocess.Popen([sys.executable, "-c", call], cwd=tmp_path, env=environment)
+    parts = [tmp_path / f"runs/seed_{k}.h5.part" for k in (1, 2)]
+    wait_until(lambda: all(part.exists() for part in parts))
+    python.send_signal(signal.SIGKILL)
+    python.wait()
+    wait_until(lambda: "stopped" in "".join(p.read_text() for p in tmp_path.glob("runs/*.log")))
+
+
+def wait_until(there) -> None:
+    """Patiently: a busy machine takes its time."""
+    for _ in range(6000):
+        if there():
+            return
+        time.sleep(0.1)
+    pytest.fail("it has never come")
+
+
+@pytest.mark.parametrize(
+    ("word", "value"), [("3", 3), ("1d-2", 0.01), (".true.", True), ("0,-1", (0, -1)), ("'x'", "x")]
+)
+def test_overrides_have_their_types(word, value):
+    assert typed(word) == value and type(typed(word)) is type(value)
