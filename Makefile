@@ -67,7 +67,7 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all library demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
+targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
   uninstall dist set-up clean distclean help
 .PHONY: $(targets) FORCE
 
@@ -174,6 +174,14 @@ library:
 	@$(MAKE) $(jobs) BUILD=$(BUILD)/library HINTS= PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
 	  $(BUILD)/library/libricochet_files.so
 	@cp $(BUILD)/library/*.so src/ricochet.h $(BUILD)
+
+# For any processor since 2013 or so, but for GLIBC as old as here: its name says which.
+wheel: export BUILD := $(BUILD)/portable
+wheel: export ARCH := x86-64-v3
+wheel:  ## build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler
+	@.ci/set-up demo wheel
+	@rm -rf '$(BUILD)/bare' && $(venv) -m pip wheel --quiet --no-deps -w '$(BUILD)/bare' .
+	@PATH="$$PWD/.venv/bin:$$PATH" $(venv) -m auditwheel repair --plat auto -w build/wheels '$(BUILD)'/bare/*.whl
 
 unit-tests:  ## unit tests; DEBUG=1 tests=tests/unit/test_X.pf: of a module
 	@$(if $(PFUNIT_DIR),$(or $(if $(pfunit_mk),:),$(error PFUNIT_DIR=$(PFUNIT_DIR): no pFUnit is installed there (include/PFUNIT.mk is missing))),:)

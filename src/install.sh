@@ -26,7 +26,7 @@ plan() {
   for text in input/* post/*.* post/ricochet/*.* post/page/*.*; do behind[$shared/$text]=$text; done
   for text in post/*.py; do
     command=ricochet-$(basename "$text" .py)
-    [[ $text == post/hatch_build.py ]] || behind[bin/${command//_/-}]="-> ../$shared/post/ricochet/commands.py"
+    behind[bin/${command//_/-}]="-> ../$shared/post/ricochet/commands.py"
   done
 }
 

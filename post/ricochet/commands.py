@@ -18,8 +18,10 @@ SCRIPTS = HERE / "post" if (HERE / "post").is_dir() else HERE.parent
 def main() -> None:
     """Run the script that the command is called after."""
     command = Path(sys.argv[0]).absolute()
+    if command.stem == "ricochet":  # of pip
+        os.execv(HERE / "bin/ricochet", [sys.argv[0], *sys.argv[1:]])
     program = command.with_name("ricochet")
-    if program.is_file():
+    if program.is_file() and not (HERE / "bin").is_dir():
         os.environ.setdefault("RICOCHET", str(program))
     name = command.name.removeprefix("ricochet-").replace("-", "_")
     sys.path[0] = str(SCRIPTS)  # as python post/NAME.py has it

@@ -72,7 +72,8 @@ def find_program() -> str:
     if wish := os.environ.get("RICOCHET"):
         places = [Path(wish)]
     else:
-        places = [root / "build/ricochet", Path(shutil.which("ricochet") or "")]
+        built = [Path(__file__).with_name("bin") / "ricochet", root / "build/ricochet"]
+        places = [*built, Path(shutil.which("ricochet") or "")]
     for place in places:
         if place.is_file() and os.access(place, os.X_OK):
             return str(place.resolve())

@@ -26,6 +26,7 @@ from .nature import Nature, nature_of
 from .program import ProgramError, namelist, value_text
 
 ROOM = 100_000  # bytes for a message
+ENDLESS = b"stop.time=1e100\n"
 PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
@@ -64,10 +65,17 @@ class Simulation:
             if b"\0" in word:
                 raise ValueError("an input has no zero bytes")
         engine = library(files=b".h5" in b"".join(words))
-        self._take(opened(engine.ricochet_open, *words, int(threads or 0)))
+        try:
+            handle = opened(engine.ricochet_open, *words, int(threads or 0))
+        except ProgramError as problem:
+            if not str(problem).startswith("input: stop: no rule ends the run"):
+                raise
+            words = words[0], words[1] + ENDLESS  # who steps it knows when to stop
+            handle = opened(engine.ricochet_open, *words, int(threads or 0))
+        self._take(handle, endless=words[1].endswith(ENDLESS))
 
-    def _take(self, handle: int) -> None:
-        self._handle, self._lock = handle, threading.RLock()
+    def _take(self, handle: int, endless: bool = False) -> None:
+        self._handle, self._lock, self._endless = handle, threading.RLock(), endless
         self._start_energy = self.observable("all/kinetic_energy") * self.count
 
     @classmethod
@@ -138,14 +146,18 @@ class Simulation:
     ) -> Self:
         """Go on until the first of these values is reached, counted from the start of the run.
 
-        Without any it is the stop rule of the input that counts.  An interrupt (Ctrl-C) leaves
-        the simulation where it is then.
+        Without any it is the stop rule of the input that counts, if it has one.  An interrupt
+        (Ctrl-C) leaves the simulation where it is then.
         """
         limits = (
             math.inf if time is None else float(time),
             NEVER if collisions is None else int(collisions),
             NEVER if events is None else int(events),
         )
+        if self._endless and limits == (math.inf, NEVER, NEVER):
+            raise ValueError(
+                "advance: how far? The input has no &stop; give time, collisions or events"
+            )
         if math.isnan(limits[0]):
             raise ValueError("time: nan is no time")
         if limits[0] < self.time * (1 - ROUNDING):
@@ -360,11 +372,11 @@ def called(function, *arguments: object) -> bool:
 def library(files: bool = False) -> ctypes.CDLL:
     """The engine; with the functions for files it needs the HDF5 of the system."""
     name = "libricochet_files.so" if files else "libricochet.so"
-    root = Path(__file__).resolve().parents[2]
-    wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
-    path = (Path(wish) if wish else root / "build") / name
-    if not path.is_file():
-        raise ProgramError(f"no {name} in {path.parent}: run make library in a clone", 3)
+    wish, own = os.environ.get("RICOCHET_LIBRARY"), Path(__file__).resolve()  # a folder
+    places = [Path(wish)] if wish else [own.with_name("lib"), own.parents[2] / "build"]
+    path = next((place / name for place in places if (place / name).is_file()), None)
+    if path is None:
+        raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)
     engine = ctypes.CDLL(str(path))  # its symbols are its own: no clash with the HDF5 of h5py
     p, n, text = ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p
     long, real = ctypes.c_int64, ctypes.c_double

@@ -271,20 +271,28 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
 
 def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
     code = []
-    for title in ("## Running it from Python", "## In Python's own process"):
-        code += re.findall(r"^    .*", section("output", title), re.M)
+    for title in (
+        "## Running it from Python",
+        "## In Python's own process",
+        "## Many runs in Python",
+    ):
+        code += re.findall(r"^    (?!build/).*", section("output", title), re.M)
     code.append("    assert box.collisions == 3000")
     own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
     said = ran(sys.executable, "-c", textwrap.dedent("\n".join(code)), cwd=tmp_path, env=own)
     assert (said.returncode, said.stderr) == (0, "")
     energies = [float(line) for line in said.stdout.splitlines()[:3]]
     assert len(set(energies)) == 3 and all(0 < energy < 250 for energy in energies)
+    (again,) = re.findall(
+        r"^    build/ricochet (.*)", section("output", "## In Python's own process"), re.M
+    )
+    ran(program, *again.split(), cwd=tmp_path, check=True)
 
 
 def test_there_is_one_version(program):
     """That of the program; the newest section of the changes and its date are those to cite."""
     said = ran(program, "--version", check=True).stdout
-    project = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     page, cited = ((ROOT / name).read_text() for name in ("CHANGELOG.md", "CITATION.cff"))
     version, date = re.search(r"^## ([\d.]+) \((.*)\)$", page, re.M).groups()
     assert said.split()[1] == project["version"] == version
@@ -448,7 +456,7 @@ def test_one_command_installs_what_the_notebook_needs():
     wanted = {"ipykernel", "jupyterlab", "pandas"}
     lines = (ROOT / "requirements.txt").read_text().splitlines()
     installed = {line.split("==")[0] for line in lines if re.search(r"==.*#.*\bnotebook\b", line)}
-    extras = tomllib.loads((ROOT / "post" / "pyproject.toml").read_text())["project"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert installed == set(extras["optional-dependencies"]["notebook"]) == wanted
     cells = json.loads((ROOT / "docs" / "tour.ipynb").read_text())["cells"]
     code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")

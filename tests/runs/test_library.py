@@ -118,6 +118,11 @@ def test_other_threads_of_python_run_meanwhile():
         (lambda gas: gas.observable("all/pressur"), RunError, "all/temperature"),
         (lambda gas: gas.colour, AttributeError, "colour"),
         (lambda gas: gas.next_events("x"), ValueError, "x"),
+        (
+            lambda _: Simulation({"species": {"count": 9, "radius": 0.1}}).advance(),
+            ValueError,
+            "&stop",
+        ),
         (lambda gas: gas.change({"species.a.count": 3}), ProgramError, "cannot change"),
         (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "columns"),
         (lambda gas: gas.change({"contact.restitution": 2}), ProgramError, "from 0 to 1"),
