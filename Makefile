@@ -217,7 +217,7 @@ lab:  ## sets up, builds, opens the laboratory in your browser
 
 notebook:  ## sets up, and opens the tour in JupyterLab
 	@.ci/set-up demo notebook
-	@$(MAKE) $(jobs) all
+	@$(MAKE) $(jobs) all && $(MAKE) library
 	$(venv) -m jupyterlab $(if $(filter 0,$(shell id -u)),--allow-root) docs/tour.ipynb
 
 figures:  ## draws the figures of all systems in runs/figures/ (long)

@@ -486,7 +486,8 @@ def test_each_cell_shows_what_it_promises(program, monkeypatch):
     nbclient.NotebookClient(notebook, resources=folder, **kernel).execute()
     cells = [(one.source, shown(one)) for one in notebook.cells if one.cell_type == "code"]
     drawn = [output for source, output in cells if "plt.subplots" in source]
-    assert len(drawn) == 4 and all("image/png" in output for output in drawn)
+    assert len(drawn) == 6 and all("image/png" in output for output in drawn)
+    assert "next: [(" in showing(cells, "heated.next_events")
     assert "Animation(frames" in showing(cells, "animate(run")
     assert float(showing(cells, "largest relative").split(":")[1]) < 1e-12
     assert "contact.restitution" in showing(cells, "except ricochet.ProgramError")
