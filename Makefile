@@ -166,19 +166,22 @@ jobs = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write to $(BUILD); BUILD=folder takes another' >&2; exit 2; }; \
   $(if $(shell command -v flock),flock $(BUILD)/lock) $(MAKE)
 
-all:  ## builds the program (default); library: libricochet.so, ricochet.h
+all:  ## builds the program (default); library: for C, Python; wheel
 	@+$(build) $(BUILD)/ricochet
 
-# Position independent, and without hints about memory, which are for the allocations of a whole process.
+# Position independent, and without hints about memory, which are for the allocations of a whole process. A library is
+# replaced, not written over: who has loaded it keeps it.
 library:
 	@$(MAKE) $(jobs) BUILD=$(BUILD)/library HINTS= PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
 	  $(BUILD)/library/libricochet_files.so
-	@cp $(BUILD)/library/*.so src/ricochet.h $(BUILD)
+	@for file in $(BUILD)/library/*.so src/ricochet.h; do copy=$(BUILD)/$$(basename $$file); \
+	  cmp -s $$file $$copy || { cp $$file $$copy.new && mv $$copy.new $$copy; } || exit; done
 
-# For any processor since 2013 or so, but for GLIBC as old as here: its name says which.
+# build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler. For any processor
+# since 2013 or so, but for GLIBC as old as here: its name says which.
 wheel: export BUILD := $(BUILD)/portable
 wheel: export ARCH := x86-64-v3
-wheel:  ## build/wheels/*.whl: all of it with its libraries inside, for pip on machines without a compiler
+wheel:
 	@.ci/set-up demo wheel
 	@rm -rf '$(BUILD)/bare' && $(venv) -m pip wheel --quiet --no-deps -w '$(BUILD)/bare' .
 	@PATH="$$PWD/.venv/bin:$$PATH" $(venv) -m auditwheel repair --plat auto -w build/wheels '$(BUILD)'/bare/*.whl

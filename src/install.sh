@@ -58,7 +58,7 @@ remove() {
 
 case $action in
 install)
-  newer=$(find src \( -name '*.f90' -o -name '*.c' \) -newer "$build/ricochet" -print -quit)
+  newer=$(find src \( -name '*.f90' -o -name '*.c' \) ! -name 'library*.f90' -newer "$build/ricochet" -print -quit)
   [[ -z $newer ]] || give_up "$build/ricochet is older than $newer; run make first, with the options that it was built with"
   umask 022 # all users read it, whoever installs
   mkdir -p "$root" 2>/dev/null || true

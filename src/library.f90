@@ -171,7 +171,7 @@ contains
   end function change
 
   !> See ricochet.h.
-  subroutine set_velocities(handle, values) bind(C, name="ricochet_set_velocities")
+  subroutine give_velocities(handle, values) bind(C, name="ricochet_set_velocities")
     type(c_ptr), value :: handle
     real(c_double), intent(in) :: values(*)
     type(session_t), pointer :: session
@@ -179,7 +179,7 @@ contains
     session => session_of(handle)
     call change_velocities(session%sim, reshape(values(:2*session%sim%n_disks()), [2, int(session%sim%n_disks())]))
     call renew(session, session%input%text, changes_of(session)//written_exactly(session%sim%time())//" velocity"//eol)
-  end subroutine set_velocities
+  end subroutine give_velocities
 
   !> The changes so far.
   function changes_of(session) result(list)
@@ -330,7 +330,7 @@ contains
         end do
       case ("changes")
         call growing%add(changes_of(session))
-      case ("note")
+      case default
         call growing%add(passed_collapse(session%sim))
       end select
     end associate

@@ -3,7 +3,7 @@
 module changes
   use box_sides, only: bounds
   use disks, only: land, mass_column
-  use kinds, only: int32, int64, never, real64
+  use kinds, only: int32, int64, real64
   use observables, only: total_energy
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
