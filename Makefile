@@ -98,10 +98,7 @@ $(BUILD)/libricochet_files.so: $(BUILD)/library.o $(BUILD)/library_files.o $(obj
 
 $(BUILD)/%.o: %.f90 $(BUILD)/flags
 	@echo "compile $<"
-	$(Q)$(FC) $(flags) $(apart) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
-
-# Its calls would be copies of the innermost loops, at the cost of those that everybody uses.
-$(BUILD)/domain_grid.o: apart = $(if $(gnu),-fno-lto)
+	$(Q)$(FC) $(flags) $(hdf5_flags) -J$(BUILD) -c -o $@ $<
 
 $(BUILD)/%_c.o: %.c $(BUILD)/flags
 	@echo "compile $<"

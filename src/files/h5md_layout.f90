@@ -1,4 +1,5 @@
-!> The layout of an output file: H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). All paths in it are here.
+!> The layout of an output file: H5MD 1.1 (https://www.nongnu.org/h5md/h5md.html). Groups and fixed paths are here; the
+!> names of observables are in `observables`, those of the event log in `samples`.
 module h5md_layout
   implicit none
   private

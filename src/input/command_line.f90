@@ -225,7 +225,7 @@ contains
       "  --                  the next argument is a file name, even with a leading -"//eol//eol// &
       "exit:   0 finished; 2 wrong usage or bad input; 3 cannot read or write a file;"//eol// &
       "        4 the simulation broke off; 75 stopped after writing a checkpoint,"//eol// &
-      "        the same command with --resume continues it"//eol//eol// &
+      "        the same command with --resume continues it; or before it began"//eol//eol// &
       "examples:"//eol// &
       "  ricochet input/gas.nml"//eol// &
       "  ricochet input/crater.nml -o runs/heavy.h5 --set species.projectile.mass=50"//eol// &
