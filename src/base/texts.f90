@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: about, counted, size_text
+  public :: about, counted, line_at, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -277,5 +277,15 @@ contains
     text = written(number)//" "//noun
     if (number /= 1) text = text//"s"
   end function counted
+
+  !> The line of a text in which a character stands, or would stand behind the end.
+  pure function line_at(text, k) result(line)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: k                      !! place of the character
+    character(len=:), allocatable :: line
+
+    line = text(index(text(:k - 1), eol, back=.true.) + 1:)
+    line = line(:index(line//eol, eol) - 1)
+  end function line_at
 
 end module texts

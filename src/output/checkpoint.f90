@@ -21,7 +21,7 @@ module checkpoint
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use system, only: last_problem, synchronize
-  use texts, only: eol, growing_text_t, legible, lower_case, text_t, written
+  use texts, only: eol, growing_text_t, legible, line_at, lower_case, text_t, written
   use variables, only: free_to_change
   use version, only: program_version
   implicit none
@@ -107,16 +107,6 @@ contains
 
     name = lower_case(trim(adjustl(override(:index(override//"=", "=") - 1))))
   end function variable_of
-
-  !> The line of a text in which a character stands, or would stand behind the end.
-  pure function line_at(text, k) result(line)
-    character(len=*), intent(in) :: text
-    integer, intent(in) :: k                      !! place of the character
-    character(len=:), allocatable :: line
-
-    line = text(index(text(:k - 1), eol, back=.true.) + 1:)
-    line = line(:index(line//eol, eol) - 1)
-  end function line_at
 
   !> Gives a new file its checkpoints: both are of the present state.
   subroutine make_checkpoints(file, groups, sim, progress)
