@@ -264,7 +264,7 @@ sanitize:  ## searches faults of memory, and races, with sanitizers (long)
 	@.ci/set-up demo test bench
 	@LIMIT=1200 ASAN_OPTIONS=detect_leaks=0 $(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=address,undefined -fno-sanitize-recover=all' BUILD=$(sanitized) unit-tests all
 	@RICOCHET="$$(realpath '$(sanitized)')/ricochet" $(venv) -m pytest -q tests/runs/test_output_file.py tests/runs/test_restart.py
-	@$(venv) tests/runs/fuzz_input.py --count 500 --program $(sanitized)/ricochet
+	@MOST_SECONDS=100 $(venv) tests/runs/fuzz_input.py --count 500 --program $(sanitized)/ricochet
 	@$(MAKE) $(jobs) ARCH=x86-64-v3 BUILD=$(BUILD)/v3 all
 	@tests/support/run_valgrind.sh $(BUILD)/v3/ricochet
 	@$(MAKE) $(jobs) DEBUG=1 OPT='-O1 -fsanitize=thread' BUILD=$(raced) tests=tests/unit/test_parallel_events.pf $(raced)/unit_tests $(raced)/ricochet

@@ -5,9 +5,9 @@
 Runs are combined by the width v0 of the start velocities; energies are means over the runs and over
 windows of --window.  T_therm is when their difference enters --within, to stay for three windows:
 between where it does so less its error, and where with it.  A single run has no error and no
-T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in
-equilibrium, so take many.  K_light and K_heavy in the table are means in equilibrium, which is
-found or begins after --skip.
+T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in equilibrium, so take
+many.  K_light and K_heavy in the table are means in equilibrium, which is found or begins after
+--skip.
 """
 
 from functools import reduce
@@ -38,8 +38,8 @@ def entry(time: np.ndarray, gap: np.ndarray, within: float = 0.1, lasting: int =
     close = gap <= within
     for k in range(len(time) - lasting + 1):
         if close[k : k + lasting].all():
-            part = (gap[k - 1] - within) / (gap[k - 1] - gap[k]) if k else 1
-            return float(time[k] - (1 - part) * (time[k] - time[k - 1]))
+            both = [k, max(k - 1, 0)]
+            return float(np.interp(within, gap[both], time[both]))
     return float("nan")
 
 

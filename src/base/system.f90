@@ -6,13 +6,12 @@ module system
   use, intrinsic :: iso_fortran_env, only: error_unit
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
-  use texts, only: eol
   implicit none
   private
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, remove_file, make_folders_of, synchronize
   public :: what_is, identity_of, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
-  public :: file_size, read_bytes, read_lines, write_word
+  public :: file_size, read_bytes, read_file, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
   !> What a path can name.
@@ -257,21 +256,24 @@ contains
     n = c_read_bytes(path//c_null_char, bytes, len(bytes, int64))
   end subroutine read_bytes
 
-  !> The lines of a regular file, each with its line feed. (Fortran's own `read` may take for a line what could not be
-  !> read, with `iostat` 0, and go on so for ever.)
-  subroutine read_lines(path, lines, problem)
+  !> All bytes of a regular file. (Fortran's own `read` may take for a line what could not be read, with `iostat` 0, and go
+  !> on so for ever.)
+  subroutine read_file(path, text, problem)
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: lines
+    character(len=:), allocatable, intent(out) :: text
     character(len=:), allocatable, intent(out) :: problem    !! why it cannot be read; empty if it can
+    character(len=:), allocatable :: failure
     integer(int64) :: n
 
-    allocate (character(len=max(file_size(path), 8192_int64) + 1) :: lines)  ! what the system tells has the size 0
+    allocate (character(len=max(file_size(path), 8192_int64)) :: text)  ! what the system tells of itself has the size 0
+    call read_bytes(path, text, n)
+    text = text(:max(n, 0_int64))
+    problem = ""
+    if (n >= 0) return
+    failure = last_problem()
     problem = opening_problem(path, writable=.false.)
-    call read_bytes(path, lines, n)
-    if (n < 0 .and. problem == "") problem = last_problem()
-    lines = lines(:max(n, 0_int64))
-    if (n > 0 .and. index(lines, eol, back=.true.) < n) lines = lines//eol
-  end subroutine read_lines
+    if (problem == "") problem = failure
+  end subroutine read_file
 
   !> Writes a number over eight bytes of a file.
   subroutine write_word(path, position, word, done)

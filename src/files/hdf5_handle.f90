@@ -103,6 +103,7 @@ contains
 
   !> Sets the properties of a file. No file locks: they keep readers out, and a reader's lock could stop a run. Storage
   !> of datasets is allocated at once, never filled, and has no time stamps, so that the same run gives the same bytes.
+  !> Small ones share no block: HDF5 would cut that off in two steps, and between them say a wrong length of the file.
   subroutine prepare(self, access, status)
     class(hdf5_handle_t), intent(inout) :: self
     integer(hid_t), intent(out) :: access         !! properties of access to the file

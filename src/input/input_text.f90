@@ -7,7 +7,7 @@
 module input_text
   use kinds, only: int64
   use errors, only: error_t, exit_files, exit_usage, fail
-  use system, only: file_size, is_folder, read_lines
+  use system, only: file_size, is_folder, read_file
   use texts, only: digits, eol, letters, shown, written
   implicit none
   private
@@ -62,7 +62,7 @@ contains
         " bytes; an input file has at most "//written(largest_file))
     end if
     if (allocated(error)) return
-    call read_lines(path, text, problem)
+    call read_file(path, text, problem)
     if (problem /= "") then
       call fail(error, exit_files, path//": cannot be read: "//problem)
       return

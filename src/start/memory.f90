@@ -4,8 +4,8 @@ module memory
   use kinds, only: int64
   use input_problems, only: problem_list_t
   use settings, only: settings_t
-  use system, only: read_lines
-  use texts, only: eol, size_text, written
+  use system, only: read_file
+  use texts, only: eol, line_at, size_text, written
   implicit none
   private
   public :: check_memory, free_memory, room_for_domains
@@ -40,25 +40,23 @@ contains
   function free_memory(root) result(bytes)
     character(len=*), intent(in) :: root                  !! of the file system; empty but for tests
     integer(int64) :: bytes
-    character(len=:), allocatable :: lines                ! number:controllers:group; version 2 has no controllers
+    character(len=:), allocatable :: groups, line         ! number:controllers:group; version 2 has no controllers
     character(len=:), allocatable :: folder, unread
-    integer :: top, first, last, colon
+    integer :: top, at, colon
 
     bytes = number_after("MemAvailable:", root//"/proc/meminfo")
     if (bytes < huge(bytes)) bytes = 1024*bytes
-    call read_lines(root//"/proc/self/cgroup", lines, unread)
-    last = 0
-    do while (last < len(lines))
-      first = last + 1
-      last = last + index(lines(first:), eol)
-      associate (line => lines(first:last - 1))
-        colon = index(line, ":", back=.true.)
-        folder = root//"/sys/fs/cgroup"
-        if (index(line(:colon), "memory") > 0) folder = folder//"/memory"
-        top = len(folder)
-        if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
-        folder = folder//line(colon + 1:)
-      end associate
+    call read_file(root//"/proc/self/cgroup", groups, unread)
+    at = 1
+    do while (at <= len(groups))
+      line = line_at(groups, at)
+      at = at + len(line) + 1
+      colon = index(line, ":", back=.true.)
+      folder = root//"/sys/fs/cgroup"
+      if (index(line(:colon), "memory") > 0) folder = folder//"/memory"
+      top = len(folder)
+      if (index(line(:colon), "memory") + index(line, "::") == 0) cycle
+      folder = folder//line(colon + 1:)
       do while (len(folder) >= top)                       ! the group, and those around it
         bytes = min(bytes, number_after("", folder//"/memory.max"), number_after("", folder//"/memory.limit_in_bytes"))
         folder = folder(:index(folder, "/", back=.true.) - 1)
@@ -70,14 +68,15 @@ contains
   function number_after(label, path) result(number)
     character(len=*), intent(in) :: label, path
     integer(int64) :: number
-    character(len=:), allocatable :: lines, unread
-    integer :: first, status
+    character(len=:), allocatable :: text, line, unread
+    integer :: at, status
 
     number = huge(number)
-    call read_lines(path, lines, unread)
-    first = index(eol//lines, eol//label) + len(label)
-    if (first == len(label) .or. len(lines) == 0) return
-    read (lines(first:first - 1 + index(lines(first:), eol)), *, iostat=status) number
+    call read_file(path, text, unread)
+    at = index(eol//text, eol//label)
+    if (at == 0) return
+    line = line_at(text, at)
+    read (line(len(label) + 1:), *, iostat=status) number
     if (status /= 0) number = huge(number)
   end function number_after
 

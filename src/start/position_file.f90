@@ -6,7 +6,7 @@ module position_file
   use input_text, only: byte_order_mark
   use input_words, only: read_real
   use settings, only: disks_in_file_t
-  use system, only: read_lines
+  use system, only: read_file
   use texts, only: counted, eol, joined, lower_case, place_of, shown, suggestion, written
   implicit none
   private
@@ -39,7 +39,7 @@ contains
 
     allocate (table(size(column_names), 64), lines(64), column(0))
     n = 0
-    call read_lines(path, text, problem)
+    call read_file(path, text, problem)
     if (problem /= "") then
       call fail(disks%error, exit_files, path//": cannot be read: "//problem)
       return
@@ -48,7 +48,8 @@ contains
     past = 1
     do while (past <= len(text, int64))
       begin = past
-      past = past + index(text(begin:), eol, kind=int64)
+      past = begin + index(text(begin:), eol, kind=int64)
+      if (past == begin) past = len(text, int64) + 2        ! the last line needs no end
       line = text(begin:past - 2)
       number = number + 1
       if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
