@@ -166,10 +166,9 @@ build = mkdir -p $(BUILD) 2>/dev/null && [ -w $(BUILD) ] || { echo 'Cannot write
 all:  ## builds the program (default); library: for C, Python; wheel
 	@+$(build) $(BUILD)/ricochet
 
-# Position independent, and without hints about memory, which are for the allocations of a whole process. A library is
-# replaced, not written over: who has loaded it keeps it.
+# Position independent. A library is replaced, not written over: who has loaded it keeps it.
 library:
-	@$(MAKE) $(jobs) BUILD=$(BUILD)/library HINTS= PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
+	@$(MAKE) $(jobs) BUILD=$(BUILD)/library PIC='-fPIC -fno-semantic-interposition' $(BUILD)/library/libricochet.so \
 	  $(BUILD)/library/libricochet_files.so
 	@for file in $(BUILD)/library/*.so src/ricochet.h; do copy=$(BUILD)/$$(basename $$file); \
 	  cmp -s $$file $$copy || { cp $$file $$copy.new && mv $$copy.new $$copy; } || exit; done

@@ -53,13 +53,14 @@ __attribute__((used)) void *__wrap_realloc(void *memory, size_t bytes)
 }
 
 /* Large arrays that come and go are mapped and unmapped. Otherwise the C library raises the size from which it does so,
-   and each new one may end up behind the last one: the heap of a long run grows without end. */
+   and each new one may end up behind the last one: the heap of a long run grows without end. Not so in the library: the
+   heap there is that of the program that has loaded it. */
+#if defined(M_MMAP_THRESHOLD) && (defined(__PIE__) || !defined(__PIC__))
 __attribute__((constructor, used)) static void map_large_arrays(void)
 {
-#ifdef M_MMAP_THRESHOLD
     mallopt(M_MMAP_THRESHOLD, (int)large);
-#endif
 }
+#endif
 
 #else
 #define PREFETCH(address) ((void)(address))
