@@ -9,7 +9,8 @@ disks that can turn, the stress that disks carry (sum of m c_a c_b over the area
 they carry (sum of m c^2 c / 2); what collisions hand on over the distance of two centres comes on
 top of both.  u changes within a cell as it does from cell to cell.  Frames count after --skip, or
 in the second half of a run.  Errors are over blocks of time of all runs of one input
-(docs/theory.md); cells in which fewer than two of them saw a disk are left out.
+(docs/theory.md); cells in which fewer than two of them saw a disk have a density alone, and three
+disks must be left without any block for kT, stress and heat.
 
 Across equal disks between two walls, dashed: what the fluxes of momentum and energy at the walls
 say by Enskog's viscosity and conductivity (Gass 1971) and the equation of state, from temperature
@@ -28,6 +29,7 @@ from ricochet.script import command_line, launch, measured, report, spread
 from ricochet.statistics import Estimate
 
 import numpy as np
+from matplotlib.patches import Circle
 
 MOST_CELLS = 100_000
 LEAST_FLOW = 0.2  # of the thermal speed: the noise of a gas at rest is not drawn larger than it is
@@ -125,10 +127,13 @@ def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figur
     for axes, name in zip(panels, ("density", "temperature"), strict=True):
         draw_box(axes, run)
         image = axes.pcolormesh(*sides, found[name].mean.reshape(cells[::-1]), zorder=0.2)
+        for circle in (one for one in run.obstacles if one.inside):
+            held = Circle(circle.centre, circle.radius, transform=axes.transData)
+            image.set_clip_path(held)
         figure.colorbar(image, ax=axes, label=LABELS[name], shrink=0.8)
         arrows = axes.quiver(*places(run, cells).T, *(part.ravel() for part in flow), **scale)
-        key = {"labelpos": "E", "color": "black", "coordinates": "axes"}
-        axes.quiverkey(arrows, 0.1, 1.04, top, f"flow {top:.2g}", **key)
+        key = {"labelpos": "W", "color": "black", "coordinates": "axes"}
+        axes.quiverkey(arrows, 0.3, 1.04, top, f"flow {top:.2g}", **key)
     figure.suptitle(titled(runs))
     return figure
 

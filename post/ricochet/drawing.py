@@ -159,11 +159,11 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     for obstacle in run.obstacles:
         if obstacle.inside:
             axes.add_patch(Rectangle(run.lower, *run.edges, zorder=0, **grey))
-        fill = "white" if obstacle.inside else "0.75"
+        fill, level = ("white", 0.1) if obstacle.inside else ("0.75", 0.5)  # a map is at 0.2
         for shift in periods(run):
             centre = obstacle.centre + shift
             axes.add_patch(
-                Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=0.5)
+                Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=level)
             )
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     (x0, y0), (x1, y1) = run.lower, run.upper

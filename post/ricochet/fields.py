@@ -22,6 +22,7 @@ from .thermodynamics import after_start, free_disks
 
 MOST_BLOCKS = 16  # of a run
 FEWEST_BLOCKS = 3  # of all runs, for an error
+FEWEST_DISKS = 3  # that all blocks but one have seen in a cell, for what is relative to their flow
 LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
@@ -240,10 +241,12 @@ BY_FRAMES = np.array([name.startswith(("density", "stress", "heat")) for name in
 def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     """(10, C) what `sums` say of the fields; NaN where there are no disks.
 
-    A flow that changes by g h across a cell is no heat: it is m (g h)^2 / 12 of m v v.
+    Of one disk all is flow, and two carry no heat: fewer than `FEWEST_DISKS` have no kT, stress or
+    heat.  A flow that changes by g h across a cell is no heat: it is m (g h)^2 / 12 of m v v.
     """
     frames, n, dense, mass, mx, my, xx, xy, yy, qx, qy, turning = total
     u, v, density = mx / mass, my / mass, dense / frames
+    n = np.where(n < FEWEST_DISKS, np.nan, n)
     heat_x = qx - u * (xx + yy) / 2 - u * xx - v * xy + u * (u**2 + v**2) * mass
     heat_y = qy - v * (xx + yy) / 2 - u * xy - v * yy + v * (u**2 + v**2) * mass
     stress = [xx - mass * u * u, xy - mass * u * v, yy - mass * v * v]
@@ -274,7 +277,10 @@ class Fields(NamedTuple):
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
-    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk."""
+    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk.
+
+    All have a density: where centres can be but none was it is 0 but for one disk in one frame.
+    """
     blocks, most = blocks_of(runs, skip, cells)
     run = runs[0]
     areas = [accessible(run, cells, kind.radius) for kind in run.by_species]
@@ -286,12 +292,16 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
     members = Members(values, share)
     near = kinship(members, blocks, most)
     mean, error = members.estimate(near[:, None])
+    frames, disks = parts[:, :2].sum(axis=0)
+    room = np.max(areas, axis=0)
+    unseen = (disks == 0) & (room > 0)
+    error[0, unseen] += 1 / (frames * room)[unseen]
     turns = "angular_velocity" in run.elements
     names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}
     return Fields(
         {name: Estimate(mean[k], error[k]) for name, k in names.items()},
         {name: values[:, k] for name, k in names.items()},
-        parts[:, 1].sum(axis=0),
+        disks,
         blocks,
         dict(zip(NAMES, near, strict=True)),
     )

@@ -9,11 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 from scipy.signal import lfilter
 from scipy.stats import binom
 
 import correlations
 import driven
+import fields as fields_script
 import melting
 import rates
 from driven import demon_law, fuller, noise_law
@@ -626,6 +628,30 @@ def test_fields_of_few_values_have_no_bias_and_their_errors_hold(tmp_path, rng, 
         off = (np.average(mean, weights=own.disks) - truth) * np.sqrt(own.disks.sum())
         assert abs(off) < 4 * max(2, truth / 2) or name == "density"
     assert np.mean(held) == pytest.approx(0.68, abs=5 * 0.47 / np.sqrt(np.size(held)))
+
+
+def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
+    """Of one disk in each of two blocks all is flow, and where none was there may be one."""
+    place = np.full((32, 4, 2), 0.1)
+    place[[18, 30], 3, 0] = 0.5
+    run = written(tmp_path / "a.h5", place, rng.normal(size=place.shape), periodic=PERIODIC)
+    own = fields.fields([run], None, (3, 1))
+    assert own.disks.tolist() == [62, 2, 0] and len(own.blocks) > 3
+    assert own.found["density"].mean == pytest.approx(np.array([62, 2, 0]) * 3 / 16)
+    assert own.found["density"].error[2] == pytest.approx(3 / 16)
+    for name in ("temperature", "stress_xx", "heat_x"):
+        assert np.isfinite(own.found[name]).tolist() == [[True, False, False]] * 2
+
+
+def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
+    place = rng.uniform(0.3, 0.7, (16, 9, 2))
+    held = {"obstacles": [((0.5, 0.5), 0.5, 1)], "radius": 0.01}
+    run = written(tmp_path / "a.h5", place, rng.normal(size=place.shape), **held)
+    found = fields.fields([run], None, (2, 2)).found
+    figure = fields_script.draw_grid([run], (2, 2), found)
+    for axes in figure.axes[:2]:
+        (shown,) = (one for one in axes.collections if isinstance(one, QuadMesh))
+        assert shown.get_clip_path() and axes.patches[-1].zorder < shown.zorder
 
 
 def test_the_area_that_centres_can_reach(tmp_path):
