@@ -129,7 +129,8 @@ def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict)
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
             means = windows(time, value, (time[-1] - time[0]) / POINTS)
-            axes.plot(*means, color=colour, lw=1, label=label if k == 0 else None)
+            style = {"label": label * (k == 0)} | drawing.lone(means[0])
+            axes.plot(*means, color=colour, lw=1, **style)
         for level in laws[key[0]]:
             axes.axhline(level, color=colour, ls="--", lw=1.6)
     if any(laws.values()):

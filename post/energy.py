@@ -14,7 +14,7 @@ and the largest change.
 from collections.abc import Callable
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, colours, plt
+from ricochet.drawing import COLOURS, caption, colours, lone, plt
 from ricochet.nature import Refused
 from ricochet.script import command_line, launch, report
 
@@ -75,7 +75,7 @@ def draw_species(axes: plt.Axes, run: Run) -> None:
         axes.plot(time, value, color=colour, lw=0.5, alpha=0.15)
         spaced = np.linspace if run.nature.driven else np.geomspace
         means = means_of_windows(time, value, spaced)
-        axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}")
+        axes.plot(*means, color=colour, ls=style, label=f"{kind}, {name}", **lone(time))
     axes.set(ylabel="energy per disk (reduced units)", title=f"{method(run)}: {caption([run])}")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
     axes.legend(ncols=2, loc="upper right", title="means; faint: samples")
@@ -88,8 +88,8 @@ def draw(runs: list[Run]) -> plt.Figure:
     for run, colour in zip(runs, colours(len(runs), 2), strict=True):
         time, lost = change(run)
         largest = np.maximum(np.maximum.accumulate(np.abs(lost)), EPSILON / 2)
-        label = f"{method(run)}: {balance(run)[1]}"
-        bottom.semilogy(time[1:], largest[1:], color=colour, lw=1.4, label=label)
+        style = {"label": f"{method(run)}: {balance(run)[1]}"} | lone(time[1:])
+        bottom.semilogy(time[1:], largest[1:], color=colour, lw=1.4, **style)
     if not any(run.nature.driven for run in runs):
         bottom.set_xscale("log")
     bottom.set(

@@ -127,9 +127,8 @@ def draw_grid(runs: list[Run], cells: tuple[int, int], found: dict) -> plt.Figur
     for axes, name in zip(panels, ("density", "temperature"), strict=True):
         draw_box(axes, run)
         image = axes.pcolormesh(*sides, found[name].mean.reshape(cells[::-1]), zorder=0.2)
-        for circle in (one for one in run.obstacles if one.inside):
-            held = Circle(circle.centre, circle.radius, transform=axes.transData)
-            image.set_clip_path(held)
+        for one in (obstacle for obstacle in run.obstacles if obstacle.inside):
+            image.set_clip_path(Circle(one.centre, one.radius, transform=axes.transData))
         figure.colorbar(image, ax=axes, label=LABELS[name], shrink=0.8)
         arrows = axes.quiver(*places(run, cells).T, *(part.ravel() for part in flow), **scale)
         key = {"labelpos": "W", "color": "black", "coordinates": "axes"}

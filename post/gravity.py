@@ -8,7 +8,7 @@ the centre above its lowest place.  They hold for many disks without size.  Dash
 fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), unless walls or kicks give
 it; and a disk of species i is kept out of the area pi s_ij^2 about each other disk, which
 multiplies its density by exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near the
-floor.
+floor.  Where that sum is above 0.5 for disks without size, no law of the heights is drawn.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -17,7 +17,7 @@ their errors come from ten blocks of time.
 
 from typing import NamedTuple
 
-from ricochet import Run, RunError, thermodynamics
+from ricochet import Run, RunError, statistics, thermodynamics
 from ricochet.drawing import bars, caption, colours, plt
 from ricochet.nature import allow
 from ricochet.reader import Species
@@ -30,6 +30,7 @@ import scipy
 SPEED_RANGE = (0.0, 5.0)  # of m v^2 / 2 kT
 HEIGHT_RANGE = (1.0, 5.0)  # of m g h / kT
 BLOCKS = 10  # of time, for errors
+CROWDED = 0.5  # of the area at the floor: more is too much for the first order
 
 
 class Samples(NamedTuple):
@@ -106,10 +107,19 @@ def law_slope(x: np.ndarray, density: np.ndarray, limits: tuple[float, float], c
     return log_slope(np.interp(ranks, integral / integral[-1], x), limits)
 
 
+def crowding(run: Run, species: list[Samples], kt: float) -> float:
+    """The largest share of the area at the floor that disks without size would take from one."""
+    radius, pull = np.array([(s.radius, s.height.shape[1] * s.mass) for s in species]).T
+    taken = np.pi * np.add.outer(radius, radius) ** 2 @ pull * abs(run.gravity[1]) / kt
+    return float(taken.max() / (run.edges[0] - 2 * radius[0]))
+
+
 def heights(run: Run, species: list[Samples], kt: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """All heights that a disk can have, and the densities of `crowded_heights` there."""
+    """All heights that a disk can have, and the densities of `crowded_heights` there, or NaN."""
     free = run.edges - 2 * species[0].radius
     grid = np.linspace(0, free[1], 4001)
+    if crowding(run, species, kt) > CROWDED:
+        return grid, [np.full_like(grid, np.nan)] * len(species)
     return grid, crowded_heights(grid, species, abs(run.gravity[1]), kt, free[0], sharers(run))
 
 
@@ -154,10 +164,14 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
     kt, g = result[0]["kT"], float(np.abs(run.gravity[1]))
     squares = np.linspace(0, 18 * kt / min(s.mass for s in species), 1000)
     (grid, crowded), count = heights(run, species, kt), sharers(run)
+    lawful = 1 + 0 * crowded[0]  # without one law of the heights the other does not hold either
     for k, (s, row, colour) in enumerate(zip(species, result, colours(len(species)), strict=True)):
         v_law, h_law = s.mass / (2 * kt), s.mass * g / kt
         shared = sharing(0.5 * s.mass * squares, kt, count) * v_law * (1 - 0.5 / count)
-        laws = (v_law * np.exp(-v_law * squares), normalised(grid, np.exp(-h_law * grid)))
+        laws = (
+            v_law * np.exp(-v_law * squares),
+            lawful[k] * normalised(grid, np.exp(-h_law * grid)),
+        )
         for axes, x, values, law, dashed, kind, other in zip(
             panels,
             (squares, grid),
@@ -169,7 +183,9 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
             strict=True,
         ):
             fitted = " ± ".join(to_error(row[f"{kind}_slope"], row[f"{kind}_slope_error"]))
-            label = f"{run.by_species[k].label}: {fitted} (dashed: {row[f'{kind}_{other}']:.3f})"
+            label = f"{run.by_species[k].label}: {fitted}"
+            if np.isfinite(own := row[f"{kind}_{other}"]):
+                label += f" (dashed: {own:.3f})"
             draw_histogram(axes, values, x[-1], colour, label)
             for one in axes:
                 one.plot(x, law, color=colour, lw=1.4)
@@ -178,18 +194,20 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
         "slope fitted for $mv^2/2$ = {:g} to {:g} kT, over $m/2kT$".format(*SPEED_RANGE),
         "slope fitted for $mgh$ = {:g} to {:g} kT, over $mg/kT$".format(*HEIGHT_RANGE),
     )
-    for row, title in zip(panels, titles, strict=True):
+    names = "$v^2$", "height h of the centre above its lowest place"
+    for row, title, name, known in zip(panels, titles, names, (1, lawful[0]), strict=True):
         row[0].set(ylabel="probability density", xlim=(0, None))
         row[0].legend(loc="upper right", title=title)
         top = row[0].get_ylim()[1]
         row[1].set(yscale="log", ylim=(1e-4 * top, 1.5 * top))
-        row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
-        row[1].plot([], [], color="black", lw=1, ls="--", label="finite number and size of disks")
-        row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
-    for axes in panels[0]:
-        axes.set_xlabel("$v^2$ (reduced units)")
-    for axes in panels[1]:
-        axes.set_xlabel("height h of the centre above its lowest place (reduced units)")
+        for axes in row:
+            axes.set_xlabel(f"{name} (reduced units)")
+        if np.isfinite(known):
+            row[1].plot([], [], color="0.4", lw=1.4, label="exponential law (in colour)")
+            row[1].plot(
+                [], [], color="black", lw=1, ls="--", label="finite number and size of disks"
+            )
+            row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
     when, found = f"t = {start:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
     figure.suptitle(f"{caption([run])},  {when},  kT = {' ± '.join(to_error(*found))}")
     return figure
@@ -205,8 +223,13 @@ def main() -> None:
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
-    result = table(run, species, thermodynamics.temperature(run, args.skip))
-    report(args, draw(run, species, result, run.time[frames[0]]), result)
+    result, notes = table(run, species, thermodynamics.temperature(run, args.skip)), []
+    for kind, s in zip(run.by_species, species, strict=True):
+        mean = series_mean(s.height.mean(axis=1))
+        notes += statistics.doubts(f"height of {kind.label}", [mean])
+    if (share := crowding(run, species, result[0]["kT"])) > CROWDED:
+        notes.append(f"points would take {share:.2g} of the area at the floor: no law of heights")
+    report(args, draw(run, species, result, run.time[frames[0]]), result, notes=notes)
 
 
 if __name__ == "__main__":

@@ -100,8 +100,9 @@ def main() -> None:
     args = command_line(__doc__, "mixture.png", frames=None, skip=None, apart=5.0).parse_args()
     runs = args.runs
     for run in runs:
-        if run.names != runs[0].names or len(run.names) < 2:
-            raise RunError(f"{run.path}: needs a mixture, the same in all runs; see speeds.py")
+        if run.names != runs[0].names or len(run.names) < 2 or run.count < 3:
+            what = "needs a mixture of three disks or more, the same in all runs; see speeds.py"
+            raise RunError(f"{run.path}: {what}")
         allow(run, "its species do not come to one temperature", *SETTLED)
         tracks = [run.observable(f"{name}/kinetic_energy").value for name in run.names]
         if not any(np.ptp(track) > 1e-9 * np.max(track) for track in tracks):

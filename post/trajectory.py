@@ -54,9 +54,10 @@ def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) ->
         axes.plot(*path[0], marker="x", color=colour, zorder=4)
         axes.add_patch(Circle(path[-1], run.radius[disk], color=colour, lw=0, zorder=0.9))
     axes.set_title(
-        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])},  "
+        f"{run.parameter('run', 'title') or run.path.stem}\n{caption([run])}\n"
         f"t = {run.time[frames[0]]:.4g} (crosses) to {run.time[frames[-1]]:.4g} (disks)",
         parse_math=False,
+        pad=18,  # above what is said of a wall
     )
 
 

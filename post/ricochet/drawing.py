@@ -139,6 +139,11 @@ def aspect_of(run: Run) -> float:
     return height / width
 
 
+def lone(x: np.ndarray) -> dict:
+    """Style of a curve: a single point is not seen without a marker."""
+    return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
+
+
 def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
 

@@ -277,10 +277,7 @@ class Fields(NamedTuple):
 
 
 def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
-    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk.
-
-    All have a density: where centres can be but none was it is 0 but for one disk in one frame.
-    """
+    """Means and errors over blocks of time of all runs; NaN where fewer than two saw a disk."""
     blocks, most = blocks_of(runs, skip, cells)
     run = runs[0]
     areas = [accessible(run, cells, kind.radius) for kind in run.by_species]
@@ -294,7 +291,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
     mean, error = members.estimate(near[:, None])
     frames, disks = parts[:, :2].sum(axis=0)
     room = np.max(areas, axis=0)
-    unseen = (disks == 0) & (room > 0)
+    unseen = (disks == 0) & (room > 0)  # where there may be one
     error[0, unseen] += 1 / (frames * room)[unseen]
     turns = "angular_velocity" in run.elements
     names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}

@@ -15,15 +15,18 @@ from scipy.stats import binom
 
 import correlations
 import driven
+import energy
 import fields as fields_script
 import melting
 import rates
+import trajectory
 from driven import demon_law, fuller, noise_law
 from ricochet import Events, RunError, fields, read_run, statistics, theory
 from ricochet import cooling as cool
 from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
+from ricochet.drawing import plt
 from ricochet.nature import Refused
 from synthetic_run import ROOT, drawn, run_script, write_run, written
 from validation.estimators import force, hit_rate
@@ -424,6 +427,19 @@ def test_energy_is_kept_as_its_balance_says(simulated, tmp_path):
     assert float(row["largest_change"]) < 1e-12
 
 
+def test_single_points_are_seen_and_titles_lie_over_no_words_of_a_wall(simulated):
+    top = "&side name = 'top' temperature = 2 /"
+    run = simulated(f"{top} &species count = 2 radius = 0.1 temperature = 1 / &stop time = 1 /")
+    curves = [line for axes in energy.draw([run]).axes for line in axes.lines]
+    assert [line.get_marker() for line in curves if line.get_alpha() is None] == ["o", "o"]
+    figure, axes = plt.subplots(figsize=(5.2, 5.7))
+    trajectory.draw_paths(axes, run, [0], [0, -1])
+    figure.draw_without_rendering()
+    title = axes._left_title.get_window_extent()
+    said = [text.get_window_extent() for text in axes.texts if text.get_text()]
+    assert said and not any(map(title.overlaps, said))
+
+
 def test_an_even_gas_has_no_fuller_half(rng):
     """Nor one that remembers; where more than half stay in one half it is told."""
     noise = lfilter([1], [1, -0.9], rng.normal(scale=0.02, size=(2000, 300)))
@@ -567,6 +583,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (LOSSY | MIXED, {"mixture": "not elastic"}),
         (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
         (APART, {"mixture": "have not met"}),
+        (MIXED | {"count": 1, "packing": MIXED["packing"].replace("9", "1")}, {"mixture": "three"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
         (FALLING, dict.fromkeys(("correlations", "rates", *SETTLED[:4]), "falls")),
         (MIXED, {"correlations": "not equal disks", "equation_of_state": "not of one radius"}),
@@ -645,13 +662,11 @@ def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
 
 def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
     place = rng.uniform(0.3, 0.7, (16, 9, 2))
-    held = {"obstacles": [((0.5, 0.5), 0.5, 1)], "radius": 0.01}
-    run = written(tmp_path / "a.h5", place, rng.normal(size=place.shape), **held)
+    run = written(tmp_path / "a.h5", place, place - 0.5, obstacles=[((0.5, 0.5), 0.5, 1)])
     found = fields.fields([run], None, (2, 2)).found
-    figure = fields_script.draw_grid([run], (2, 2), found)
-    for axes in figure.axes[:2]:
-        (shown,) = (one for one in axes.collections if isinstance(one, QuadMesh))
-        assert shown.get_clip_path() and axes.patches[-1].zorder < shown.zorder
+    axes = fields_script.draw_grid([run], (2, 2), found).axes[0]
+    (shown,) = (one for one in axes.collections if isinstance(one, QuadMesh))
+    assert shown.get_clip_path() and axes.patches[-1].zorder < shown.zorder
 
 
 def test_the_area_that_centres_can_reach(tmp_path):

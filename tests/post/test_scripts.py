@@ -484,6 +484,10 @@ def test_crowded_disks_spread_upwards_and_share_their_energy(tmp_path, rng):
     expected = -excess + np.trapezoid(excess * ideal[0], h)
     np.testing.assert_allclose(dense[0] / ideal[0] - 1, expected, atol=0.006)
     assert np.trapezoid(dense[1], h) == pytest.approx(1, rel=1e-12)
+    wide = [s._replace(radius=0.1) for s in species]
+    taken = np.pi * 0.2**2 * 30 * 0.075 * 9.81 / 0.7 / (8 - 0.2)
+    assert gravity.crowding(run, wide, 0.7) == pytest.approx(taken) and taken > gravity.CROWDED
+    assert np.isnan(gravity.heights(run, wide, 0.7)[1]).all()
     e = np.linspace(0, 84, 20001)
     density = gravity.normalised(e, gravity.sharing(e, 0.7, 60))
     assert np.trapezoid(e * density, e) == pytest.approx(0.7, rel=1e-4)
