@@ -3,8 +3,8 @@
     python post/driven.py runs/heated/*.h5 -o heated.png --csv heated.csv
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
 
---show temperature: of all disks, m <(v - u)^2> / 2.  Dashed, for equal disks that noise heats in a
-periodic box: where heating and collisions balance (van Noije and Ernst 1998).
+--show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  Dashed, for equal disks
+that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998).
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.
@@ -20,6 +20,7 @@ larger.
 
 from ricochet import Run, RunError, drawing, hard_disks, theory
 from ricochet.drawing import plt
+from ricochet.nature import Refused
 from ricochet.script import command_line, launch, measured, over_runs, report
 from ricochet.statistics import Estimate, grows, series_mean, windows
 from ricochet.structure import largest_cluster
@@ -36,8 +37,11 @@ Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, 
 
 
 def temperature(run: Run) -> Curves:
-    """At the observables."""
-    return {"": run.observable("all/temperature")}
+    """At the observables, which are about the mean motion: of one disk nothing is left."""
+    if run.count < 2:
+        raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
+    time, value = run.observable("all/temperature")
+    return {"": (time, value * run.count / (run.count - 1))}
 
 
 def noise_law(run: Run) -> float | None:

@@ -410,6 +410,8 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     found = [[run.path.stem for run in group] for group in groups.values()]
     assert found == [["a", "b"], ["c"], ["d"], ["e"]]
     assert list(groups)[1] == "ξ = 0.9, bottom velocity = 0.2, drive strength = 1"
+    v, kt = runs[0].velocity[0], driven.temperature(runs[0])[""][1][0]
+    assert kt == pytest.approx(np.sum((v - v.mean(axis=0)) ** 2) / 2 / (9 - 1))
     expected = theory.demon_share(0.3 / 0.01, 9 * 0.04 / 0.46, 0.9)
     assert noise_law(runs[0]) is None, "walls take part"
     assert demon_law(runs[0]) is None, "noise takes part"
@@ -662,7 +664,8 @@ def test_cells_in_which_few_disks_were_have_no_error_of_nothing(tmp_path, rng):
 
 def test_a_map_of_a_round_container_is_drawn_in_it(tmp_path, rng):
     place = rng.uniform(0.3, 0.7, (16, 9, 2))
-    run = written(tmp_path / "a.h5", place, place - 0.5, obstacles=[((0.5, 0.5), 0.5, 1)])
+    v, held = rng.normal(size=place.shape), [((0.5, 0.5), 0.5, 1)]
+    run = written(tmp_path / "a.h5", place, v, obstacles=held)
     found = fields.fields([run], None, (2, 2)).found
     axes = fields_script.draw_grid([run], (2, 2), found).axes[0]
     (shown,) = (one for one in axes.collections if isinstance(one, QuadMesh))
