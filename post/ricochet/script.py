@@ -199,7 +199,8 @@ def recorded(run: Run, name: str) -> float:
     """A number above 0 that a run records when it has finished."""
     value = float(run.provenance.get(name, 0))
     if value <= 0:
-        raise RunError(f"{run.path}: records no {name.replace('_', ' ')}: not finished, or had none")
+        what = name.replace("_", " ")
+        raise RunError(f"{run.path}: records no {what}: not finished, or had none")
     return value
 
 
