@@ -114,7 +114,8 @@ def nature_of(
     beta = float(contact.get("tangential_restitution", -1.0))
     pairs = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
     # What may take energy counts before it has taken any, but for walls, which may not be met.
-    inelastic = len(mass) > 1 and (pairs.min() < 1 or -1 < beta < 1)
+    slips = beta > -1 and (beta < 1 or contact.get("friction") is not None)
+    inelastic = len(mass) > 1 and (pairs.min() < 1 or slips)
     found = {
         "changed": bool(parameters.get("changes")),
         "collapsed": collapsed,

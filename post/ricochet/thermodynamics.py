@@ -126,7 +126,7 @@ def conserved(run: Run) -> np.ndarray:
     if kicked or run.nature & {"obstructed", "sheared", "changed"}:
         return np.zeros(2, dtype=bool)
     kept = run.periodic & (run.gravity == 0)
-    if run.nature & {"thermal", "rough", "turning"}:  # sides may change what is along them
+    if run.nature & {"thermal", "rough", "turning", "lossy"}:  # walls may change what is along
         carried = run.mass[:, None] * run.velocity[[0, -1]]
         kept &= np.abs(np.ptp(carried.sum(axis=1), axis=0)) < ROUNDING * np.abs(carried).sum()
     return kept

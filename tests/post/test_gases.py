@@ -27,7 +27,7 @@ from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
 from ricochet.drawing import plt
-from ricochet.nature import Refused
+from ricochet.nature import Refused, nature_of
 from synthetic_run import ROOT, drawn, run_script, write_run, written
 from validation.estimators import force, hit_rate
 
@@ -87,6 +87,18 @@ def test_kt_is_of_the_momenta_that_are_free(tmp_path, rng, periodic):
     stopped = written(tmp_path / "stopped.h5", 0 * v[:1], v[:1], mass=mass, **inside)
     expected = stopped.kinetic_energy(0).mean()
     assert td.kt_at_start(stopped) == pytest.approx(expected), "an obstacle takes all"
+    if periodic == (True, False):  # walls that slow down what is along them take it, too
+        slower = np.stack([v[0] + np.array([1.0, 0.0]), v[1]])
+        parts |= {"periodic": periodic, "parameters": {"contact": {"restitution": 0.9}}}
+        run = written(tmp_path / "slower.h5", 0 * slower, slower, **parts)
+        assert not td.conserved(run).any()
+
+
+def test_disks_that_may_slip_may_lose_energy():
+    rough = {"tangential_restitution": 1.0, "inertia": 0.5}
+    for contact, there in ((rough, False), (rough | {"friction": 0.3}, True)):
+        parts = {"contact": contact}, np.ones(9), np.ones(9)
+        assert ("lossy" in nature_of(*parts, lost=0.0, turning=True, collapsed=False)) == there
 
 
 def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):

@@ -208,6 +208,10 @@ def test_mixture_has_the_means_of_maxwell(tmp_path, rng):
         assert row["K_start"] == kinetic and row["v_start"] == 1
         assert row["v_theory"] == pytest.approx(speed, abs=1e-6)
         assert row["K"] == pytest.approx(1.25, rel=0.02) and row["KS_p"] > 1e-3
+    slow = np.repeat(maxwell_velocities(rng, 40, 1000), 10, axis=0)  # speeds that last ten frames
+    parts["observables"] = {"collisions": np.arange(400) * 500}
+    run = written(tmp_path / "slow.h5", 0 * slow, slow, **parts)
+    assert 300 < mixture.independent([run], [list(range(400))], "heavy") / 500 * 10 < 700
     for speed, top in rng.uniform((0.1, 2), (2, 9), (20, 2)):  # a start at one speed
         bins = mixture.speed_bins(np.full(5, speed), top)
         one = np.searchsorted(bins, speed)
