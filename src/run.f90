@@ -242,6 +242,8 @@ contains
         eol//"dissipated_energy = "//written(sim%tally%total(dissipated))// &
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
+      if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
+      if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%evolution%alone)
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
     end associate

@@ -120,6 +120,7 @@ contains
     type(parallel_events_t) :: usual
 
     call ask(settings%run%threads, name)
+    settings%run%threads_asked = settings%run%threads
     warning = ""
     cores = cores_of_process()
     associate (threads => settings%run%threads)

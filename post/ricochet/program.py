@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -21,16 +22,20 @@ from .reader import Run, read_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
+PAUSE = 30.0  # s between two lines without a terminal
 ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """The program could not run or finish; the message is its own, `code` its exit code."""
+    """The program could not run or finish; `message` is its own, `code` its exit code.
 
-    def __init__(self, message: str, code: int):
+    `path` is that of the file with what there is of the run, None if there is nothing.
+    """
+
+    def __init__(self, message: str, code: int, path: Path | None = None):
         """The message may have several lines if the input has several mistakes."""
         super().__init__(message)
-        self.code = code
+        self.message, self.code, self.path = message, code, path
 
 
 def run(
@@ -39,28 +44,37 @@ def run(
     output: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
+    threads: int | None = None,
+    progress: bool = True,
 ) -> Run:
     """Simulate `system` and open the result.
 
     It is an input file, or its groups as in `{"species": {"count": 9, "radius": 0.1}, ...}`, with
     a list of dictionaries for a repeated group.  `overrides` are those of --set, as
-    `{"species.gas.mass": 2}`; `force` and `resume` the options of these names.  Without `output`
-    the file is a temporary one, which is there until Python ends.
+    `{"species.gas.mass": 2}`; None gives a variable its default back.  `force` and `resume` are the
+    options of these names, `threads` is run.threads.  Without `output` the file is a temporary one,
+    which is there until Python ends.  `progress` shows how far it is, on a terminal and in a
+    notebook at once, else in a line every 30 s.
     """
     program = find_program()
     work = Path(tempfile.mkdtemp(prefix="ricochet-"))
     atexit.register(shutil.rmtree, work, ignore_errors=True)
+    text = None
     if isinstance(system, Mapping):
         text, system = namelist(system), work / "input.nml"
         system.write_text(text, encoding="utf-8")
     output = work / "run.h5" if output is None else Path(output)
-    settings = [f"{name}={value_text(name, value)}" for name, value in (overrides or {}).items()]
-    command = [program, "-o", output, *(word for pair in settings for word in ("--set", pair))]
+    overrides = dict(overrides or {}) | ({"run.threads": threads} if threads else {})
+    words = [word for pair in settings_of(overrides) for word in ("--set", pair)]
+    command = [program, "-o", output, *words]
     command += ["--force"] * force + ["--resume"] * resume + ["--", system]
-    code, lines = watched(list(map(str, command)))
+    code, lines = watched(list(map(str, command)), progress)
     message = "\n".join(lines).replace(f"{work}{os.sep}", "")
     if code != 0:
-        raise ProgramError(message or f"{program} ended with exit code {code}", code)
+        part = output.with_name(f"{output.name}.part")
+        left = next((path for path in (part, output) if path.exists()), None)
+        message = named(message, text) or f"{program} ended with exit code {code}"
+        raise ProgramError(message, code, left)
     if message:
         print(message, file=sys.stderr)
     return read_run(output)
@@ -83,7 +97,7 @@ def find_program() -> str:
     raise ProgramError(f"no program ricochet {where}: {make}, or set RICOCHET to its place", 3)
 
 
-def watched(command: list[str]) -> tuple[int, list[str]]:
+def watched(command: list[str], progress: bool = True) -> tuple[int, list[str]]:
     """Run the command with a progress bar; its exit code, and its messages.
 
     If Python is interrupted, or killed, the program writes a checkpoint and ends.
@@ -95,8 +109,8 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
         tied(command), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its
     )
     os.close(its)
-    lines = []
-    show = sys.stderr.isatty() or "ipykernel" in sys.modules
+    lines, spoken = [], time.monotonic()
+    show = progress and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     look = {"bar_format": "{bar:20} {desc}", "dynamic_ncols": True, "delay": 0.5}
     try:
         with tqdm(total=100, leave=False, disable=not show, **look) as bar:
@@ -108,6 +122,9 @@ def watched(command: list[str]) -> tuple[int, list[str]]:
                 elif share:
                     bar.n = float(share[1])
                     bar.set_description_str(text)
+                    if progress and not show and time.monotonic() > spoken + PAUSE:
+                        print(text, file=sys.stderr, flush=True)
+                        spoken = time.monotonic()
     finally:
         if process.poll() is None:
             process.terminate()
@@ -155,9 +172,33 @@ def namelist(groups: Mapping[str, object]) -> str:
             lines = [
                 f"  {variable} = {value_text(f'{name}.{variable}', value)}\n"
                 for variable, value in group.items()
+                if value is not None
             ]
             text += [f"&{name}\n", *lines, "/\n"]
     return "".join(text)
+
+
+def settings_of(overrides: Mapping[str, object]) -> list[str]:
+    """GROUP.VARIABLE=VALUE of each; without a value it is the default."""
+    return [
+        f"{name}={'' if value is None else value_text(name, value)}"
+        for name, value in overrides.items()
+    ]
+
+
+def named(message: str, text: str | None) -> str:
+    """The program's lines about an input that nobody sees, with names instead of its lines."""
+
+    def place(found: re.Match) -> str:
+        before = text.splitlines()[: int(found[1] or 0)]
+        starts = [k for k, line in enumerate(before) if line.lstrip().startswith("&")]
+        own = "\n".join(text.splitlines()[starts[-1] :] if starts else [])
+        name = re.match(r"[^&]*&\w+\s[^/&]*?\bname\s*=\s*'([^']*)'", own)
+        return f"{found[2]}.{name[1]}" if name else found[2]
+
+    if text is None:
+        return message
+    return re.sub(r"^input(?:\.nml)?(?::(\d+))?: (\w+)", place, message, flags=re.MULTILINE)
 
 
 def value_text(name: str, value: object) -> str:

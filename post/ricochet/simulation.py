@@ -21,12 +21,12 @@ from typing import Self
 
 import numpy as np
 
-from .files import RunError
+from .files import RunError, did_you_mean
 from .nature import Nature, nature_of
-from .program import ProgramError, namelist, value_text
+from .program import ProgramError, named, namelist, settings_of
 
 ROOM = 100_000  # bytes for a message
-ENDLESS = b"stop.time=1e100\n"
+ENDLESS = b"stop.time=1e100"
 PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
@@ -58,9 +58,17 @@ class Simulation:
         threads: int | None = None,
     ):
         """Problems with the input raise `ProgramError`, with the program's own lines."""
-        text = namelist(system) if isinstance(system, Mapping) else read_input(system)
-        lines = [f"{name}={value_text(name, value)}\n" for name, value in (overrides or {}).items()]
-        words = text.encode(), "".join(lines).encode()
+        unseen = isinstance(system, Mapping)
+        text = namelist(system) if unseen else read_input(system)
+        try:
+            self._begin(text, settings_of(overrides or {}), threads)
+        except ProgramError as problem:
+            message = named(problem.message, text if unseen else None)
+            raise ProgramError(message, problem.code) from None
+
+    def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
+        """With overrides GROUP.VARIABLE=VALUE."""
+        words = text.encode(), "\n".join(settings).encode()
         for word in words:
             if b"\0" in word:
                 raise ValueError("an input has no zero bytes")
@@ -70,7 +78,8 @@ class Simulation:
         except ProgramError as problem:
             if not str(problem).startswith("input: stop: no rule ends the run"):
                 raise
-            words = words[0], words[1] + ENDLESS  # who steps it knows when to stop
+            settings = [*settings, ENDLESS.decode()]  # who steps it knows when to stop
+            words = words[0], "\n".join(settings).encode()
             handle = opened(engine.ricochet_open, *words, int(threads or 0))
         self._take(handle, endless=words[1].endswith(ENDLESS))
 
@@ -162,11 +171,14 @@ class Simulation:
             raise ValueError("time: nan is no time")
         if limits[0] < self.time * (1 - ROUNDING):
             raise ValueError(f"time: {time} is past; it is {self.time:.6g}")
-        going_on = True
-        while going_on:
-            with self._open() as handle:
-                going_on = called(library().ricochet_advance, handle, *limits, PATIENCE)
+        while self._go_on(limits, PATIENCE):
+            pass
         return self
+
+    def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
+        """Towards these limits for some seconds; whether they are still ahead."""
+        with self._open() as handle:
+            return called(library().ricochet_advance, handle, *limits, patience)
 
     def change(self, values: Mapping[str, object]) -> Self:
         """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
@@ -175,9 +187,11 @@ class Simulation:
         their temperatures, speeds and motions.  What this does to the total energy counts as work.
         What cannot change raises `ProgramError`, and nothing changes.
         """
-        lines = "".join(f"{name}={value_text(name, value)}\n" for name, value in values.items())
+        return self._change(settings_of(values))
+
+    def _change(self, settings: list[str]) -> Self:
         with self._open() as handle:
-            called(library().ricochet_change, handle, lines.encode())
+            called(library().ricochet_change, handle, "\n".join(settings).encode())
         return self
 
     def _text(self, what: str) -> str:
@@ -303,7 +317,7 @@ class Simulation:
         """The value of an observable now: a number, or an array of its components."""
         found = self._observed()
         if name not in found:
-            raise RunError(f"there is no observable {name}; there are {', '.join(found)}")
+            raise RunError(f"there is no observable {name}{did_you_mean(name, found)}")
         return found[name].item() if len(found[name]) == 1 else found[name]
 
     def next_events(self, most: int) -> list[tuple[float, int, int]]:

@@ -27,6 +27,7 @@ module evolution
     logical :: idle = .false.     !! nothing will ever happen again
     logical :: arrived = .false.  !! at the limit of time of the last advance, with all that happens up to it behind
     integer(int64) :: turns_left = 0       !! of those that the last advance was allowed
+    integer(int64) :: alone = 0            !! events on one core, where there are more
     integer(int32) :: last_event(2) = 0    !! disk and partner of the last event, or of the first one beyond the limit of time
   contains
     procedure :: warning

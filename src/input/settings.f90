@@ -22,6 +22,7 @@ module settings
     character(len=:), allocatable :: search           !! 'cells', 'pairs' or 'rescan'
     character(len=:), allocatable :: queue            !! 'calendar' or 'heap'
     integer :: threads                                !! 0: as the environment says; then those of the run
+    integer :: threads_asked = 1                      !! for
   end type run_settings_t
 
   !> Disks as a file has them.

@@ -184,6 +184,7 @@ contains
       events = sim%tally%events
       time = sim%time()
       call self%engine%advance(sim, goal, error, log)
+      self%alone = self%alone + sim%tally%events - events
       self%idle = self%engine%idle
       self%arrived = self%engine%arrived
       self%last_event = self%engine%last_event

@@ -115,7 +115,7 @@ def test_other_threads_of_python_run_meanwhile():
         (lambda gas: gas.advance(time=np.nan), ValueError, "nan"),
         (lambda gas: gas.advance(time="soon"), ValueError, "soon"),
         (lambda gas: gas.advance(events=None, collisions=[1]), TypeError, "int"),
-        (lambda gas: gas.observable("all/pressur"), RunError, "all/temperature"),
+        (lambda gas: gas.observable("all/temperatur"), RunError, "all/temperature"),
         (lambda gas: gas.colour, AttributeError, "colour"),
         (lambda gas: gas.next_events("x"), ValueError, "x"),
         (
