@@ -65,8 +65,8 @@ def test_what_the_program_says_names_variables_where_nobody_sees_lines(begin):
     two = [{"name": name, "count": 9, "radius": size} for name, size in (("a", 0.01), ("b", -1))]
     with pytest.raises(ProgramError, match=r'^species\.b\.radius: "-1" is out of range'):
         begin({"run": {"seed": None}, "species": two, "stop": {"time": 1}})
+    Path("gas.nml").write_text(TEXT)
     with pytest.raises(ProgramError, match=r"^\S+:3: species\.radius: is missing"):
-        Path("gas.nml").write_text(TEXT)
         begin("gas.nml", {"species.light.radius": None})
 
 
