@@ -301,7 +301,7 @@ docs:  ## pages of the source, with FORD: build/docs/index.html
 	@$(venv) -m ford --quiet --no-search --src_dir "$$PWD/src" --output_dir "$$(realpath $(BUILD))/docs" --config \
 	  'project = "Ricochet"; preprocess = false; display = ["public", "private"]; print_creation_date = false' src/README.md
 
-install: $(if $(wildcard $(BUILD)/ricochet),,all)  ## for all users (PREFIX=, DESTDIR=); uninstall; dist: tarball
+install: $(if $(wildcard $(BUILD)/ricochet),,all library)  ## for all users (PREFIX=, DESTDIR=); uninstall; dist: tarball
 install uninstall dist: export BUILD := $(BUILD)
 install uninstall dist: export DESTDIR := $(DESTDIR)
 install uninstall dist: export PREFIX := $(PREFIX)

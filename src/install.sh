@@ -12,18 +12,27 @@ shared=share/ricochet
 list=$shared/installed
 documents=share/doc/ricochet
 manuals=share/man/man1
+version=$(sed -n 's/.*program_version = "\(.*\)"/\1/p' src/base/version.f90)
+module=share/modulefiles/ricochet/$version
+package=$shared/post/ricochet
 completions=share/bash-completion/completions
 
-# What stands behind each name: a file, or "-> PLACE" for a link; nothing where the manual page is made.
+# What stands behind each name: a file, or "-> PLACE" for a link; nothing where it is made here.
 declare -A behind
 plan() {
   local text command
   behind=([bin/ricochet]=$build/ricochet [bin/ricochet-ensemble]=runs/ensemble.sh
     [$completions/ricochet]=docs/ricochet-completion.bash [$completions/ricochet-ensemble]='-> ricochet'
-    [$manuals/ricochet.1]='' [$manuals/ricochet-ensemble.1]='' [$shared/post/requirements.txt]=requirements.txt)
+    [$manuals/ricochet.1]='' [$manuals/ricochet-ensemble.1]='' [$module]='' [include/ricochet.h]=src/ricochet.h
+    [$shared/post/requirements.txt]=requirements.txt)
   for text in LICENSE README.md CHANGELOG.md CITATION.cff docs/*.{md,png,ipynb}; do behind[$documents/$text]=$text; done
   behind[$documents/input]="-> ../../ricochet/input" # pages lead there
   for text in input/* post/*.* post/ricochet/*.* post/page/*.*; do behind[$shared/$text]=$text; done
+  for text in libricochet.so libricochet_files.so; do
+    [[ -e $build/$text ]] || continue # made by make library
+    behind[$package/lib/$text]=$build/$text
+    behind[lib/$text]="-> ../$package/lib/$text"
+  done
   for text in post/*.py; do
     command=ricochet-$(basename "$text" .py)
     behind[bin/${command//_/-}]="-> ../$shared/post/ricochet/commands.py"
@@ -85,9 +94,21 @@ install)
     python3 -B docs/manual_page.py "$root/bin/$command" "$PREFIX" >"$root/$manuals/$command.1" ||
       give_up 'python3 is needed for the manual pages'
   done
+  mkdir -p "$root/${module%/*}"
+  cat >"$root/$module" <<MODULE
+#%Module1.0
+module-whatis "Ricochet $version: event-driven simulation of hard disks"
+conflict ricochet
+prepend-path PATH $PREFIX/bin
+prepend-path MANPATH $PREFIX/share/man
+prepend-path PYTHONPATH $PREFIX/$shared/post
+MODULE
   comm -23 <(echo "$before") <(echo "$now") | remove # files of an earlier version
   echo "$now" >"$root/$list"
   echo "installed: $root/bin/ricochet; ricochet-player and the other scripts; inputs in $root/$shared; pages in $root/$documents; man ricochet"
+  if [[ $PREFIX != "$HOME"/* ]] && grep -q -e '-march=native' "$build/flags" 2>/dev/null; then
+    echo "install: $build/ricochet is for processors like the one of this machine; for all: make ARCH=x86-64-v3 all library install" >&2
+  fi
   ;;
 uninstall)
   [[ -e $root/$list ]] || give_up "$root/$list, the list of what was installed, is not there: nothing is removed"
@@ -96,7 +117,7 @@ uninstall)
   printf '%s\n' "$names" "$list" | remove
   ;;
 dist)
-  name=ricochet-$(sed -n 's/.*program_version = "\(.*\)"/\1/p' src/base/version.f90)
+  name=ricochet-$version
   git rev-parse --show-toplevel 2>/dev/null | grep -qx "$(pwd -P)" || give_up 'only a git clone can make a release'
   [[ -z $(git status --porcelain) ]] || give_up 'commit your changes first: a release holds what is committed'
   mkdir -p "$build"

@@ -153,6 +153,32 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_p
     assert done.returncode == 0 and "--no-open" in done.stdout, done.stderr
 
 
+def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
+    """By what the modulefile sets: a program in C, and the package."""
+    (module,) = (installed / "share/modulefiles/ricochet").iterdir()
+    told = dict(re.findall(r"^prepend-path (\w+) (\S+)$", module.read_text(), re.MULTILINE))
+    assert module.read_text().startswith("#%Module") and told["PATH"] == "/usr/bin"
+    assert (installed / "lib/libricochet.so").exists()
+    assert (installed / "include/ricochet.h").exists()
+    place = told["PYTHONPATH"].replace("/usr", str(installed), 1)
+    code = "import ricochet; print(ricochet.Simulation('&species radius = .1 count = 2 /').count)"
+    own = environment(PYTHONPATH=place)
+    done = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
+    assert (done.returncode, done.stdout.strip()) == (0, "2"), done.stderr
+
+
+def test_who_installs_for_others_is_told_that_the_program_is_for_this_processor(tmp_path, program):
+    build = tmp_path / "build"
+    build.mkdir()
+    shutil.copy(program, build)
+    place = [f"BUILD={build}", f"PREFIX={tmp_path}/usr"]
+    for flags, said in (("-march=native", True), ("-march=x86-64-v3", False)):
+        (build / "flags").write_text(f"gfortran -O2 {flags}\n")
+        done = make("install", *place)
+        assert done.returncode == 0
+        assert ("ARCH=x86-64-v3" in done.stderr) == said and len(done.stderr.splitlines()) == said
+
+
 def test_only_what_was_installed_goes(tmp_path):
     """Another program stays; so do runs, notes and folders of users, from install to uninstall."""
     prefix = tmp_path / "it's a folder"

@@ -1,0 +1,29 @@
+# Spack: put it into packages/ricochet/ of a repository of yours, with the address of this project as `git`. Not tried here.
+from spack.package import *
+
+
+class Ricochet(MakefilePackage):
+    """Event-driven simulation of hard disks."""
+
+    git = "ADDRESS OF THE PROJECT"
+    license("MIT")
+    version("main", branch="main")
+
+    variant("python", default=True, description="scripts and the package ricochet")
+
+    depends_on("c", type="build")
+    depends_on("fortran", type="build")
+    depends_on("gmake", type="build")
+    depends_on("hdf5@1.10: +fortran ~mpi")
+    depends_on("python@3.11:", type=("build", "run"))
+    for package in ("py-numpy", "py-scipy", "py-h5py", "py-matplotlib@3.9:", "py-tqdm", "py-aiohttp"):
+        depends_on(package, type="run", when="+python")
+
+    requires("%fortran=gcc@12:", msg="built and tested with gfortran")
+
+    def build(self, spec, prefix):
+        # Spack's compiler wrapper adds the flags of the target; our own are for this processor.
+        make("ARCH=x86-64", "all", "library")
+
+    def install(self, spec, prefix):
+        make(f"PREFIX={prefix}", "install")
