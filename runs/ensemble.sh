@@ -26,13 +26,16 @@ running:
            slurm         a Slurm job array, -j N members at a time in all; sbatch takes its options
                          from the environment: SBATCH_TIMELIMIT, SBATCH_PARTITION, ...
            parallel      GNU parallel, -j N members at a time on each host
+  --tasks N              of the array at most: they share the members [10 for each of -j N, and what
+                         the site allows]
+  --retry                submit members that failed to Slurm once more
   --sshloginfile FILE    hosts for GNU parallel, as in its manual [this machine]
   --share K/M            of M parts of the list the K-th (what the engines start elsewhere)
   -h, --help
 
 Member NAME writes FOLDER/NAME.h5 and FOLDER/NAME.log.  The same command again goes on: a member
 with NAME.h5 is finished and left out, one with NAME.h5.part resumes, one that broke off or failed
-is tried again.  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
+is tried again (by Slurm only with --retry).  TERM or Ctrl-C stops all members after a checkpoint.  Copies of the command on one folder
 share the work.  The program is what RICOCHET names, or ricochet beside this command (in a clone
 build/ricochet).  All machines need the same folders.
 
@@ -45,7 +48,7 @@ TEXT
 fail() {
   local code=$1
   shift
-  printf '%s: %s\n' "$me" "${*//[[:cntrl:]]/?}" >&2
+  if [[ -n ${task:-} ]]; then tell "$me" "${*//[[:cntrl:]]/?}"; else printf '%s: %s\n' "$me" "${*//[[:cntrl:]]/?}" >&2; fi
   exit "$code"
 }
 
@@ -167,15 +170,24 @@ put() {
 # What member NAME has said last.
 last_words() { ! may_be_ours "$folder/$1.log" || tail -n 1 -- "$folder/$1.log" 2>/dev/null || true; }
 
+goes_on='^(stopped .*|killed by signal .*|.*--resume goes on.*|)$' # what one that has not failed says last
+
 # Does member NAME have data, finished or to go on from? One that broke off has said why.
-has_data() {
-  [[ -e $folder/$1.h5 ]] ||
-    [[ -e $folder/$1.h5.part && $(last_words "$1") =~ ^(stopped .*|.*--resume goes on.*|)$ ]]
+has_data() { [[ -e $folder/$1.h5 || -e $folder/$1.h5.part && $(last_words "$1") =~ $goes_on ]]; }
+
+has_failed() { [[ ! -e $folder/$1.h5 && ! $(last_words "$1") =~ $goes_on ]]; }
+
+# What member NAME has said of an attempt before says nothing of the next.
+forget_failure() {
+  local lock
+  has_failed "$1" && open_log "$folder/$1.log" || return 0
+  echo >&"$lock"
+  exec {lock}>&-
 }
 
 # Members of an earlier command on the folder must mean the same: results are told apart by name.
 remember() {
-  local line name k door='' changed=''
+  local line name k door='' changed='' mended=''
   local -A before=() linked=()
   if { exec {door}<"$folder"; } 2>/dev/null; then # one command at a time, where folders have locks
     flock -w 60 -E 75 "$door" 2>/dev/null || (($? != 75)) ||
@@ -191,6 +203,7 @@ remember() {
   if [[ -e $folder/input.nml ]] && ! cmp -s -- "$input" "$folder/input.nml"; then
     [[ -e $folder/manifest.txt ]] ||
       fail 3 "$folder/input.nml is not of an ensemble: choose another folder"
+    mended=1
     for name in "${!before[@]}"; do
       ! has_data "${name#x}" ||
         die "$folder holds members of another input, or of $input before a change (see $folder/input.nml):" \
@@ -207,6 +220,7 @@ remember() {
         "choose another folder or name"
     fi
     [[ ${before[x$name]-none} == "${overrides[k]}" ]] || changed=1
+    [[ -z $mended && ${before[x$name]-${overrides[k]}} == "${overrides[k]}" ]] || forget_failure "$name"
     before[x$name]=${overrides[k]}
   done
   cmp -s -- "$input" "$folder/input.nml" || put "$folder/input.nml" <"$input"
@@ -218,15 +232,22 @@ remember() {
 
 # --- workers ---
 
-# Run member k; what became of it goes through the pipe to the parent.
-run_member() {
-  local base=$folder/${names[$1]} rest=${overrides[$1]} status resume=
-  local arguments=("$input" -o "$base.h5" --quiet)
+# The overrides of member k behind what is in `arguments`.
+add_overrides() {
+  local rest=${overrides[$1]}
   while [[ $rest == '--set '* ]]; do
     rest=${rest#--set }
     arguments+=(--set "${rest%% --set *}")
     if [[ $rest == *' --set '* ]]; then rest="--set ${rest#* --set }"; else rest=; fi
   done
+}
+
+# Run member k; what became of it goes through the pipe to the parent.
+run_member() {
+  local base=$folder/${names[$1]} status resume=
+  local arguments=("$input" -o "$base.h5" --quiet)
+  add_overrides "$1"
+  [[ -z $(last_words "${names[$1]}") ]] || echo >&"$lock" # of an attempt before
   [[ ! -e $base.h5.part ]] || resume=--resume
   while :; do
     "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
@@ -234,7 +255,7 @@ run_member() {
     [[ -z $stopping ]] || kill -TERM "$child" 2>/dev/null || true # the signal came before
     while :; do # `wait` also ends when a signal comes
       interrupted='' status=0
-      wait "$child" || status=$?
+      wait "$child" 2>/dev/null || status=$? # without bash's word on a kill
       [[ -n $interrupted && ($status == 143 || $status == 130) ]] || break
     done
     child=
@@ -243,6 +264,8 @@ run_member() {
   done
   # Stopped while it started, or while bash waited for it a second time (-1: it has lost the status).
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
+  ((status <= 128)) || printf 'killed by signal %d%s, %(%FT%T%z)T on %s\n' "$((status - 128))" \
+    "$([[ $status != 137 ]] || echo ' (out of memory?)')" -1 "$host" >&"$lock"
   printf '%s %s\n' "$1" "$status" >&"$events"
 }
 
@@ -270,7 +293,10 @@ work() {
       printf '%s busy\n' "$k" >&"$events"
     elif [[ -e $base.h5 ]]; then
       printf '%s 0\n' "$k" >&"$events"
+    elif [[ -n $share ]] && has_failed "${names[k]}"; then
+      printf '%s failed before\n' "$k" >&"$events" # as this task was requeued
     else
+      tell "${names[k]}" "$([[ -e $base.h5.part ]] && echo 'goes on' || echo begins)"
       run_member "$k"
     fi
     exec {lock}>&-
@@ -289,7 +315,13 @@ clock() {
   fi
 }
 
+# MEMBER TEXT: a line of a share, which must tell by itself who, when and where.
+tell() {
+  [[ -z $task ]] || printf '%(%FT%T%z)T %s %s %s: %s\n' -1 "$task" "$host" "$1" "$2" >&2
+}
+
 show_progress() {
+  [[ -z $share ]] || return 0
   local now=$SECONDS done_now=$((finished - skipped)) left=$((total - finished - failed)) line
   line="$finished/$total members finished, $failed failed, $(clock "$now")"
   if ((done_now > 0 && left > 0)); then line+=", ETA $(clock $((now * left / done_now)))"; fi
@@ -340,46 +372,52 @@ run_all() {
 count_reply() {
   case $2 in
   ends) ended=$((ended + 1)) ;;
-  0) finished=$((finished + 1)) ;;
-  75) ;;
-  busy) busy=$((busy + 1)) ;;
-  closed) failure "${names[$1]}" "cannot write $folder/${names[$1]}.log" ;;
-  *) failure "${names[$1]} (exit $2)" "$(tail -n 1 -- "$folder/${names[$1]}.log")" ;;
+  0) finished=$((finished + 1)) && tell "${names[$1]}" finished ;;
+  75) tell "${names[$1]}" "$(last_words "${names[$1]}")" ;;
+  busy) busy=$((busy + 1)) && tell "${names[$1]}" 'is run by another copy' ;;
+  closed) failure "${names[$1]}" '' "cannot write $folder/${names[$1]}.log" ;;
+  'failed before') failure "${names[$1]}" '' "$(last_words "${names[$1]}")" ;;
+  *) failure "${names[$1]}" " (exit $2)" "$(last_words "${names[$1]}")" ;;
   esac
 }
 
-# WHO WHY
+# WHO HOW WHY
 failure() {
   failed=$((failed + 1))
-  failures+=("$1: ${2:-no message in its log}")
+  failures+=("$1$2: ${3:-no message in its log}")
+  tell "$1" "failed$2: ${3:-no message in its log}"
+}
+
+# TEXT of what has come before; a share has told all.
+announce() {
+  [[ -z $share ]] || return 0
+  printf '%s: %s%d of %d members finished' "$folder" "$1" "$finished" "$total" >&2
+  ((skipped == 0)) || printf ', %d of them before' "$skipped" >&2
+  printf ', %d failed, %s\n' "$failed" "$(clock "$SECONDS")" >&2
+  ((failed == 0)) || printf '  failed: %s\n' "${failures[@]}" >&2
 }
 
 summarise() {
-  local failure
   finished=0
   for name in "${names[@]}"; do [[ ! -e $folder/$name.h5 ]] || finished=$((finished + 1)); done
-  printf '%s: %d of %d members finished' "$folder" "$finished" "$total" >&2
-  ((skipped == 0)) || printf ', %d of them before' "$skipped" >&2
-  printf ', %d failed, %s\n' "$failed" "$(clock "$SECONDS")" >&2
-  for failure in "${failures[@]}"; do printf '  failed: %s\n' "$failure" >&2; done
+  announce "$1"
   ((failed == 0)) || exit 1
-  if ((finished < total)); then
-    if ((busy > 0)); then printf '  %d are run by another copy\n' "$busy" >&2; fi
-    printf '  %sthe same command goes on with the rest\n' "${stopped:+stopped: }" >&2
-    exit 75
-  fi
+  ((finished < total)) || return 0
+  [[ -n $share ]] || ((busy == 0)) || printf '  %d are run by another copy\n' "$busy" >&2
+  [[ -n $share ]] || printf '  %sthe same command goes on with the rest\n' "${stopped:+stopped: }" >&2
+  exit 75
 }
 
 # --- engines: the same script, with one share of the members, started elsewhere ---
 
-# Fills `share_command`, which lacks only K/M, and `shares`, M: no more than Slurm allows in an array.
+# Fills `share_command`, which lacks only K/M, and `shares`, M: at most so many. A member that failed has no share.
 prepare_shares() {
-  local most=1000 k here left=0
+  local most=$1 k here left=0
   here=$(cd -- "$folder" && pwd)
   for k in "${!names[@]}"; do
-    [[ -e $folder/${names[k]}.h5 ]] || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
+    [[ -e $folder/${names[k]}.h5 ]] || has_failed "${names[k]}" || printf '%s\t%s\n' "${names[k]}" "${overrides[k]}"
   done | put "$folder/left.txt" || exit 3
-  left=$((total - finished))
+  left=$(wc -l <"$folder/left.txt")
   shares=$((left < most ? left : most))
   share_command=(env "RICOCHET=$(realpath -- "$program")" bash "$script" "$here/input.nml" -d "$here"
     --manifest "$here/left.txt" -j 1 --share)
@@ -387,9 +425,10 @@ prepare_shares() {
 
 # What became of the members shows in their files.
 judge_by_files() {
-  local name
+  local name said=''
   for name in "${names[@]}"; do
-    has_data "$name" || [[ -z $(last_words "$name") ]] || failure "$name" "$(last_words "$name")"
+    [[ -e $folder/$name.h5 ]] || said=$(last_words "$name")
+    [[ -e $folder/$name.h5 || $said =~ $goes_on && $said != killed* ]] || failure "$name" '' "$said"
   done
 }
 
@@ -398,7 +437,8 @@ judge_by_files() {
 run_parallel() {
   local options=(--will-cite -j "$jobs" --termseq 'TERM,600000') child=''
   command -v parallel >/dev/null || die "--engine parallel needs GNU parallel (package parallel)"
-  prepare_shares
+  for name in "${names[@]}"; do forget_failure "$name"; done
+  prepare_shares 1000
   put "$folder/parallel.log" </dev/null
   [[ -z $hosts ]] || options+=(--sshloginfile "$hosts" --workdir "$PWD")
   [[ ! -t 2 ]] || options+=(--bar)
@@ -409,6 +449,21 @@ run_parallel() {
   while kill -0 "$child" 2>/dev/null; do wait "$child" || true; done
   [[ -z $stopped ]] || wait_for_locks
   judge_by_files
+}
+
+# What no member could begin with fails before any waits in the queue; of those that differ by their seed one is tried.
+check_inputs() {
+  local k kind reason arguments
+  local -A seen=()
+  for k in "${!names[@]}"; do
+    kind="x${overrides[k]} "
+    while [[ $kind =~ ^(.*)'--set run.seed='[^\ ]*' '(.*)$ ]]; do kind=${BASH_REMATCH[1]}${BASH_REMATCH[2]}; done
+    if [[ -n ${seen[$kind]:-} || -e $folder/${names[k]}.h5 ]] || has_failed "${names[k]}"; then continue; fi
+    seen[$kind]=1 arguments=("$input" --check --quiet)
+    add_overrides "$k"
+    reason=$("$program" "${arguments[@]}" 2>&1 </dev/null) || failure "${names[k]}" " (exit $?)" "${reason##*$'\n'}"
+  done
+  ((failed == 0)) || summarise 'nothing is submitted: mend what failed, or leave it out: '
 }
 
 # Members on other machines end a moment after the connection to them has.
@@ -423,33 +478,40 @@ wait_for_locks() {
 # The array's tasks send TERM on to the members; a task whose time is over, and that nobody has
 # cancelled, goes back into the queue.
 submit_to_slurm() {
-  local id='' here task
+  local id='' here text site
   command -v sbatch >/dev/null || die "--engine slurm needs Slurm (no sbatch here)"
   here=$(cd -- "$folder" && pwd)
   check_ordinary "$folder/slurm.job"
   [[ ! -s $folder/slurm.job ]] || id=$(<"$folder/slurm.job")
   if [[ -n $id && -n $(squeue --noheader --array --jobs "$id" 2>/dev/null || true) ]]; then
-    printf '%s: Slurm job %s goes on: %d of %d members finished\n' "$folder" "$id" "$finished" "$total" >&2
+    judge_by_files
+    announce "Slurm job $id goes on: "
     exit 75
   fi
-  prepare_shares
+  [[ -z $retry ]] || for name in "${names[@]}"; do forget_failure "$name"; done
+  check_inputs
+  judge_by_files
+  site=$(scontrol show config 2>/dev/null | awk '$1 == "MaxArraySize" { print $3 - 1 }' || true) # the highest number
+  [[ $site =~ ^[1-9][0-9]*$ ]] || site=1000
+  : "${tasks:=$((10*jobs))}"
+  prepare_shares "$((tasks < site ? tasks : site))"
+  ((shares > 0)) || summarise 'only --retry goes on: '
   check_ordinary "$folder/slurm.log"
-  task="#!/usr/bin/env bash
+  text="#!/usr/bin/env bash
 trap 'stopped=1; [[ -z \$child ]] || kill -TERM \$child' TERM
 stopped='' child=''
 $(printf '%q ' "${share_command[@]}")\$SLURM_ARRAY_TASK_ID/$shares & child=\$!
 [[ -z \$stopped ]] || kill -TERM \$child
 status=143
 while kill -0 \$child 2>/dev/null; do status=0; wait \$child || status=\$?; done
-if ((status == 75)) && [[ \$(squeue --noheader --format=%T --jobs=\$SLURM_JOB_ID) == RUNNING ]]; then
+if [[ \$status == 75 || -n \$stopped && \$status != 0 ]] && [[ \$(squeue --noheader --format=%T --jobs=\$SLURM_JOB_ID) == RUNNING ]]; then
   scontrol requeue \$SLURM_JOB_ID
 fi
 exit \$status"
   id=$(sbatch --parsable --array="1-$shares%$jobs" --requeue --signal=B:TERM@60 --open-mode=append \
-    --job-name="${here##*/}" --output="$here/slurm.log" <<<"$task") || die "sbatch refused the job"
+    --job-name="${here##*/}" --output="$here/slurm.log" <<<"$text") || die "sbatch refused the job"
   put "$folder/slurm.job" <<<"${id%%;*}"
-  printf '%s: Slurm job %s submitted, %d of %d members finished before\n' \
-    "$folder" "${id%%;*}" "$finished" "$total" >&2
+  announce "Slurm job ${id%%;*} submitted, "
   printf '  the same command says how far it is\n' >&2
   exit 75
 }
@@ -459,16 +521,17 @@ exit \$status"
 trap 'fail 75 "stopped before any member ran"' TERM INT
 unset CDPATH
 script=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)/${BASH_SOURCE[0]##*/}
-input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' jobs=$(nproc 2>/dev/null || echo 1)
-common='' scans=()
+input='' folder='' seeds='' manifest='' engine=pool hosts='' share='' dry='' tasks='' retry='' task='' jobs=$(nproc 2>/dev/null || echo 1)
+common='' scans=() host=$(uname -n)
 for word; do [[ $word != *[[:cntrl:]]* ]] || die "'$word' holds control characters"; done
 while (($#)); do
   case $1 in
   -h | --help) usage && exit 0 ;;
   --dry-run) dry=1 && shift && continue ;;
-  -d | -j | --seeds | --scan | --set | --manifest | --engine | --sshloginfile | --share) (($# > 1)) || die "$1 needs a value" ;;
+  --retry) retry=1 && shift && continue ;;
+  -d | -j | --seeds | --scan | --set | --manifest | --engine | --tasks | --sshloginfile | --share) (($# > 1)) || die "$1 needs a value" ;;
   -*)
-    near=$(nearest "$1" --seeds --scan --set --manifest --engine --sshloginfile --share --dry-run --help)
+    near=$(nearest "$1" --seeds --scan --set --manifest --engine --tasks --retry --sshloginfile --share --dry-run --help)
     die "unknown option $1${near:-, see --help}"
     ;;
   *)
@@ -484,6 +547,7 @@ while (($#)); do
   --set) common+="${common:+ }--set $2" ;;
   --manifest) manifest=$2 ;;
   --engine) engine=$2 ;;
+  --tasks) tasks=$2 ;;
   --sshloginfile) hosts=$2 ;;
   --share) share=$2 ;;
   esac
@@ -496,6 +560,8 @@ done
 [[ $folder != -* ]] || folder=./$folder
 [[ $jobs =~ ^[1-9][0-9]{0,5}$ ]] || die "-j $jobs: not a number of members"
 [[ $engine =~ ^(pool|slurm|parallel)$ ]] || die "--engine $engine: pool, slurm or parallel"
+[[ $tasks =~ ^(|[1-9][0-9]{0,5})$ ]] || die "--tasks $tasks: not a number of tasks"
+[[ -z $tasks$retry || $engine == slurm ]] || die "--tasks and --retry go with --engine slurm"
 [[ -z $hosts || $engine == parallel ]] || die "--sshloginfile goes with --engine parallel"
 [[ -z $hosts || -f $hosts && -r $hosts ]] || die "cannot read $hosts, or it is not an ordinary file"
 [[ $share =~ ^(|[1-9][0-9]{0,8}/[1-9][0-9]{0,8})$ ]] || die "--share $share: write K/M, such as 2/10"
@@ -516,6 +582,8 @@ done
 
 # Of M shares the K-th: members K, K + M, K + 2M, ...
 if [[ -n $share ]]; then
+  task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID:-}}
+  task=${task:-share $share}
   for k in "${!names[@]}"; do
     (((k + 1 - ${share%/*}) % ${share#*/} == 0)) || unset "names[k]" "overrides[k]"
   done
@@ -549,4 +617,4 @@ if ((finished < total)); then
   slurm) submit_to_slurm ;;
   esac
 fi
-summarise
+summarise ''

@@ -12,7 +12,9 @@ import fcntl
 import itertools
 import os
 import re
+import signal
 import subprocess
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -26,7 +28,7 @@ from .simulation import Simulation, read_input
 
 BROKE_OFF = ": its run broke off "
 AT_WORK: set[subprocess.Popen] = set()
-GOES_ON = re.compile(r"(stopped.*|.*--resume goes on.*|.*: its run broke off .*|)")
+GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
 
 
 def sweep(
@@ -110,7 +112,7 @@ def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
     before = read_manifest(folder)
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
-    data = {name for name in before if any(files_of(folder, name))}
+    data = {name for name in before if any(files_of(folder, name)) and not failed(folder, name)}
     if old != text and data:
         raise RunError(
             f"{folder}: holds members of another input (see {path}); choose another folder"
@@ -148,6 +150,8 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         finished, unfinished = files_of(folder, name)
         if finished:
             return 0
+        if last_words(folder, name):
+            print(file=log, flush=True)  # that was of an attempt before
         words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
         output = ["-o", folder / f"{name}.h5", "--quiet", *words]
         command = [find_program(), folder / "input.nml", *output]
@@ -156,6 +160,10 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         code = finished_with([*command, *["--resume"] * bool(unfinished)], **pipes)
         if unfinished and BROKE_OFF in last_words(folder, name):
             code = finished_with(command, **pipes)  # it starts over
+        if code < 0:
+            memory = " (out of memory?)" * (-code == signal.SIGKILL)
+            moment = time.strftime("%FT%T%z")
+            print(f"killed by signal {-code}{memory}, {moment} on {os.uname().nodename}", file=log)
         return code
 
 
@@ -181,6 +189,12 @@ def last_words(folder: Path, name: str) -> str:
     path = folder / f"{name}.log"
     lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
     return lines[-1] if lines else ""
+
+
+def failed(folder: Path, name: str) -> bool:
+    """Whether a member has said why it cannot go on."""
+    words = last_words(folder, name)
+    return not (files_of(folder, name)[0] or GOES_ON.fullmatch(words))
 
 
 # --- the table ---
@@ -226,8 +240,7 @@ def row_of(folder: Path, name: str, overrides: str) -> dict:
     said = last_words(folder, name)
     row |= {"seed": row.get("run.seed"), "state": "finished", "reason": "", "wall_time": np.nan}
     if not finished:
-        goes_on = GOES_ON.fullmatch(said) and BROKE_OFF not in said
-        row["state"] = "unfinished" if goes_on else "failed"
+        row["state"] = "failed" if failed(folder, name) else "unfinished"
         row["reason"] = said or ("" if unfinished else "has not begun")
     path = finished or unfinished
     if path:

@@ -6,6 +6,7 @@ With the program itself: neither faults nor the order of the work show in the re
 import contextlib
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -22,20 +23,25 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
 # Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
-# `outcome.exit=N` fails with N; after 4 it has broken off, and does not resume.
+# `outcome.exit=N` fails with N, 2 with --check, too; after 4 it has broken off, and does not resume.
+# 9 is a kill.
 PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
   --set) sets+="$2|" && [[ $2 != outcome.exit=* ]] || outcome=${2#*=} && shift ;;
   --resume) resumed=resumed ;;
+  --check) check=check ;;
   esac
   shift
 done
+[[ -z ${check:-} || ${outcome:-} == 2 ]] || exit 0
+out=${out:-$1.check}
 trap 'echo TERM >>"$out.signals"; touch "$out.h5.part"; exit 75' TERM INT
 echo "${resumed:-anew} $sets" >>"$out.starts"
 [[ -z ${resumed:-} || ! -e $out.broken ]] ||
   { echo "$out.h5.part: its run broke off and cannot go on" >&2; exit 3; }
 [[ ${outcome:-} != 4 ]] || touch "$out.h5.part" "$out.broken"
+[[ ${outcome:-} != 9 ]] || { touch "$out.h5.part"; kill -9 $$; }
 [[ -z ${outcome:-} ]] || { echo "reason of the failure" >&2; exit "$outcome"; }
 while [[ -e ${HOLD:-} ]]; do sleep 0.05; done
 rm -f -- "$out.h5.part"
@@ -206,6 +212,85 @@ def test_a_signal_reaches_each_member_once_and_the_command_goes_on(lab, how):
     )
 
 
+# A cluster that runs all tasks of an array at once, two at most.
+SLURM = {
+    "sbatch": """echo 1 >>"$LAB/jobs"
+for word; do
+  case $word in
+  --array=*) range=${word#*=1-} && range=${range%%%*} ;;
+  --output=*) output=${word#*=} ;;
+  esac
+done
+cat >"$LAB/task"
+echo "$range" >"$LAB/array"
+for ((k = 1; k <= range; k++)); do
+  SLURM_ARRAY_JOB_ID=7 SLURM_ARRAY_TASK_ID=$k SLURM_JOB_ID=7 bash "$LAB/task" >>"$output" 2>&1
+  echo "$?" >>"$LAB/codes"
+done
+echo 7
+""",
+    "scontrol": """echo "MaxArraySize            = 3"
+""",
+    "squeue": "",
+}
+
+
+@pytest.fixture
+def slurm(lab):
+    """`slurm(*options)`: what the script says of an ensemble on a cluster."""
+    (lab / "bin").mkdir()
+    for name, text in SLURM.items():
+        executable(lab / "bin" / name, text, "bash")
+    path = f"{lab}/bin:{os.environ['PATH']}"
+
+    def run(*options):
+        return ensemble(lab, "--engine", "slurm", *options, PATH=path, LAB=lab)
+
+    return run
+
+
+def lines_of(path) -> list[str]:
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
+    """A member that was killed goes on, one that failed does only with --retry, or mended."""
+    manifest = lab / "members.txt"
+    manifest.write_text("a\nb\t--set outcome.exit=4\nc\t--set outcome.exit=9\n")
+    members = ("--manifest", str(manifest))
+    assert slurm(*members).returncode == 75 and lines_of(lab / "codes") == ["1", "1"]
+    again = slurm(*members)
+    assert again.returncode == 75 and "1 of 3 members finished, 1 of them before, 2 failed" in again.stderr
+    assert "failed: b: reason of the failure" in again.stderr
+    assert "failed: c: killed by signal 9 (out of memory?), " in again.stderr
+    assert [len(starts(lab)[name]) for name in "abc"] == [1, 1, 2]
+    manifest.write_text("a\nb\t--set outcome.exit=4\n")
+    for options, code, times in (((), 1, 1), (("--retry",), 75, 3), ((), 1, 3)):
+        assert slurm(*members, *options).returncode == code
+        assert len(starts(lab)["b"]) == times
+    assert len(lines_of(lab / "jobs")) == 3
+    host = os.uname().nodename
+    line = re.compile(rf"\d{{4}}-\d\d-\d\dT[\d:]{{8}}[+-]\d{{4}} 7_[12] {host} [abc]: \S.*")
+    said = lines_of(lab / "out" / "slurm.log")
+    assert said and all(map(line.fullmatch, said)), said
+    manifest.write_text("b\t--set run.seed=1\n")
+    assert slurm(*members).returncode == 75 and slurm(*members).returncode == 0
+
+
+def test_nothing_is_submitted_with_a_member_whose_input_is_bad(lab, slurm):
+    told = slurm("--scan", "outcome.exit=75,2", "--seeds", "1-3")
+    assert told.returncode == 1 and "nothing is submitted" in told.stderr
+    assert "failed: exit_2_seed_1 (exit 2): reason of the failure" in told.stderr
+    assert "1 failed" in told.stderr and not lines_of(lab / "jobs")
+
+
+@pytest.mark.parametrize(("options", "tasks"), [((), 2), (("--tasks", "1"), 1)])
+def test_members_share_tasks_and_the_site_has_numbers_for_them(lab, slurm, options, tasks):
+    assert slurm("--seeds", "1-5", *options).returncode == 75
+    assert lines_of(lab / "array") == [str(tasks)]
+    assert slurm("--seeds", "1-5").returncode == 0 and len(starts(lab)) == 5
+
+
 # Read by a shell at its start: TERM comes just before the command MOMENT, or the MOMENTth one of a
 # shell. One that meets a worker goes to the launcher as well.
 AT_A_COMMAND = """if [[ $0 == */ensemble.sh ]]; then
@@ -312,6 +397,7 @@ def test_settings_of_a_failed_member_may_be_mended(lab):
         (["--seeds", "1", "--engine", "cloud"], "--engine cloud: pool, slurm or parallel"),
         (["--seeds", "1", "--sshloginfile", "hosts"], "goes with --engine parallel"),
         (["--seeds", "1", "--share", "0/3"], "--share 0/3: write K/M"),
+        (["--seeds", "1", "--retry"], "go with --engine slurm"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(lab, options, message):

@@ -1,6 +1,7 @@
 """Ensembles from Python: each goes on with what the script has left, and tells what there is."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 
 from ricochet import ProgramError, RunError, ensemble, sweep
 from ricochet.ensembles import typed
-from whole_runs import ran
+from whole_runs import executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
 GAS = """&box boundary = 'wall', 'wall' /
@@ -69,6 +70,24 @@ def test_members_that_did_not_finish_say_why(tmp_path):
     told = ran(*command, check=True)
     assert "3 members: 2 failed, 1 unfinished" in told.stderr
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 4
+
+
+def test_a_member_that_was_killed_says_so_and_one_that_failed_may_be_mended(
+    program, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("RICOCHET", str(executable(tmp_path / "killed", "kill -9 $$", "bash")))
+    table = sweep(GAS, {"run.seed": [1]}, tmp_path / "runs")
+    host = re.escape(os.uname().nodename)
+    assert table.state[0] == "unfinished"
+    assert re.fullmatch(rf"killed by signal 9 \(out of memory\?\), .* on {host}", table.reason[0])
+    monkeypatch.setenv("RICOCHET", str(program))
+    assert sweep(GAS, {"run.seed": [1]}, tmp_path / "runs").state[0] == "finished"
+    heap = GAS.replace("'wall' /", "'wall' gravity = 0, -1 /").replace("= 5 ", "= 5000 ")
+    heap = f"{heap}&contact restitution = 0.3 /"
+    for _ in range(2):
+        table = sweep(heap, {"run.seed": [1]}, tmp_path / "heap")
+        assert table.state[0] == "failed" and "collapse" in table.reason[0]
+    assert sweep(GAS, {"run.seed": [1]}, tmp_path / "heap").state[0] == "finished"
 
 
 def test_a_killed_python_leaves_checkpoints_and_no_process(program, tmp_path):
