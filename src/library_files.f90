@@ -47,6 +47,7 @@ contains
     if (.not. allocated(error)) call new_simulation(input, silent, first, error)
     first%changes = session%sim%changes               ! which makes work an observable
     if (first%changes > 0) input%changes = session%input%changes
+    input%saved_at = session%sim%time()
     if (.not. allocated(error)) call output%claim(text_of(path), error)
     if (.not. allocated(error)) call output%open(input, first, force /= 0, error)
     if (.not. allocated(error)) call output%save(session%sim, error)

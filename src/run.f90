@@ -42,6 +42,7 @@ module run
     type(progress_line_t) :: line
     real(real64) :: started = 0.0_real64                   !! by the clock of `seconds` [s]
     real(real64) :: rate = 0.0_real64                      !! collisions per processor time of this part [1/s]
+    integer(int64) :: alone = 0                            !! events of this part on one core, where there are more
   end type run_t
 
 contains
@@ -169,6 +170,7 @@ contains
     call main_loop(run, error)
     call cpu_time(cpu(2))
     run%rate = (run%sim%tally%collisions - collisions)/max(cpu(2) - cpu(1), 1.0e-9_real64)
+    run%alone = run%evolution%alone
     deallocate (run%evolution)                             ! the end of the output needs room
   end subroutine follow
 
@@ -243,7 +245,7 @@ contains
         eol//"wall_time = "//written(seconds() - run%started)// &
         eol//"collisions_per_second = "//written(run%rate)
       if (run%input%settings%run%threads_asked > 1) text = text//eol//"threads = "//written(run%input%settings%run%threads)
-      if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%evolution%alone)
+      if (run%input%settings%run%threads > 1) text = text//eol//"events_on_one_core = "//written(run%alone)
       if (sim%drive%is_on()) text = text//eol//"kicks = "//written(sim%kicks)// &
         eol//"drive_energy = "//written(sim%tally%total(drive_energy))
     end associate

@@ -28,6 +28,7 @@ module h5md_layout
   ! Attributes
   character(len=*), parameter, public :: &
     wall_time = provenance//"@wall_time", &
+    saved_at = provenance//"/saved_at", &
     replaced_file = provenance//"@replaced"       !! identity of the file that the finished one may replace
 
   ! Elements: groups of step, time, value

@@ -85,6 +85,7 @@ module settings
     character(len=:), allocatable :: path                !! of the input file, for messages
     character(len=:), allocatable :: text                !! the input file as it is
     type(text_t), allocatable :: overrides(:)            !! GROUP.VARIABLE=VALUE of each --set
+    real(real64) :: saved_at = -1.0_real64               !! up to when a simulation in memory went; negative: none did [time]
     character(len=:), allocatable :: changes             !! made while the run was at work, a line `TIME VARIABLE=VALUE` for each
     type(group_t), allocatable :: groups(:)    !! every value as used
     type(settings_t) :: settings                         !! the same as typed data

@@ -11,7 +11,7 @@ module output
   use errors, only: error_t, exit_files, fail
   use event_log, only: event_log_t
   use evolution, only: limits_t
-  use h5md_layout, only: changes_at_work, event_counter, frame_counter, replaced_file, sample_counter, wall_time
+  use h5md_layout, only: changes_at_work, event_counter, frame_counter, replaced_file, sample_counter, saved_at, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
   use moments, only: frame_sample, observable_sample
   use observables, only: observed
@@ -156,6 +156,10 @@ contains
     self%spent = spent(1)
     if (.not. finished) call self%file%fetch(replaced_file, 3, self%replaced)
     if (self%file%length(changes_at_work) >= 0) call self%file%fetch_text(changes_at_work, self%input%changes)
+    if (self%file%length(saved_at) >= 0) then
+      call self%file%fetch(saved_at, 1, spent)
+      self%input%saved_at = spent(1)
+    end if
     call check_replaced(self%path, self%replaced, error)
     if (allocated(error)) return
     counts = [progress%cadence%count, progress%events]

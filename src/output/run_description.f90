@@ -6,7 +6,7 @@ module run_description
   use build_info, only: build_flags, git_commit
   use disks, only: names_of
   use h5md_layout, only: all_disks, box_group, changes_at_work, disk_id, disk_mass, disk_radius, disk_species, observables_group, &
-    parameters_group, provenance, species_counts, species_names, wall_time
+    parameters_group, provenance, saved_at, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
   use input_groups, only: group_t, value_t, range_of
@@ -131,6 +131,7 @@ contains
     subroutine describe_origin()
       call file%make_group(provenance)
       call file%put(provenance//"@program_version", program_version)
+      if (.not. input%saved_at < 0) call file%put(saved_at, scalar, [input%saved_at])
       call file%put(provenance//"@git_commit", git_commit)
       call file%put(provenance//"@compiler", compiler_version())
       call file%put(provenance//"@flags", build_flags)
