@@ -26,6 +26,7 @@ from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
+TENSORS = ("virial_tensor", "stress_tensor", "helfand_stress")
 WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
 
 
@@ -294,7 +295,7 @@ class Run:
         for name, (time, value) in series.items():
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T
-            if name == "virial_tensor":
+            if name in TENSORS:
                 parts[4,] = ("_xx", "_xy", "_yx", "_yy")
             columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))

@@ -49,7 +49,9 @@ contains
       with%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
         .or. any(settings%species%rotational_temperature >= 0)
       with%orientation = with%rotation .or. settings%drive%kind == active
-      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor
+      with%helfand = settings%output%helfand
+      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor &
+        .or. with%helfand
     end associate
     call check_conflicts(settings, groups, problems)
 
@@ -170,6 +172,7 @@ contains
         output%single_precision = group%text_of("precision") == "single"
         output%event_log = group%text_of("event_log") == ".true."
         output%virial_tensor = group%text_of("virial_tensor") == ".true."
+        output%helfand = group%text_of("helfand") == ".true."
         output%checkpoint_every = group%real_of("checkpoint_every", never)
       end associate
     end subroutine take_output
@@ -198,6 +201,8 @@ contains
       call refuse(shear .and. any(groups%name == "obstacle"), "box.shear_rate", "&obstacle")
       call refuse(shear .and. any(groups%name == "wall"), "box.shear_rate", "&wall")
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
+      call refuse(settings%output%helfand .and. box%falling(), "output.helfand", "box.gravity: velocities change all the time")
+      call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)
       call refuse(by_energy .and. kicks, energy, "drive.kind: kicks change the energy"//other_rule)
       call refuse(by_energy .and. box%gives_energy() .and. .not. shear, energy, "walls that give energy, by temperature, speed " &

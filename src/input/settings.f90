@@ -66,6 +66,7 @@ module settings
     logical :: single_precision                       !! precision == 'single'
     logical :: event_log
     logical :: virial_tensor                          !! of smooth disks, too
+    logical :: helfand                                !! moments of momentum and heat
     real(real64) :: checkpoint_every                  !! [s] of wall clock
   end type output_settings_t
 

@@ -252,6 +252,8 @@ module variables
     variable_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
     variable_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
       "gather it for smooth disks, too, at some cost"), &
+    variable_t("output", "helfand", "logical", 1, "default", ".false.", &
+      "sum up over time what disks carry, for viscosities and conductivity"), &
     variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "computing time between checkpoints", positive, "s")]
 

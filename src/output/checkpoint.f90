@@ -29,7 +29,7 @@ module checkpoint
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
   public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides
 
-  integer, parameter :: layout = 8                !! of the checkpoints; another one is not understood
+  integer, parameter :: layout = 9                !! of the checkpoints; another one is not understood
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
   integer, parameter :: none = 0

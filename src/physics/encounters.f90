@@ -10,7 +10,7 @@ module encounters
   use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
-  use tally, only: dissipated, stress, virial, work
+  use tally, only: dissipated, heat_virial, stress, virial, work
   use texts, only: written
   use wall_hits, only: collide_wall
   implicit none
@@ -29,7 +29,7 @@ contains
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout), optional :: log
-    real(real64) :: v(2), change(2)
+    real(real64) :: v(2), w(2), change(2)
     integer(int32) :: first, second, ids(2)
 
     first = i
@@ -46,6 +46,8 @@ contains
     end if
     call sim%turn(first, t)
     v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
+    w = v
+    if (code > 0) w = flight_velocity(sim%disk(second)%v, sim%box%gravity, t - sim%disk(second)%clock)
     if (code > 0) then
       call collide_pair(sim, i, code, t, counts)
       if (sim%law%grip%is_rough()) &
@@ -55,7 +57,10 @@ contains
     end if
     if (.not. counts) return
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
-    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change)
+    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change, &
+      0.5_real64*(gain(sim, first, v) - gain(sim, second, w)))
+    call sim%note_change(first, v, t)
+    if (code > 0) call sim%note_change(second, w, t)
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
@@ -154,12 +159,23 @@ contains
     call keep_apart(sim, i, j)
   end subroutine rub
 
-  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change times their
-  !> distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
-  subroutine book_pair(sim, i, j, change)
+  !> The energy of translation that disk i has gained.
+  pure function gain(sim, i, before)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: before(2)        !! its velocity [length/time]
+    real(real64) :: gain                         !! [energy]
+
+    gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
+  end function gain
+
+  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change, and the energy
+  !> that one hands to the other, times their distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
+  subroutine book_pair(sim, i, j, change, handed)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: change(2)        !! [mass length/time]
+    real(real64), intent(in) :: handed           !! to disk i [energy]
     real(real64) :: r(2), slip(2)
     integer :: a, b
 
@@ -171,6 +187,7 @@ contains
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
       end do
     end do
+    if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(handed*r)
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-slip(1)*change(1))
     call keep_apart(sim, i, j)

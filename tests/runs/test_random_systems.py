@@ -361,6 +361,7 @@ APART = [
     (r"obstacle|wall\.", r"species\.(file|position|grid|placement = (lattice|dense))"),
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
+    ("output.helfand", r"box\.(gravity|shear)"),
     ("drive", "drive"),
     (r"obstacle\.(name|side)|wall (x|y)", "periodic"),
     ("output.frames_every", "output.frames_every"),

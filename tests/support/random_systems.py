@@ -367,6 +367,7 @@ class Draw:
         rng = self.rng
         words = "&output" + self.maybe(0.4, "event_log = .true.")
         words += self.maybe(0.2, "precision = 'single'") + self.maybe(0.3, "virial_tensor = .true.")
+        words += "" if self.falls or self.sheared else self.maybe(0.3, "helfand = .true.")
         words += self.maybe(0.1, "checkpoint_every = 1e-3")
         for track in "frames", "observables":
             for kind in rng.sample(CADENCES, rng.choice([0, 1, 1, 1])):
