@@ -67,6 +67,7 @@ contains
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
         if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! in the text with all digits
+        if (free_to_change(groups(g)%value_line(k))) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
       end do

@@ -3,7 +3,7 @@
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
-  use disks, only: image_column, land, mass_column
+  use disks, only: disk_t, image_column, land, mass_column
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
@@ -29,7 +29,7 @@ contains
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout), optional :: log
-    real(real64) :: v(2), w(2), change(2)
+    real(real64) :: v(2), w(2), change(2), restitution
     integer(int32) :: first, second, ids(2)
 
     first = i
@@ -49,7 +49,9 @@ contains
     w = v
     if (code > 0) w = flight_velocity(sim%disk(second)%v, sim%box%gravity, t - sim%disk(second)%clock)
     if (code > 0) then
-      call collide_pair(sim, i, code, t, counts)
+      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+      if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, approach(sim, i, code, t))
+      call collide_pair(sim, i, code, t, counts, restitution)
       if (sim%law%grip%is_rough()) &
         call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
     else
@@ -68,18 +70,18 @@ contains
   end subroutine collide
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.
-  subroutine collide_pair(sim, i, j, t, counts)
+  subroutine collide_pair(sim, i, j, t, counts, restitution)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally
-    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
+    real(real64), value :: restitution           !! but for the TC model
+    real(real64) :: dx(2), dv(2), b, distance2, q, mass_i, mass_j
     integer(int32) :: si, sj
     logical :: elastic
 
     si = sim%tag(i)%species
     sj = sim%tag(j)%species
-    restitution = sim%law%restitution(si, sj)
     if (sim%law%contact_time > 0) then
       elastic = .false.
       call sim%make_contact(i, t, elastic)
@@ -116,6 +118,24 @@ contains
     call sim%tally%sum(virial)%add(-q*distance2)
     if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
+
+  !> Speed along the normal with which the disks i and j meet at the time t.
+  pure function approach(sim, i, j, t) result(g)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    type(disk_t) :: p, q
+    real(real64) :: g, dx(2), dv(2)              ! [length/time]
+
+    p = sim%disk(i)
+    q = sim%disk(j)
+    call land(p, sim%box%gravity, t)
+    call land(q, sim%box%gravity, t)
+    dx = q%x - p%x
+    dv = q%v - p%v
+    call see_nearest(sim, t, dx, dv)
+    g = abs(dot_product(dx, dv))/magnitude(dx)
+  end function approach
 
   !> Counts a collision of two disks that have both had one at this very time, if it is lossy: by the TC model it is not. In
   !> a lattice many may have that; but if two have hit each other then, and do so again, it is a collapse.
