@@ -217,7 +217,7 @@ def in_step(run: Run, start: float) -> slice:
     if len(apart) < 16 or np.ptp(apart) > 1e-6 * apart[0]:
         raise RunError(
             f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
-            "output.frames_every_time"
+            "output.frames_every_time alone"
         )
     return frames
 

@@ -23,6 +23,7 @@ from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
 from ricochet import transport as tp
 from ricochet.nature import Refused
+from ricochet.reader import Restitution
 from synthetic_run import ROOT, drawn, run_script, write_run, written
 from validation.estimators import force, hit_rate
 
@@ -358,6 +359,28 @@ def test_the_first_rate_is_counted_where_no_equation_of_state_is_known(bulk, sim
     drawn(tmp_path, "haff", two.path)
 
 
+@pytest.mark.parametrize("law", ["power", "viscoelastic"])
+def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
+    """In the end as t^(-5/3); all above g0 by Haff's law."""
+    hard = hd.haff_soft(Restitution(0.7, law, 1e-9), 1.0)
+    np.testing.assert_allclose(hard[2][:99], hd.haff_by_time(hard[0][:99], 0.7), rtol=1e-3)
+    soft = hd.haff_soft(Restitution(0.7, law, 10.0), 1.0)
+    assert cool.exponent(soft[0], soft[2]) == pytest.approx(5 / 3, abs=0.01)
+    run = simulated(
+        f"""&box boundary = 'periodic', 'periodic' /
+        &contact restitution = 0.8 restitution_law = '{law}' restitution_speed = 10 /
+        &species count = 400 packing_fraction = 0.05 temperature = 1 /
+        &stop collisions_per_disk = 40 /
+        &output observables_per_decade = 20 frames_from = 0.01 /""",
+        name=law,
+    )
+    curves, *_ = cool.haff([cool.energy_left(run)], 0.8, cool.soft_law([run]))
+    np.testing.assert_allclose(curves["K_by_time"].mean, curves["haff"], rtol=0.15)
+    assert "soft" in run.nature and np.isnan(run.restitution)
+    (row,) = (row for row in drawn(tmp_path, "haff", run.path)[:1])
+    assert any("below 10" in name for name in row)
+
+
 HAFF = "smooth disks that only cool"
 
 
@@ -555,6 +578,7 @@ def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, ca
 
 
 LOSSY = {"restitution": 0.9}
+SOFT = {"restitution": "0.9 restitution_law = 'power' restitution_speed = 9"}
 WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1", "helfand": ".false."}
 MIXED = {"packing": "0.1 temperature = 2 / &species name = 'b' count = 9 packing_fraction = 0.1"}
@@ -587,6 +611,12 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (LOSSY, dict.fromkeys(SETTLED, "not elastic") | {"rough": "equal rough disks"}),
         (LOSSY | {"log": ".false."}, {"rates": "not elastic", "correlations": "draw them"}),
         (LOSSY | MIXED, {"mixture": "not elastic"}),
+        (SOFT, {"rough": "depends on the speed", "melting": "not elastic"}),
+        (SOFT | MIXED, {"haff": "is a mixture of soft disks"}),
+        (
+            {"seed": 2, "cadence": "frames_every_time = 0.05 frames_at = 0.07"},
+            {"correlations": "_time alone"},
+        ),
         (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
         (APART, {"mixture": "have not met"}),
         (UNEVEN, dict.fromkeys(SETTLED, "at different temperatures")),
