@@ -122,7 +122,7 @@ def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray,
 
     `thermal` = sqrt(kT/m) at the start.  Of g, u = m g^2 / 4 kT is exponential, weighted by g.
     """
-    k, u = np.geomspace(1, 1e-12, 600), np.linspace(0, 40, 4001)
+    k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
     g = 2 * thermal * np.sqrt(k[:, None] * u)
     lost = scipy.integrate.trapezoid((1 - law.at(g) ** 2) * u * np.exp(-u), u)
     tau = scipy.integrate.cumulative_trapezoid(2 / lost, -np.log(k), initial=0)
