@@ -190,7 +190,8 @@ contains
   end function gain
 
   !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change, and the energy
-  !> that one hands to the other, times their distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
+  !> that one hands to the other, times their distance; and what the shear has done, which is nothing but if they met through
+  !> the bottom or the top.
   subroutine book_pair(sim, i, j, change, handed)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j

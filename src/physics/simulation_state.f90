@@ -303,7 +303,7 @@ contains
 
     if (.not. self%with%helfand) return
     associate (mass => self%mass_of(i), sums => self%tally%sum(flights:flights + 4))
-      call sums%add((carried(mass, self%disk(i)%v) - carried(mass, before))*(self%epoch + t))
+      call sums%add((carried(mass, self%disk(i)%v) - carried(mass, before))*(self%box%epoch + t))
     end associate
   end subroutine note_change
 
