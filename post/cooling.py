@@ -78,7 +78,7 @@ def table(groups: list, results: list[Curves]) -> list[dict]:
     """A row per restitution: energy and temperature ratio at the end."""
     return [
         {
-            "restitution": xi,
+            "restitution": xi.name,
             "runs": len(runs),
             **measured("energy_left", in_time(found, "all"), -1),
             **measured("temperature_ratio", found.get("ratio"), -1),

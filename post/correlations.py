@@ -44,7 +44,7 @@ import numpy as np
 MOST_FRAMES = 50  # for the structure
 PLAIN = {"walled"}  # what equal smooth elastic disks may be
 #: What has no equilibrium, but a structure.
-RESTLESS = ("lossy", "unlike", "uneven", "noisy", "active", "sliding")
+RESTLESS = ("lossy", "soft", "unlike", "uneven", "noisy", "active", "sliding")
 NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
@@ -67,7 +67,7 @@ def check(run: Run, first: Run) -> None:
     settled = first.nature.in_equilibrium
     even = not settled or len(steps) == 0 or np.ptp(steps) <= 1e-6 * steps[0]
     if run.frames < 10 or not even:
-        how = ", written by frames_every_time" if settled else ""
+        how = ", written by frames_every_time alone" if settled else ""
         raise RunError(f"{run.path}: needs 10 frames and more{how}")
 
 

@@ -64,7 +64,7 @@ Scans = dict[str, list[list[Point]]]  # by parameter: curves of points in ascend
 def key_of(run: Run) -> tuple[float, ...]:
     """Mass ratio, speed, radius ratio, restitution."""
     if np.isnan(run.restitution):
-        raise RunError(f"{run.path}: has several restitutions, which are no parameter of a scan")
+        raise RunError(f"{run.path}: has no single restitution, as a scan needs it")
     tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
     ratios = run.mass[tip] / run.mass[lying], run.radius[tip] / run.radius[lying]
     values = ratios[0], run.speed(0)[tip], ratios[1], run.restitution

@@ -13,15 +13,18 @@ The cooling rate is -d ln K / d tau, tau collisions per disk.  The homogeneous s
 mean over two collisions per disk and over the runs falls below 90 % of the law for good; from there
 on the curves are pale, and of several runs it is printed with its error.  `rate` is the slope of a
 line through ln K from two collisions per disk on, when speeds have their shape, until half of that
-end, or to the end of a run without one; its error is from the scatter of the runs.  What a rate a
-little below the law adds up to in a run without that end is said, if K ends more than 10 % from the
-law.
+end, or to the end of a run without one; its error is from the scatter of the runs.  Soft disks
+(contact.restitution_law) have a law of their own, for Maxwell's velocities (docs/theory.md), and
+instead of the rate the `exponent` of K ~ t^-p in the last decade of time, which goes to 5/3.  What
+a rate a little below the law adds up to in a run without that end is said, if K ends more than 10 %
+from the law.
 """
 
 from ricochet import Run
-from ricochet.cooling import SLOW, energy_left, haff
+from ricochet.cooling import SLOW, energy_left, exponent, haff, soft_law
 from ricochet.drawing import band, caption, colours, plt
-from ricochet.hard_disks import haff_by_collisions, haff_rate
+from ricochet.hard_disks import haff_rate
+from ricochet.reader import Restitution
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
 from ricochet.statistics import Estimate, to_error
 from ricochet.thermodynamics import packing
@@ -49,11 +52,15 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
                 band(axes, x, np.where(after, np.nan, mean), error, color=colour)
                 band(axes, x, np.where(after, mean, np.nan), error, color=colour, alpha=0.4)
             upper.plot(x, law, color="black", ls="--", lw=1)
-        label = f"ξ = {xi:g},  rate {' ± '.join(to_error(*rate))}  ({haff_rate(xi):.4g})"
+        name, known = expected(xi, found)
+        label = f"ξ = {xi:g},  {name} {' ± '.join(to_error(*rate))}  ({known:.4g})"
         panels[0, 0].plot([], [], color=colour, label=f"ξ = {xi:g}")
         panels[0, 1].plot([], [], color=colour, label=label)
-    panels[0, 0].plot([], [], color="black", ls="--", lw=1, label="Haff 1983")
-    panels[0, 1].plot([], [], color="black", ls="--", lw=1, label="van Noije and Ernst 1998")
+    laws = "Haff 1983", "van Noije and Ernst 1998"
+    if any(xi.law != "constant" for xi, _ in groups):
+        laws = ("law, of soft disks for Maxwell's velocities",) * 2
+    for axes, law in zip(panels[0], laws, strict=True):
+        axes.plot([], [], color="black", ls="--", lw=1, label=law)
     floor = min(found["K_by_time"].mean.min() for found, *_ in results)
     panels[0, 0].set(xscale="log", yscale="log", ylim=(floor / 2, 1.5), ylabel="$K / K_0$")
     panels[1, 0].set(xlabel="$w_0\\,t$", ylabel="$K$ / law")
@@ -75,28 +82,36 @@ def energies(groups: list, results: list) -> list[dict]:
         reached = found["collisions_per_disk"]
         for tau in (5, 10, 20):
             if tau <= reached[-1]:
-                row = {"restitution": xi, "runs": len(members), "collisions_per_disk": tau}
+                row = {"restitution": xi.name, "runs": len(members), "collisions_per_disk": tau}
                 left = Estimate(*(np.interp(tau, reached, part) for part in found["K"]))
                 row |= measured("energy_left", left)
-                rows.append(row | {"expected": float(haff_by_collisions(tau, xi))})
+                law = np.interp(tau, reached, np.log(found["law"]))
+                rows.append(row | {"expected": float(np.exp(law))})
     return rows
+
+
+def expected(law: Restitution, found: dict) -> tuple[str, float]:
+    """The cooling rate by the law, or of soft disks its exponent where that of the runs is."""
+    if law.law == "constant":
+        return "rate", haff_rate(law.xi)
+    return "exponent", exponent(found["w0_t"], found["haff"])
 
 
 def rates(groups: list, results: list) -> list[dict]:
     """The cooling rate beside the law, and where the homogeneous state ends."""
     return [
         {
-            "restitution": xi,
+            "restitution": xi.name,
             "runs": len(members),
-            **measured("rate", rate),
-            "expected": haff_rate(xi),
+            **measured(expected(xi, found)[0], rate),
+            "expected": expected(xi, found)[1],
             **measured("homogeneous_until", end if np.isfinite(end.error) else None),
         }
-        for (xi, members), (_, rate, _, end) in zip(groups, results, strict=True)
+        for (xi, members), (found, rate, _, end) in zip(groups, results, strict=True)
     ]
 
 
-def apart(xi: float, found: dict, end: float) -> list[str]:
+def apart(xi: Restitution, found: dict, end: float) -> list[str]:
     """What a rate a little below the law adds up to, where the homogeneous state has no end."""
     ratio, tau = found["K"].mean[-1] / found["law"][-1], found["collisions_per_disk"][-1]
     if not np.isnan(end) or abs(ratio - 1) < 1 - SLOW:
@@ -108,7 +123,10 @@ def apart(xi: float, found: dict, end: float) -> list[str]:
 def main() -> None:
     args = command_line(__doc__, "haff.png").parse_args()
     groups = by_restitution(args.runs)
-    results = [haff([energy_left(run) for run in members], xi) for xi, members in groups]
+    results = [
+        haff([energy_left(run) for run in members], law.xi, soft_law(members))
+        for law, members in groups
+    ]
     data = spread({f"_xi{xi:g}": own for (xi, _), (own, *_) in zip(groups, results, strict=True)})
     tables = energies(groups, results), rates(groups, results)
     each = zip(groups, results, strict=True)

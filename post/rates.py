@@ -31,7 +31,7 @@ import numpy as np
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # of the frames of a single run
 #: With which disks fly straight and at one speed, in all parts of the box alike.
-STRAIGHT = {"walled", "mixture", "unlike", "lossy", "rough", "turning"}
+STRAIGHT = {"walled", "mixture", "unlike", "lossy", "soft", "rough", "turning"}
 STRAIGHT |= {"thermal", "uneven", "sliding"}
 
 

@@ -2,9 +2,9 @@
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-Equal elastic disks in a periodic box.  Runs are combined by packing fraction; they take an event
-log (output.event_log), from which the Helfand moments of momentum and energy follow exactly, and
-for D frames that are equally far apart in time.
+Equal elastic disks in a periodic box.  Runs are combined by packing fraction; they take the Helfand
+moments of momentum and energy (output.helfand), as observables some four times in a mean free time
+(output.observables_every_time), and for D frames that are equally far apart in time.
 
 Small panels: half of the slope of the mean square of a moment between neighbouring lags, over
 Enskog's coefficient; bands are errors over the runs.  For D half the integral of

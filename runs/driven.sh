@@ -15,19 +15,19 @@ done
 
 # Viscosity, conductivity, diffusion: some mean free times from frame to frame, packing by packing.
 transport=()
-while read -r packing interval placement; do
+while read -r packing interval samples placement; do
   runs/ensemble.sh input/bulk.nml -d "$data/transport_$packing" --seeds 1-4 \
     --set "species.disks.packing_fraction=$packing" --set "species.disks.placement=$placement" \
     --set species.disks.count=256 --set stop.collisions_per_disk=8000 \
     --set "output.frames_every_time=$interval" --set output.precision=single \
-    --set output.event_log=true "$@"
+    --set output.helfand=true --set "output.observables_every_time=$samples" "$@"
   transport+=("$data/transport_$packing"/*.h5)
 done <<'TABLE'
-0.05 0.13 random
-0.2 0.05 random
-0.35 0.026 random
-0.5 0.014 random
-0.6 0.009 dense
+0.05 0.13 0.016 random
+0.2 0.05 0.006 random
+0.35 0.026 0.0033 random
+0.5 0.014 0.0018 random
+0.6 0.009 0.0011 dense
 TABLE
 "$python" post/transport.py "${transport[@]}" -o "$figures/transport.png" \
   --csv "$figures/transport.csv"

@@ -18,7 +18,7 @@ Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
 SLOW = 0.9  # of Haff's law, below which a gas is no longer homogeneous
-SMOOTH = ("lossy", "mixture", "turning")  # what a gas may be that cools by Haff's law
+SMOOTH = ("lossy", "soft", "mixture", "turning")  # what a gas may be that cools by Haff's law
 SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so close to its limit
 
 
@@ -72,6 +72,8 @@ def first_rate(run: Run) -> float:
     allow(run, law, *SMOOTH)
     if "lossy" not in run.nature:
         raise Refused(f"{run.path}: does not cool; {law}")
+    if {"soft", "mixture"} <= run.nature:
+        raise Refused(f"{run.path}: is a mixture of soft disks; {law}, or of one kind")
     if "mixture" in run.nature:
         return counted_rate(run)
     z = float(hard_disks.simulated(packing(run)))
@@ -94,14 +96,26 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time * first_rate(run), tau, energy / energy[0]
 
 
+def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """w0 t, collisions per disk, K / K0 by the law of soft disks; None if they are not."""
+    if "soft" not in runs[0].nature:
+        return None
+    thermal = np.mean([np.sqrt(kt_at_start(run) / run.mass[0]) for run in runs])
+    return hard_disks.haff_soft(runs[0].contact_law, float(thermal))
+
+
 def haff(
-    tracks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], xi: float, points: int = 200
+    tracks: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    xi: float,
+    soft: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+    points: int = 200,
 ) -> tuple[Curves, Estimate, float, Estimate]:
     """What runs with the same restitution say, each as w0 t, collisions per disk, K / K0.
 
     Curves: K / K0 against w0 t, in logarithmic steps, and against collisions per disk, each with
-    its law, and the local cooling rate.  Then the cooling rate, and where the homogeneous state
-    ends, in collisions per disk, alone and with its error: NaN if it does not.
+    its law, and the local cooling rate.  Then the cooling rate, or with the law of soft disks the
+    `exponent`, and where the homogeneous state ends, in collisions per disk, alone and with its
+    error: NaN if it does not.
     """
     time = np.geomspace(max(t[1] for t, *_ in tracks), min(t[-1] for t, *_ in tracks), points)
     tau, by_tau = on_grid([c for _, c, _ in tracks], [(k, np.log(k)) for *_, k in tracks], points)
@@ -109,23 +123,39 @@ def haff(
     low, high = (np.clip(tau + shift, 0, tau[-1]) for shift in (-WINDOW / 2, WINDOW / 2))
     falls = [np.interp(low, tau, y) - np.interp(high, tau, y) for y in logs]
     local = estimate(np.array(falls) / (high - low))
-    law = hard_disks.haff_rate(xi)
+    law, by_time = hard_disks.haff_rate(xi), hard_disks.haff_by_time(time, xi)
+    by_collisions = hard_disks.haff_by_collisions(tau, xi)
+    if soft is not None:
+        by_time, by_collisions = (
+            np.exp(np.interp(x, own, np.log(soft[2])))
+            for x, own in zip((time, tau), soft[:2], strict=True)
+        )
+        law = -np.gradient(np.log(by_collisions), tau)
     end = homogeneous_until(tau, local.mean, law)
     part = (tau >= WINDOW) & (tau <= (tau[-1] if np.isnan(end) else end / 2))
     slopes = [-np.polyfit(tau[part], y[part], 1)[0] if part.sum() > 2 else np.nan for y in logs]
+    in_time = [np.exp(np.interp(np.log(time), np.log(t[1:]), np.log(k[1:]))) for t, _, k in tracks]
+    if soft is not None:
+        slopes = [exponent(time, k) for k in in_time]
     curves = {
         "w0_t": time,
         "K_by_time": estimate([np.interp(time, t, k) for t, _, k in tracks]),
-        "haff": hard_disks.haff_by_time(time, xi),
+        "haff": by_time,
         "collisions_per_disk": tau,
         "K": estimate(by_tau[:, 0]),
-        "law": hard_disks.haff_by_collisions(tau, xi),
+        "law": by_collisions,
         "rate": local,
     }
     return curves, estimate(slopes), end, when(lambda c: homogeneous_until(tau, c, law), local)
 
 
-def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float) -> float:
+def exponent(time: np.ndarray, energy: np.ndarray) -> float:
+    """P of K ~ t^-p in the last decade of logarithmic times: 2 by Haff, 5/3 if disks are soft."""
+    late = time >= time[-1] / 10
+    return float(-np.polyfit(np.log(time[late]), np.log(energy[late]), 1)[0])
+
+
+def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray) -> float:
     """From where on the rate stays below `SLOW` of the law; NaN if it does not in the end."""
     slow = rate < SLOW * law
     if not slow[-1]:

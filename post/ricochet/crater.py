@@ -30,7 +30,8 @@ class Crater(NamedTuple):
 
 
 #: What a run may be in which nothing but a projectile moves a bed.
-QUIET = ("lossy", "rough", "turning", "unlike", "mixture", "obstructed", "walled", "stepped")
+QUIET = ("lossy", "soft", "rough", "turning", "unlike", "mixture", "obstructed", "walled")
+QUIET += ("stepped",)
 FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
 
 

@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 import scipy
 
+from .reader import Restitution
+
 CLOSE_PACKING = math.pi / math.sqrt(12)
 # Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);
 # above, Erpenbeck and Luban, Phys. Rev. A 32, 2920 (1985).
@@ -113,6 +115,19 @@ def haff_by_collisions(tau: np.ndarray, xi: float) -> np.ndarray:
 def haff_by_time(w0_t: np.ndarray, xi: float) -> np.ndarray:
     """K / K0 after the time t, w0 = w at the start; Haff, J. Fluid Mech. 134, 401 (1983)."""
     return (1 + (1 - xi**2) * np.asarray(w0_t) / 4) ** -2
+
+
+def haff_soft(law: Restitution, thermal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """w0 t, collisions per disk, K / K0 of a gas of soft disks, for Maxwell's velocities.
+
+    `thermal` = sqrt(kT/m) at the start.  Of g, u = m g^2 / 4 kT is exponential, weighted by g.
+    """
+    k, u = np.geomspace(1, 1e-26, 1000), np.linspace(0, 40, 2001)
+    g = 2 * thermal * np.sqrt(k[:, None] * u)
+    lost = scipy.integrate.trapezoid((1 - law.at(g) ** 2) * u * np.exp(-u), u)
+    tau = scipy.integrate.cumulative_trapezoid(2 / lost, -np.log(k), initial=0)
+    time = scipy.integrate.cumulative_trapezoid(2 / lost / np.sqrt(k), -np.log(k), initial=0)
+    return time, tau, k
 
 
 def noise_temperature(

@@ -411,7 +411,7 @@ class Lab:
         if sample is None or sample.time[-1] <= 0:
             return {}
         given = {word for group in groups if group["kind"] == "output" for word in group["given"]}
-        kinds = {word.split("_every_")[0] for word in given}
+        kinds = {word.split("_")[0] for word in given}
         step = f"{sample.time[-1] / FRAMES:.1g}"
         wanted = {"event_log": ".true."} | {
             word: step for word in self.table["output"] if word.endswith("_every_time")
@@ -419,7 +419,7 @@ class Lab:
         return {
             f"output.{word}": value
             for word, value in wanted.items()
-            if word.split("_every_")[0] not in kinds
+            if word.split("_")[0] not in kinds
         }
 
     def sample(self, name: str) -> Run | None:

@@ -31,6 +31,7 @@ TRAITS = {
     "thermal": "has walls that heat and cool (temperature)",
     "falling": "falls (box.gravity)",
     "lossy": "is not elastic: it loses energy in collisions",
+    "soft": "has a restitution that depends on the speed (contact.restitution_law)",
     "rough": "has rough disks, whose collisions turn them",
     "turning": "has disks that turn",
     "round": "keeps its angular momentum in a round container",
@@ -44,7 +45,7 @@ SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed
 #: With which velocities change between collisions, too.
 KICKED = {"noisy", "active", "bathed"}
 #: With which velocities do not settle to Maxwell's law.
-UNSETTLED = {*SOURCES, "uneven", "lossy", "round"} - {"bathed", "thermal"}
+UNSETTLED = {*SOURCES, "uneven", "lossy", "soft", "round"} - {"bathed", "thermal"}
 #: With which they do.
 SETTLED = TRAITS.keys() - UNSETTLED
 
@@ -130,6 +131,8 @@ def nature_of(
         "thermal": thermal,
         "falling": bool(np.any(box.get("gravity", 0.0))),
         "lossy": inelastic or lost > ROUNDING,
+        "soft": contact.get("restitution_law", "constant") != "constant"
+        and (inelastic or lost > ROUNDING),
         "rough": beta > -1,
         "turning": turning,
         "obstructed": "obstacle" in parameters or "wall" in parameters,

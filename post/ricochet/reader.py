@@ -26,6 +26,7 @@ from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
+TENSORS = ("virial_tensor", "stress_tensor", "helfand_stress")
 WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
 
 
@@ -145,6 +146,30 @@ class Frames:
             else:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
         return values.astype(float) if values.dtype.kind == "f" else values
+
+
+class Restitution(NamedTuple):
+    """That of a contact; from a speed of approach on as given, below by a law of soft bodies."""
+
+    xi: float
+    law: str = "constant"
+    speed: float = 0.0  # g0
+
+    def __format__(self, spec: str) -> str:
+        soft = f" {self.law} below {self.speed:g}" if self.law != "constant" else ""
+        return f"{self.xi:{spec}}{soft}"
+
+    @property
+    def name(self) -> float | str:
+        """What tells it from others in a table."""
+        return self.xi if self.law == "constant" else f"{self:g}"
+
+    def at(self, g: np.ndarray) -> np.ndarray:
+        """Ramirez et al., Phys. Rev. E 60, 4465 (1999): 1 - y + c y^2 with y ~ g^(1/5)."""
+        c = {"power": 0.0, "viscoelastic": 0.6}[self.law]
+        y = 2 * (1 - self.xi) / (1 + np.sqrt(1 - 4 * c * (1 - self.xi)))
+        y = y * np.minimum(g / self.speed, 1.0) ** 0.2
+        return 1 - y + c * y**2
 
 
 @dataclass(frozen=True)
@@ -294,7 +319,7 @@ class Run:
         for name, (time, value) in series.items():
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T
-            if name == "virial_tensor":
+            if name in TENSORS:
                 parts[4,] = ("_xx", "_xy", "_yx", "_yy")
             columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
@@ -346,11 +371,18 @@ class Run:
 
     @property
     def restitution(self) -> float:
-        """Restitution of disk on disk; NaN if it differs between pairs of species."""
-        one = self.parameter("contact", "restitution", 1.0)
-        pairs = self.parameter("contact", "pair_restitution", one)
-        values = np.unique(np.asarray(pairs, dtype=float))
-        return float(values[0]) if len(values) == 1 else np.nan
+        """Restitution of disk on disk; NaN if it differs between pairs of species, or by speed."""
+        return self.contact_law.xi if self.contact_law.law == "constant" else np.nan
+
+    @property
+    def contact_law(self) -> Restitution:
+        """Restitution of disk on disk, NaN if it differs between pairs of species, and its law."""
+        contact = self.parameters.get("contact", {})
+        values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
+        xi = float(values[0]) if len(values) == 1 else float("nan")
+        if "soft" not in self.nature:
+            return Restitution(xi)
+        return Restitution(xi, contact["restitution_law"], float(contact["restitution_speed"]))
 
     @property
     def time_step(self) -> float:

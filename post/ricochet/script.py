@@ -20,7 +20,7 @@ import numpy as np
 from .drawing import LABELS, STYLE, plt, save, warn
 from .files import did_you_mean, destination
 from .nature import Refused
-from .reader import Run, RunError, read_run
+from .reader import Restitution, Run, RunError, read_run
 from .statistics import Curve, Estimate, SeriesMean, combined, doubts
 from .thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
 
@@ -210,9 +210,9 @@ def grouped(runs: Iterable[Run], key: Callable[[Run], float]) -> list[tuple[floa
     return [(value, list(group)) for value, group in groupby(ordered, key=key)]
 
 
-def by_restitution(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:
-    """Runs of the same restitution together."""
-    return grouped(runs, lambda run: run.restitution)
+def by_restitution(runs: Iterable[Run]) -> list[tuple[Restitution, list[Run]]]:
+    """Runs of the same restitution, and law of it, together."""
+    return grouped(runs, lambda run: run.contact_law)
 
 
 def by_packing(runs: Iterable[Run]) -> list[tuple[float, list[Run]]]:

@@ -118,7 +118,7 @@ class SeriesMean(NamedTuple):
     """The mean of a correlated series, and what is needed to trust it."""
 
     mean: float
-    error: float  # half the 68 % interval; NaN with fewer than `FEWEST` samples
+    error: float  # half the 68 % interval; NaN if worth fewer than `FEWEST` samples
     samples: float  # independent samples that the series is worth
     drift: float  # second half less first half, over the error of that difference
 
@@ -158,14 +158,17 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
     """Sum of a series (T,) in equilibrium over the sum of another, such as counts over times.
 
     The error is that of the mean of amount - ratio * per, from the autocorrelation of its cells,
-    with Student's t for few samples.
+    with Student's t for few samples.  There is none if a few cells have most of the weight, as with
+    samples in decades.
     """
     amount, per = np.broadcast_arrays(np.asarray(amount, dtype=float), per)
     if len(amount) == 0:
         return SeriesMean(np.nan, np.nan, 0.0, 0.0)
     mean = float(np.sum(amount) / np.sum(per))
-    if len(amount) < FEWEST:
-        return SeriesMean(mean, np.nan, float(len(amount)), 0.0)
+    weight = cells(per, COARSE)
+    worth = min(float(len(amount)), float(weight.sum() ** 2 / np.sum(weight**2)))
+    if worth < FEWEST:
+        return SeriesMean(mean, np.nan, worth, 0.0)
     rest = (amount - mean * per) / np.mean(per)
     coarse = cells(rest, COARSE)
     least = min(1.0, memory(cells(rest, FINE)))  # few cells may seem to make up for each other

@@ -16,6 +16,7 @@ from .nature import KICKED, ROUNDING, SETTLED, allow
 from .reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
+TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
 MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
 #: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
@@ -180,7 +181,8 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
         return SeriesMean(kt_at_start(run), 0.0, np.inf, 0.0)
     start, (track, time, kt) = start_of_equilibrium(run, skip), kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
-    if run.parameter("output", f"{track}_every_time") is None and "falling" not in run.nature:
+    by_time = (run.parameter("output", f"{track}_{how}") for how in TIMED)
+    if all(given is None for given in by_time) and "falling" not in run.nature:
         return series_mean(kt**0.5, kt**-0.5)
     return series_mean(*between(time, kt)[::-1])
 

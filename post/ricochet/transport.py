@@ -9,9 +9,8 @@ has been carried, times the way: disks carry m v_a v_b and (m v^2 / 2) v while t
 collision hands dP_a and dE on over r = x_i - x_j.  Its mean square grows in time as the mean square
 displacement does, and half of the slope is the transport coefficient: times 1 / (A kT) for
 viscosities, 1 / (A kT^2) for the conductivity, A the area.  See Helfand, Phys. Rev. 119, 1 (1960);
-Alder, Gass and Wainwright, J. Chem. Phys. 53, 3813 (1970).  Velocities between collisions are the
-first ones and all changes in the event log, and r is along the change of momentum, one diameter
-long: so the moments are exact, at any time, without positions.
+Alder, Gass and Wainwright, J. Chem. Phys. 53, 3813 (1970).  The run sums them up exactly, as
+observables, where `output.helfand` is set.
 """
 
 from typing import NamedTuple
@@ -21,14 +20,15 @@ import numpy as np
 from . import hard_disks
 from . import thermodynamics as td
 from .nature import allow
-from .reader import Events, Run, RunError, read_run
+from .reader import Run, RunError
 from .statistics import Curve, SeriesMean, estimate, series_mean
 
-PER_FREE_TIME = 10  # samples of the moments
+PER_FREE_TIME = 4  # samples of the moments that are enough
+SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
 #: Mean free times after which fluxes are forgotten: in a dilute gas as exp(-w t / 2.06), that of
 #: heat, which lives longest; from half of this on less than 0.2 % of the conductivity is missing.
 MEMORY = 20.0
-CLOSE = 1e-5  # of a velocity
+CLOSE = 1e-6  # of a step
 TAKES = "transport takes equal elastic smooth disks in a periodic box"
 MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
 
@@ -107,76 +107,36 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
 # --- Helfand moments ---
 
 
-def log(run: Run) -> Events:
-    """The events until the last frame."""
-    events = read_run(run.path).events  # logs are long: the run would keep them
-    seen = np.searchsorted(events.time, run.time[-1], "right")
-    return Events(*(part[:seen] for part in events))
-
-
-def velocities(run: Run, events: Events) -> tuple[np.ndarray, np.ndarray]:
-    """(E, 2, 2) velocities of the disks i and j before each collision and after it.
-
-    Raises RunError if the log does not lead from the first frame to the last.
-    """
-    start, end = run.velocity[[0, -1]] - td.drift(run)
-    _, i, j, _, change = events
-    disk = np.stack([i, j], axis=1).ravel() - 1
-    change = np.stack([change, -change], axis=1).reshape(-1, 2) / run.mass[disk, None]
-    order = np.argsort(disk, kind="stable")  # the collisions of each disk in turn
-    disk, change = disk[order], change[order]
-    before = np.cumsum(change, axis=0) - change
-    first, last = (np.searchsorted(disk, disk, side) for side in ("left", "right"))
-    before += start[disk] - before[first]
-    after = before + change
-    if not np.allclose(after[last - 1], end[disk], rtol=0, atol=CLOSE * np.abs(end).max()):
-        raise RunError(f"{run.path}: the event log does not lead from the first frame to the last")
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    return before[back].reshape(-1, 2, 2), after[back].reshape(-1, 2, 2)
-
-
-def flux(v: np.ndarray, mass: float) -> np.ndarray:
-    """(..., 5) what disks with the velocities (..., 2) carry: momentum xx, xy, yy, energy x, y."""
-    x, y = np.moveaxis(v, -1, 0)
-    energy = mass * (x**2 + y**2) / 2
-    return np.stack([mass * x * x, mass * x * y, mass * y * y, energy * x, energy * y], axis=-1)
-
-
-def handed_on(run: Run, change: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(E, 5) the same, from disk to disk in each collision."""
-    way = 2 * run.radius[0] * change / np.linalg.norm(change, axis=1, keepdims=True)
-    gain = run.mass[0] * np.sum(after[:, 0] ** 2 - before[:, 0] ** 2, axis=1) / 2
-    products = [change[:, a] * way[:, b] for a, b in ((0, 0), (0, 1), (1, 1))]
-    return np.stack([*products, gain * way[:, 0], gain * way[:, 1]], axis=1)
-
-
 def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
-    """From the time `start` to the last frame, `PER_FREE_TIME` samples per mean free time.
+    """From the time `start` on, at each sample of the observables.
 
     Their step, and by coefficient the moments (T, C) without their mean growth: of the momentum xy
-    and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y.
+    and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y; all relative to the centre of mass.
+    Raises RunError where the run has not summed them up, or not equally far apart in time.
     """
     allow(run, TAKES)
-    events = log(run)
-    before, after = velocities(run, events)
-    mass = run.mass[0]
-    carried = flux(run.velocity[0] - td.drift(run), mass).sum(axis=0)
-    changes = (flux(after, mass) - flux(before, mass)).sum(axis=1)
-    carried = carried + np.cumsum(np.vstack([np.zeros(5), changes]), axis=0)
-    knots = np.concatenate([run.time[:1], events.time, run.time[-1:]])
-    flown = np.cumsum(np.vstack([np.zeros(5), carried * np.diff(knots)[:, None]]), axis=0)
-    handed = handed_on(run, events.momentum_change, before, after)
-    handed = np.cumsum(np.vstack([np.zeros(5), handed]), axis=0)
-
-    step = td.mean_free_time(run, start) / PER_FREE_TIME
-    time = np.arange(start, run.time[-1], step)
-    total = handed[np.searchsorted(events.time, time, "right")]
-    total += np.stack([np.interp(time, knots, part) for part in flown.T], axis=1)
-    total -= total[0] + np.linspace(0, 1, len(time))[:, None] * (total[-1] - total[0])
-    xx, xy, yy, *heat = total.T
-    parts = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat
-    return step, {name: np.stack(one, axis=1) for name, one in zip(MOMENTS, parts, strict=True)}
+    if "helfand_heat" not in run.observables:
+        raise RunError(f"{run.path}: has no Helfand moments, set output.helfand = .true.")
+    parts = [run.observable(name) for name in SUMS]
+    first = int(np.searchsorted(parts[0].time, start))
+    time = parts[0].time[first:-1]  # the last may come sooner
+    apart = np.diff(time)
+    if len(apart) < 2 or np.ptp(apart) > CLOSE * apart[0]:
+        raise RunError(
+            f"{run.path}: moments take observables equally far apart in time; set "
+            f"output.observables_every_time = {td.mean_free_time(run, start) / PER_FREE_TIME:.2g}"
+        )
+    flown, handed, heat, heat_handed = (part.value[first:-1] for part in parts)
+    momentum = (flown + handed).reshape(-1, 2, 2)
+    # In the frame of the centre of mass; what else that takes away grows evenly.
+    heat = heat + heat_handed - np.einsum("a,tab->tb", td.drift(run), momentum)
+    xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
+    groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
+    found = {name: np.stack(one, axis=1) for name, one in zip(MOMENTS, groups, strict=True)}
+    share = np.linspace(0, 1, len(time))[:, None]
+    return float(apart.mean()), {
+        name: one - one[0] - share * (one[-1] - one[0]) for name, one in found.items()
+    }
 
 
 def squares(moment: np.ndarray, lag: int) -> np.ndarray:
@@ -224,12 +184,19 @@ def enskog_of(run: Run) -> dict[str, float]:
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     """Viscosities and conductivity."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
+    steps = [step / td.mean_free_time(run) for run, (step, _) in zip(runs, each, strict=True)]
+    if np.ptp(steps) > 0.1 * steps[0]:
+        raise RunError(f"{runs[0].path}: samples of the others are not as far apart")
+    per_free_time = 1 / float(np.mean(steps))
     shortest = min(len(one["viscosity"]) for _, one in each)
-    lag = min(round(MEMORY * PER_FREE_TIME), shortest // 8)
-    if lag < PER_FREE_TIME:
-        raise RunError(f"{runs[0].path}: needs more than eight collisions per disk in equilibrium")
+    lag = min(round(MEMORY * per_free_time), shortest // 8)
+    if lag < max(2, per_free_time):
+        raise RunError(
+            f"{runs[0].path}: needs more than eight collisions per disk in equilibrium, and "
+            "observables more often than each tenth"
+        )
     at = lags(4 * lag)  # up to twice the lag
-    middle = (at + np.append(0, at[:-1])) / 2 / PER_FREE_TIME
+    middle = (at + np.append(0, at[:-1])) / 2 / per_free_time
     found = {}
     for name in MOMENTS:
         members, slopes = [], []
@@ -239,7 +206,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
             unit = 1 / unit / enskog_of(run)[name]
             members.append(coefficient(one[name], step, lag).scaled(unit))
             slopes.append(running(one[name], step, at) * unit)
-        found[name] = Found(members, Curve(middle, *estimate(slopes)), lag / PER_FREE_TIME)
+        found[name] = Found(members, Curve(middle, *estimate(slopes)), lag / per_free_time)
     return found
 
 
@@ -250,7 +217,7 @@ def in_step(run: Run, start: float) -> slice:
     if len(apart) < 16 or np.ptp(apart) > 1e-6 * apart[0]:
         raise RunError(
             f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
-            "output.frames_every_time"
+            "output.frames_every_time alone"
         )
     return frames
 

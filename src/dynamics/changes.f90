@@ -60,13 +60,15 @@ contains
   subroutine change_velocities(sim, v)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: v(:, :)                      !! (2,n) by id [length/time]
-    real(real64) :: before                                   ! [energy]
+    real(real64) :: before, old(2)                           ! [energy], [length/time]
     integer(int32) :: i
 
     before = total_energy(sim)
     call land_all(sim)
     do i = 1, sim%n_disks()
+      old = sim%disk(i)%v
       sim%disk(i)%v = v(:, sim%tag(i)%id)
+      call sim%note_change(i, old, sim%now)
       sim%tag(i)%met = 0                                     ! what it met last, it may meet again at once, as after a kick
     end do
     call book(sim, before)

@@ -89,7 +89,7 @@ contains
 
     turns = limits%turns
     self%turns_left = turns
-    self%thorough = present(log) .or. sim%with%are_rare()
+    self%thorough = present(log) .or. sim%with%are_rare() .or. sim%law%by_speed%speed > 0
     self%arrived = .false.
     do while (turns > 0)
       if (limits%reached(sim%tally) .or. is_full(log)) return
@@ -191,7 +191,7 @@ contains
         if (self%thorough .or. .not. abs(sim%disk(i)%clock - sim%disk(code)%clock) > 0) then
           call collide(sim, i, code, t, counts, log)
         else
-          call collide_pair(sim, i, code, t, counts)
+          call collide_pair(sim, i, code, t, counts, sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species))
         end if
         call self%queue%forget(code)
         call self%search%predict_both(sim, i, code)

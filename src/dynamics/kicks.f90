@@ -129,11 +129,12 @@ contains
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: v(2)             !! [length/time]
+    real(real64) :: before(2)
 
-    associate (before => sim%disk(i)%v)
-      call sim%tally%sum(drive_energy)%add(0.5_real64*sim%mass_of(i)*dot_product(v - before, v + before))
-      before = v
-    end associate
+    before = sim%disk(i)%v
+    call sim%tally%sum(drive_energy)%add(0.5_real64*sim%mass_of(i)*dot_product(v - before, v + before))
+    sim%disk(i)%v = v
+    call sim%note_change(i, before, sim%now)
   end subroutine change_velocity
 
   !> Gives disk i an angular velocity, and counts the energy that this takes.

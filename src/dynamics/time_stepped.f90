@@ -88,11 +88,10 @@ contains
     type(event_log_t), intent(inout), optional :: log
     integer(int64) :: k
 
-    self%arrived = .false.
+    self%arrived = .not. sim%now < limits%time      ! a step is one moment, whatever ends there, the turns too
     self%turns_left = limits%turns
     k = steps_taken(sim%now, self%dt)
     do while (self%turns_left > 0)
-      self%arrived = .not. sim%now < limits%time    ! a step is one moment, whatever ends there
       if (limits%reached(sim%tally) .or. is_full(log)) return
       if (modulo(k, steps_per_look) == 0) self%idle = at_rest(sim)
       if (self%idle .or. (k + 1)*self%dt > limits%time) then
@@ -104,6 +103,7 @@ contains
       call take_step(self, sim, k*self%dt, error, log)
       if (allocated(error) .or. sim%now < k*self%dt) return
       self%turns_left = self%turns_left - 1
+      self%arrived = .not. sim%now < limits%time
     end do
   end subroutine advance
 

@@ -2,14 +2,14 @@
 module input_settings
   use kinds, only: int64, never, real64
   use box_geometry, only: box_t
-  use collisions, only: grip_t, wall_law_t, wall_rules
+  use collisions, only: grip_t, restitution_laws, series_terms, wall_law_t, wall_rules
   use disks, only: names_of
   use drive, only: active, drive_kinds
   use input_groups, only: group_t, range_of
   use input_problems, only: problem_list_t
   use input_species, only: take_species
-  use input_surfaces, only: take_grip, take_obstacles, take_wall_laws
-  use settings, only: sampled_by, settings_t
+  use input_surfaces, only: check_least, take_grip, take_obstacles, take_wall_laws
+  use settings, only: sampled, sampled_by, sampling_t, settings_t
   use texts, only: counted, joined, place_of, shown, suggestion, written
   use variables, only: is_repeated, obstacle_groups, row_of, variables_of, words_of
   implicit none
@@ -49,7 +49,9 @@ contains
       with%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
         .or. any(settings%species%rotational_temperature >= 0)
       with%orientation = with%rotation .or. settings%drive%kind == active
-      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor
+      with%helfand = settings%output%helfand
+      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor &
+        .or. with%helfand
     end associate
     call check_conflicts(settings, groups, problems)
 
@@ -102,6 +104,12 @@ contains
         restitution = group%real_of("restitution", 1.0_real64)
         wall_law%restitution = group%real_of("wall_restitution", restitution)
         wall_law%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
+        law%by_speed%speed = group%real_of("restitution_speed", 0.0_real64)
+        law%by_speed%c = series_terms(max(1, place_of(group%text_of("restitution_law"), words_of(restitution_laws))))
+        wall_law%by_speed = law%by_speed
+        call check_least(group, "restitution", law%by_speed, problems)
+        call check_least(group, "wall_restitution", law%by_speed, problems)
+        call check_least(group, "pair_restitution", law%by_speed, problems)
         call take_grip(group, "", grip_t(), law%grip, problems)
         call take_grip(group, "wall_", law%grip, wall_law%grip, problems)
         law%inertia = group%real_of("inertia", 0.5_real64)
@@ -164,15 +172,37 @@ contains
       type(group_t), intent(in) :: group
       integer :: k
 
+      do k = 1, size(sampled)
+        call take_sampling(group, trim(sampled(k)), settings%output%sampling(k))
+      end do
+      if (group%given("frames_from") .and. all(settings%output%sampling%per_decade == 0)) call group%complain("frames_from", &
+        "has no effect without frames_per_decade or observables_per_decade", problems)
       associate (output => settings%output)
-        output%frames_every = [(group%real_of("frames_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
-        output%observables_every = [(group%real_of("observables_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
         output%single_precision = group%text_of("precision") == "single"
         output%event_log = group%text_of("event_log") == ".true."
         output%virial_tensor = group%text_of("virial_tensor") == ".true."
+        output%helfand = group%text_of("helfand") == ".true."
         output%checkpoint_every = group%real_of("checkpoint_every", never)
       end associate
     end subroutine take_output
+
+    !> When frames or observables are written.
+    subroutine take_sampling(group, what, sampling)
+      type(group_t), intent(in) :: group
+      character(len=*), intent(in) :: what                !! in `sampled`
+      type(sampling_t), intent(out) :: sampling
+      integer :: k
+
+      sampling%every = [(group%real_of(what//"_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
+      sampling%per_decade = int(group%integer_of(what//"_per_decade", 0_int64))
+      sampling%from = group%real_of("frames_from", never)
+      if (sampling%per_decade > 0 .and. .not. group%given("frames_from")) call group%complain(what//"_per_decade", &
+        "needs frames_from, the time of the first", problems)
+      if (.not. group%given(what//"_at")) return
+      sampling%at = group%reals_of(what//"_at")
+      if (any(sampling%at(2:) <= sampling%at(:size(sampling%at) - 1))) call group%complain(what//"_at", &
+        "the times must increase", problems)
+    end subroutine take_sampling
   end subroutine resolve_settings
 
   !> The table of what cannot be together in an input, across its groups, and of intervals that are too short. What excludes
@@ -198,6 +228,8 @@ contains
       call refuse(shear .and. any(groups%name == "obstacle"), "box.shear_rate", "&obstacle")
       call refuse(shear .and. any(groups%name == "wall"), "box.shear_rate", "&wall")
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
+      call refuse(settings%output%helfand .and. box%falling(), "output.helfand", "box.gravity: velocities change all the time")
+      call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)
       call refuse(by_energy .and. kicks, energy, "drive.kind: kicks change the energy"//other_rule)
       call refuse(by_energy .and. box%gives_energy() .and. .not. shear, energy, "walls that give energy, by temperature, speed " &

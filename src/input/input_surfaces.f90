@@ -2,7 +2,7 @@
 module input_surfaces
   use box_geometry, only: box_t
   use circles, only: new_circle
-  use collisions, only: grip_t, normal_rule, wall_law_t, wall_rules
+  use collisions, only: grip_t, normal_rule, speed_law_t, wall_law_t, wall_rules
   use input_problems, only: problem_list_t
   use input_species, only: check_name
   use kinds, only: real64
@@ -14,7 +14,7 @@ module input_surfaces
   use texts, only: place_of, written
   implicit none
   private
-  public :: take_grip, take_obstacles, take_wall_laws
+  public :: check_least, take_grip, take_obstacles, take_wall_laws
 
 contains
 
@@ -107,6 +107,8 @@ contains
         if (thermal) return
         law%rule = max(1, place_of(group%text_of("rule"), rules))
       end associate
+      law%by_speed = otherwise%by_speed
+      call check_least(group, "restitution", law%by_speed, problems)
       law%restitution = group%real_of("restitution", otherwise%restitution)
       call group%put_reals("restitution", [law%restitution])
       if (law%rule == normal_rule) call take_grip(group, "", otherwise%grip, law%grip, problems)
@@ -132,6 +134,17 @@ contains
         written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
     end subroutine take_motion
   end subroutine take_wall_laws
+
+  !> Reports restitutions that are given and too small for the law of their speed.
+  subroutine check_least(group, name, by_speed, problems)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: name
+    type(speed_law_t), intent(in) :: by_speed
+    type(problem_list_t), intent(inout) :: problems
+
+    if (group%given(name) .and. any(group%reals_of(name) < by_speed%least())) call group%complain(name, "must be at least " &
+      //written(by_speed%least())//" with contact.restitution_law = 'viscoelastic': there its series ends to fall", problems)
+  end subroutine check_least
 
   !> How rough disks or walls are, by variables whose names have a prefix in &contact.
   subroutine take_grip(group, prefix, otherwise, grip, problems)

@@ -1,7 +1,7 @@
 !> The input as typed data: the file, its defaults and the overrides, with every value resolved.
 !> Meaning, range and unit of each variable are in `variables`.
 module settings
-  use kinds, only: int64, real64
+  use kinds, only: int64, never, real64
   use disks, only: species_t
   use errors, only: error_t
   use input_groups, only: group_t
@@ -10,7 +10,7 @@ module settings
   use texts, only: text_t
   implicit none
   private
-  public :: run_input_t, settings_t, run_settings_t, species_settings_t, output_settings_t, disks_in_file_t
+  public :: run_input_t, settings_t, run_settings_t, sampling_t, species_settings_t, output_settings_t, disks_in_file_t
 
   integer, parameter :: many_disks = 500000           !! from here on parts of the box that fit into caches pay
 
@@ -61,12 +61,23 @@ module settings
   character(len=19), parameter, public :: sampled_by(4) = [character(len=19) :: "time", "collisions", "events", &
     "collisions_per_disk"]
 
-  !> An interval that is not set is `never`.
+  !> What is sampled, in the names of variables.
+  character(len=11), parameter, public :: sampled(2) = [character(len=11) :: "frames", "observables"]
+
+  !> When it is; an interval that is not set is `never`.
+  type :: sampling_t
+    real(real64) :: every(4) = never                  !! of `sampled_by`
+    real(real64), allocatable :: at(:)                !! chosen times, in their order [time]
+    integer :: per_decade = 0                         !! times in each power of ten; 0: none
+    real(real64) :: from = never                      !! the first of them [time]
+  end type sampling_t
+
   type :: output_settings_t
-    real(real64) :: frames_every(4), observables_every(4)     !! of `sampled_by`
+    type(sampling_t) :: sampling(2)                   !! of `sampled`
     logical :: single_precision                       !! precision == 'single'
     logical :: event_log
     logical :: virial_tensor                          !! of smooth disks, too
+    logical :: helfand                                !! moments of momentum and heat
     real(real64) :: checkpoint_every                  !! [s] of wall clock
   end type output_settings_t
 

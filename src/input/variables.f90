@@ -2,7 +2,7 @@
 !> `/parameters` in the output file and the reference page.
 module variables
   use kinds, only: real64
-  use collisions, only: wall_rules
+  use collisions, only: restitution_laws, wall_rules
   use drive, only: drive_kinds
   use side_motion, only: motions
   use texts, only: joined, written
@@ -37,6 +37,7 @@ module variables
   type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
   type(range_t), parameter :: tangential = range_t(-1, 1, "from -1 to 1")
   type(range_t), parameter :: moment = range_t(smallest, 1, "> 0 and <= 1")
+  type(range_t), parameter :: per_decade = range_t(1, 1000, "from 1 to 1000")
   type(range_t), parameter :: count_of_disks = range_t(1, most_disks, "from 1 to 100000000")
 
   type :: variable_t
@@ -179,6 +180,11 @@ module variables
       "of two disks: 1 elastic, 0 no rebound", unit_interval), &
     variable_t("contact", "wall_restitution", "real", 1, "optional", "1", &
       "of a disk and a wall; default as restitution", unit_interval), &
+    variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
+      "slower contacts of disks and with walls lose less: 1 - restitution ~ g**(1/5)", choices=restitution_laws), &
+    variable_t("contact", "restitution_speed", "real", 1, "required", "1", &
+      "speed g along the normal from which on restitutions are as given", positive, "length/time", &
+      goes_with="restitution_law power viscoelastic"), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
       "walls reduce the whole velocity, or its normal part only", choices=wall_rules), &
     variable_t("contact", "contact_time", "real", 1, "default", "0", &
@@ -239,6 +245,12 @@ module variables
       "a frame after so many collisions of any kind", positive), &
     variable_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
       "a frame whenever 2 collisions/N has grown by this", positive), &
+    variable_t("output", "frames_at", "real", 0, "optional", "0.1, 1, 10", &
+      "frames at these times, too, in their order", not_negative, "time"), &
+    variable_t("output", "frames_per_decade", "integer", 1, "optional", "10", &
+      "frames at so many times in each power of ten, too, from frames_from on", per_decade), &
+    variable_t("output", "frames_from", "real", 1, "optional", "0.001", &
+      "first time of frames_per_decade and observables_per_decade", positive, "time"), &
     variable_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "energies, pressure, ...; default the first and the last", positive, "time"), &
     variable_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
@@ -247,11 +259,17 @@ module variables
       "a sample after so many collisions of any kind", positive), &
     variable_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
       "a sample whenever 2 collisions/N has grown by this", positive), &
+    variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
+      "samples at these times, too, in their order", not_negative, "time"), &
+    variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
+      "samples at so many times in each power of ten, too, from frames_from on", per_decade), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
     variable_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
     variable_t("output", "virial_tensor", "logical", 1, "default", ".false.", &
       "gather it for smooth disks, too, at some cost"), &
+    variable_t("output", "helfand", "logical", 1, "default", ".false.", &
+      "sum up over time what disks carry, for viscosities and conductivity"), &
     variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
       "computing time between checkpoints", positive, "s")]
 
@@ -261,7 +279,7 @@ module variables
   !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
   !> is written. They have no effect on the trajectory.
   character(len=25), parameter :: free(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
-    "stop.", "output.frames_every_", "output.observables_every_", "output.checkpoint_every"]
+    "stop.", "output.frames_", "output.observables_", "output.checkpoint_every"]
 
   !> Those that may be another while a run is at work, but for what says where something is: what acts on disks.
   character(len=11), parameter :: acting(*) = [character(len=11) :: "box.gravity", "contact.", "side.", "obstacle.", "wall.", &

@@ -1,9 +1,9 @@
-!> When samples are due: at multiples of a time, of a number of collisions or of a number of events, and at the start and
-!> the end of a run. And how far the output has come.
+!> When samples are due: at multiples of a time, of a number of collisions or of a number of events, at chosen times, and at
+!> the start and the end of a run. And how far the output has come.
 module cadence
   use kinds, only: int64, never, real64
   use evolution, only: limits_t
-  use settings, only: settings_t
+  use settings, only: sampling_t, settings_t
   use simulation_state, only: simulation_t
   use stop_rules, only: whole_collisions
   implicit none
@@ -13,8 +13,11 @@ module cadence
   !> What is counted.
   integer, parameter :: by_time = 1, by_collisions = 2, by_events = 3
 
+  integer, parameter :: units_lost = 4          !! times that differ by so many units in the last place are one
+
   type :: cadence_t
     real(real64) :: every(3) = never              !! interval of time; of collisions and of events, whole or not
+    type(sampling_t) :: chosen                    !! as in the input, for its times
     integer(int64) :: count = 0                   !! samples taken; the first is due at once
     real(real64) :: next(3) = never               !! time, collisions and events at which the next are due
     real(real64) :: last_time = -1.0_real64       !! of the last sample [time]
@@ -26,6 +29,7 @@ module cadence
     procedure :: look_ahead
     procedure :: tighten
     procedure :: planned
+    procedure, private :: next_time, number_within
   end type cadence_t
 
   !> With the state, all that is needed to go on.
@@ -45,9 +49,12 @@ contains
   pure function new_progress(settings) result(progress)
     type(settings_t), intent(in) :: settings
     type(progress_t) :: progress
+    integer :: k
 
-    progress%cadence(frames)%every = intervals(settings%output%frames_every)
-    progress%cadence(values)%every = intervals(settings%output%observables_every)
+    do k = frames, values
+      progress%cadence(k)%every = intervals(settings%output%sampling(k)%every)
+      progress%cadence(k)%chosen = settings%output%sampling(k)
+    end do
   contains
 
     !> Of time, of collisions in all or per disk, and of events.
@@ -97,7 +104,7 @@ contains
     logical :: over                               ! the present moment, for samples
 
     over = sim%settled .or. self%last_time >= sim%time()
-    self%next(by_time) = next_time(sim%time(), self%every(by_time), over)
+    self%next(by_time) = self%next_time(sim%time(), merge(sim%time(), self%last_time, over))
     self%next(by_collisions:) = next_number([sim%tally%collisions, sim%tally%events], self%every(by_collisions:))
   end subroutine look_ahead
 
@@ -112,20 +119,65 @@ contains
     limits%sampled = max(limits%sampled, self%last_time)
   end subroutine tighten
 
-  !> The first multiple of an interval from a time on, or beyond it: a product, not a sum, so that it does not drift.
-  pure function next_time(time, every, beyond) result(next)
-    real(real64), intent(in) :: time, every       !! [time]
-    logical, intent(in) :: beyond
-    real(real64) :: next
-    integer(int64) :: multiple
+  !> The first time from one on, and beyond another, at which a sample is due: a multiple of the interval (a product, not a
+  !> sum, so that it does not drift), a step of the decades, or a time in the list. What differs by rounding is due once, at
+  !> the last of these.
+  pure function next_time(self, time, past) result(next)
+    class(cadence_t), intent(in) :: self
+    real(real64), intent(in) :: time, past        !! [time]
+    real(real64) :: next, due(3)
+    integer(int64) :: n
+    integer :: k
 
-    next = never
-    if (.not. every < never) return
-    multiple = max(1_int64, int(time/every, int64))
-    do while (multiple*every < time .or. (beyond .and. multiple*every <= time))
-      multiple = multiple + 1
+    due = never
+    if (self%every(by_time) < never) then
+      n = max(1_int64, int(time/self%every(by_time), int64))
+      do while (.not. is_ahead(n*self%every(by_time)))
+        n = n + 1
+      end do
+      due(1) = n*self%every(by_time)
+    end if
+    if (self%chosen%per_decade > 0) then
+      associate (from => self%chosen%from, steps => real(self%chosen%per_decade, real64))
+        n = max(0_int64, int(steps*log10(max(time, from)/from), int64) - 1)
+        do while (.not. is_ahead(from*10**(n/steps)))
+          n = n + 1
+        end do
+        due(2) = from*10**(n/steps)
+      end associate
+    end if
+    if (allocated(self%chosen%at)) due(3) = first_ahead(self%chosen%at)
+    next = minval(due)
+    do k = 2, 3
+      if (due(k) <= next + units_lost*spacing(next)) next = due(k)
     end do
-    next = multiple*every
+  contains
+
+    !> Whether a time is still to come.
+    pure logical function is_ahead(t)
+      real(real64), intent(in) :: t
+
+      is_ahead = t >= time .and. t > past + units_lost*spacing(past)
+    end function is_ahead
+
+    !> The first of some times that is.
+    pure real(real64) function first_ahead(times)
+      real(real64), intent(in) :: times(:)        !! in their order [time]
+      integer :: behind, ahead, middle
+
+      behind = 0
+      ahead = size(times) + 1
+      do while (ahead - behind > 1)
+        middle = (behind + ahead)/2
+        if (is_ahead(times(middle))) then
+          ahead = middle
+        else
+          behind = middle
+        end if
+      end do
+      first_ahead = never
+      if (ahead <= size(times)) first_ahead = times(ahead)
+    end function first_ahead
   end function next_time
 
   !> The first number of collisions or events beyond n that reaches another multiple of an interval: where a run would end
@@ -146,22 +198,43 @@ contains
   end function next_number
 
   !> Number of samples of a run if it can be known in advance: there is at most one interval, and one rule of the same
-  !> kind ends the run. Otherwise 0.
+  !> kind ends the run, that of time if times are chosen. Otherwise 0.
   elemental function planned(self, limits) result(n)
     class(cadence_t), intent(in) :: self
     type(limits_t), intent(in) :: limits          !! of the run
     integer(int64) :: n
-    logical :: given(3), limited(3)
+    logical :: given(3), limited(3), chooses
 
+    chooses = self%chosen%per_decade > 0 .or. allocated(self%chosen%at)
     given = self%every < never
+    given(by_time) = given(by_time) .or. chooses
     limited = [limits%time < never, limits%collisions < huge(n), limits%events < huge(n)]
     n = 0
     if (.not. any(given)) n = 2
     if (count(given) /= 1 .or. any(given .neqv. limited) .or. limits%watches()) return
-    if (given(by_time)) n = multiples_within(limits%time, self%every(by_time))
+    if (given(by_time) .and. .not. chooses) n = multiples_within(limits%time, self%every(by_time))
+    if (chooses) n = self%number_within(limits%time)
     if (given(by_collisions)) n = numbers_within(limits%collisions, self%every(by_collisions))
     if (given(by_events)) n = numbers_within(limits%events, self%every(by_events))
   end function planned
+
+  !> Number of times up to t at which samples are due, 0 and t itself among them. 0: too many to plan for.
+  pure function number_within(self, t) result(n)
+    class(cadence_t), intent(in) :: self
+    real(real64), intent(in) :: t                 !! [time]
+    integer(int64) :: n
+    integer(int64), parameter :: too_many = 10000000
+    real(real64) :: next
+
+    n = 1
+    next = self%next_time(0.0_real64, 0.0_real64)
+    do while (next < t .and. n < too_many)
+      n = n + 1
+      next = self%next_time(next, next)
+    end do
+    if (t > 0) n = n + 1
+    if (n > too_many) n = 0
+  end function number_within
 
   !> Number of times 0, dt, 2 dt, ... up to t, and t itself. 0: too many to plan for.
   pure function multiples_within(t, dt) result(n)

@@ -3,12 +3,27 @@ module collisions
   use kinds, only: real64
   implicit none
   private
-  public :: contact_law_t, grip_t, normal_rule, pair_impulse, tangential_impulse
+  public :: contact_law_t, grip_t, normal_rule, pair_impulse, restitution_laws, series_terms, speed_law_t, tangential_impulse
   public :: wall_law_t, wall_rebound, wall_rules
 
   !> The rules for walls by their names in the input; a rule is its number in this list.
   character(len=*), parameter :: wall_rules = "velocity normal"
   integer, parameter :: normal_rule = 2              !! a smooth wall
+
+  !> How restitution depends on the speed of approach, by names in the input; and the coefficient c of `speed_law_t` for each,
+  !> 3/5 in the series of viscoelastic bodies.
+  character(len=*), parameter :: restitution_laws = "constant power viscoelastic"
+  real(real64), parameter :: series_terms(3) = [0.0_real64, 0.0_real64, 0.6_real64]
+
+  !> Soft contacts lose less (Ramirez, Poschel, Brilliantov and Schwager, Phys. Rev. E 60, 4465 (1999)): below the speed g0 the
+  !> restitution is 1 - y + c y**2, y = y0 (g/g0)**(1/5). The law has y0 such that it is that of the input at g0, as it is above.
+  type :: speed_law_t
+    real(real64) :: speed = 0.0_real64               !! g0 along the normal; 0: constant [length/time]
+    real(real64) :: c = 0.0_real64                   !! in `series_terms`
+  contains
+    procedure :: restitution_at
+    procedure :: least
+  end type speed_law_t
 
   !> How two rough surfaces act on each other along their tangent (Walton 1993; Luding, Huthmann, McNamara and Zippelius,
   !> Phys. Rev. E 57, 3416 (1998)).
@@ -23,6 +38,7 @@ module collisions
   type :: wall_law_t
     real(real64) :: restitution = 1.0_real64
     integer :: rule = 1                              !! in `wall_rules`
+    type(speed_law_t) :: by_speed = speed_law_t()
     type(grip_t) :: grip = grip_t()
     real(real64) :: temperature = 0.0_real64         !! kT of a thermal wall; 0: it is none [energy]
     real(real64) :: speed = 0.0_real64               !! of the surface along the wall [length/time]
@@ -31,6 +47,7 @@ module collisions
   !> What happens when two disks touch, and when a contact is over.
   type :: contact_law_t
     real(real64), allocatable :: restitution(:, :)   !! (s,s) by pair of species, symmetric
+    type(speed_law_t) :: by_speed = speed_law_t()    !! of two disks
     !> TC model (Luding and McNamara, Granular Matter 1, 113 (1998)): a contact is elastic if a partner
     !> had its last one less than this time ago. [time]
     real(real64) :: contact_time = 0.0_real64
@@ -49,6 +66,28 @@ contains
 
     yes = any(self%restitution < 1) .or. self%grip%is_rough()
   end function loses_energy
+
+  !> The restitution of a contact.
+  elemental function restitution_at(self, restitution, g) result(xi)
+    class(speed_law_t), intent(in) :: self
+    real(real64), intent(in) :: restitution          !! at g0
+    real(real64), intent(in) :: g                    !! speed of approach along the normal [length/time]
+    real(real64) :: xi, y
+
+    xi = restitution
+    if (.not. g < self%speed) return
+    y = 2*(1 - xi)/(1 + sqrt(max(0.0_real64, 1 - 4*self%c*(1 - xi))))*(g/self%speed)**0.2_real64
+    xi = 1 - y + self%c*y**2
+  end function restitution_at
+
+  !> The least restitution at g0: there the series ends to fall.
+  elemental function least(self) result(xi)
+    class(speed_law_t), intent(in) :: self
+    real(real64) :: xi
+
+    xi = 0
+    if (self%c > 0) xi = 1 - 1/(4*self%c)
+  end function least
 
   !> Impulse on disk i divided by the separation vector dx = x_j - x_i: v_i grows by q dx/m_i, v_j by
   !> -q dx/m_j. It takes the true distance, not the nominal one: energy is kept to rounding.
@@ -94,8 +133,8 @@ contains
     logical, intent(in) :: elastic                   !! the last contact is not over yet
     real(real64) :: after(2), approach, restitution
 
-    restitution = merge(1.0_real64, law%restitution, elastic)
     approach = v(1)*normal(1) + v(2)*normal(2)
+    restitution = merge(1.0_real64, law%by_speed%restitution_at(law%restitution, abs(approach)), elastic)
     if (law%rule == normal_rule) then
       after = v + (restitution*abs(approach) - approach)*normal
     else

@@ -3,14 +3,14 @@
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
-  use disks, only: image_column, land, mass_column
+  use disks, only: disk_t, image_column, land, mass_column
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
   use partners, only: axis_of, is_side, is_wall, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
-  use tally, only: dissipated, stress, virial, work
+  use tally, only: dissipated, heat_virial, stress, virial, work
   use texts, only: written
   use wall_hits, only: collide_wall
   implicit none
@@ -29,7 +29,7 @@ contains
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout), optional :: log
-    real(real64) :: v(2), change(2)
+    real(real64) :: v(2), w(2), change(2), restitution
     integer(int32) :: first, second, ids(2)
 
     first = i
@@ -46,8 +46,12 @@ contains
     end if
     call sim%turn(first, t)
     v = flight_velocity(sim%disk(first)%v, sim%box%gravity, t - sim%disk(first)%clock)
+    w = v
+    if (code > 0) w = flight_velocity(sim%disk(second)%v, sim%box%gravity, t - sim%disk(second)%clock)
     if (code > 0) then
-      call collide_pair(sim, i, code, t, counts)
+      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+      if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, approach(sim, i, code, t))
+      call collide_pair(sim, i, code, t, counts, restitution)
       if (sim%law%grip%is_rough()) &
         call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
     else
@@ -55,7 +59,10 @@ contains
     end if
     if (.not. counts) return
     change = sim%mass_of(first)*(sim%disk(first)%v - v)
-    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change)
+    if (code > 0 .and. sim%with%stress) call book_pair(sim, first, second, change, &
+      0.5_real64*(gain(sim, first, v) - gain(sim, second, w)))
+    call sim%note_change(first, v, t)
+    if (code > 0) call sim%note_change(second, w, t)
     if (.not. present(log)) return
     ids = [sim%tag(first)%id, code]
     if (code > 0) ids(2) = sim%tag(second)%id
@@ -63,18 +70,18 @@ contains
   end subroutine collide
 
   !> Collides the disks i and j at the time t. Which of them is i changes no bit.
-  subroutine collide_pair(sim, i, j, t, counts)
+  subroutine collide_pair(sim, i, j, t, counts, restitution)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
     logical, value :: counts                     !! in the tally
-    real(real64) :: dx(2), dv(2), b, distance2, restitution, q, mass_i, mass_j
+    real(real64), value :: restitution           !! but for the TC model
+    real(real64) :: dx(2), dv(2), b, distance2, q, mass_i, mass_j
     integer(int32) :: si, sj
     logical :: elastic
 
     si = sim%tag(i)%species
     sj = sim%tag(j)%species
-    restitution = sim%law%restitution(si, sj)
     if (sim%law%contact_time > 0) then
       elastic = .false.
       call sim%make_contact(i, t, elastic)
@@ -111,6 +118,24 @@ contains
     call sim%tally%sum(virial)%add(-q*distance2)
     if (restitution < 1) call sim%tally%sum(dissipated)%add(0.5_real64*(1 - restitution)*q*b)
   end subroutine collide_pair
+
+  !> Speed along the normal with which the disks i and j meet at the time t.
+  pure function approach(sim, i, j, t) result(g)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, j
+    real(real64), intent(in) :: t
+    type(disk_t) :: p, q
+    real(real64) :: g, dx(2), dv(2)              ! [length/time]
+
+    p = sim%disk(i)
+    q = sim%disk(j)
+    call land(p, sim%box%gravity, t)
+    call land(q, sim%box%gravity, t)
+    dx = q%x - p%x
+    dv = q%v - p%v
+    call see_nearest(sim, t, dx, dv)
+    g = abs(dot_product(dx, dv))/magnitude(dx)
+  end function approach
 
   !> Counts a collision of two disks that have both had one at this very time, if it is lossy: by the TC model it is not. In
   !> a lattice many may have that; but if two have hit each other then, and do so again, it is a collapse.
@@ -154,12 +179,24 @@ contains
     call keep_apart(sim, i, j)
   end subroutine rub
 
-  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change times their
-  !> distance; and what the shear has done, which is nothing but if they met through the bottom or the top.
-  subroutine book_pair(sim, i, j, change)
+  !> The energy of translation that disk i has gained.
+  pure function gain(sim, i, before)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: before(2)        !! its velocity [length/time]
+    real(real64) :: gain                         !! [energy]
+
+    gain = 0.5_real64*sim%mass_of(i)*dot_product(sim%disk(i)%v - before, sim%disk(i)%v + before)
+  end function gain
+
+  !> Books a collision of the disks i and j, whose momentum changes by `change` and its negative: the change, and the energy
+  !> that one hands to the other, times their distance; and what the shear has done, which is nothing but if they met through
+  !> the bottom or the top.
+  subroutine book_pair(sim, i, j, change, handed)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: change(2)        !! [mass length/time]
+    real(real64), intent(in) :: handed           !! to disk i [energy]
     real(real64) :: r(2), slip(2)
     integer :: a, b
 
@@ -171,6 +208,7 @@ contains
         call sim%tally%sum(stress + 2*(a - 1) + b - 1)%add(change(a)*r(b))
       end do
     end do
+    if (sim%with%helfand) call sim%tally%sum(heat_virial:heat_virial + 1)%add(handed*r)
     if (.not. sim%box%is_sheared()) return
     call sim%tally%sum(work)%add(-slip(1)*change(1))
     call keep_apart(sim, i, j)

@@ -10,6 +10,7 @@ module features
     logical :: rotation = .false.       !! disks can turn
     logical :: orientation = .false.    !! disks have a direction, as all have that can turn
     logical :: stress = .false.         !! the changes of momentum are summed, and logged
+    logical :: helfand = .false.        !! and what disks carry is summed over time
   contains
     procedure :: are_rare
   end type features_t

@@ -6,7 +6,7 @@ module observables
   use drive, only: noise
   use partners, only: n_sides
   use simulation_state, only: simulation_t
-  use tally, only: dissipated, drive_energy, gain, heat, impulse, stress, virial, work
+  use tally, only: carried, dissipated, drive_energy, flights, gain, heat, heat_virial, impulse, stress, virial, work
   implicit none
   private
   public :: observable_list_t, observed, own_names, energies, total_energy
@@ -33,8 +33,10 @@ module observables
   integer, parameter :: disks = 1, mass = 2, speed = 3, momentum = 4       !! and the next: of two components
   integer, parameter :: kinetic = 6, potential = 7, rotational = 8         !! energies
   integer, parameter :: own_kinetic = 9, own_momentum = 10                 !! relative to the profile of a sheared box; likewise
+  integer, parameter :: flow = 12               !! and the next four: see `tally: carried`; likewise
+  integer, parameter :: tensor(*) = flow + [0, 1, 1, 2]                    !! of momentum: xx, xy, yx, yy
   !> The energy of all kinds, so exactly that it can be balanced, and what rounding has taken from it; unless `is_driven`: 0.
-  integer, parameter :: energy = 12, lost = 13
+  integer, parameter :: energy = 17, lost = 18
 
 contains
 
@@ -44,6 +46,7 @@ contains
     type(observable_list_t) :: list
     real(real64) :: sums(lost, 0:size(sim%species))   ! by species; 0: all
     character(len=:), allocatable :: path
+    real(real64) :: flown(5)                          ! [energy time], [energy length]
     integer :: s, k
 
     call add_up(sim, sums)
@@ -65,7 +68,16 @@ contains
     end associate
     if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%highest_speed() > 0 .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
-    if (sim%with%stress) call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
+    if (sim%with%stress) then
+      call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
+      call list%add("stress_tensor", sums(tensor, 0))
+    end if
+    if (sim%with%helfand) then
+      flown = sums(flow:flow + 4, 0)*sim%time() - sim%tally%total([(flights + k, k=0, 4)])
+      call list%add("helfand_stress", flown(tensor - flow + 1))
+      call list%add("helfand_heat", flown(4:))
+      call list%add("heat_virial", sim%tally%total([heat_virial, heat_virial + 1]))
+    end if
     do k = 1, size(sim%box%surface)
       if (.not. sim%box%is_wall(k)) cycle
       path = merge("sides/", "walls/", k <= n_sides)//sim%box%surface(k)%name
@@ -160,6 +172,7 @@ contains
     empty%box%surface%law%temperature = 1         ! but all that can be measured
     empty%box%surface%law%speed = 1
     empty%with%stress = .true.
+    empty%with%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
     names(list%n + 1) = "walls"                   ! it has none
@@ -210,7 +223,7 @@ contains
   pure subroutine add_up(sim, sums)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(out) :: sums(:, 0:)
-    real(real64) :: term(own_momentum + 1), v(2), own_v(2)
+    real(real64) :: term(flow + 4), v(2), own_v(2)
     logical :: falling, sheared, driven
     integer(int32) :: i
     integer :: s, k
@@ -233,7 +246,8 @@ contains
       if (falling) term(potential) = -term(mass)*dot_product(sim%box%gravity, sim%position(i))
       if (sim%with%rotation) term(rotational) = 0.5_real64*sim%inertia_of(i)*sim%spin(i)**2
       term(own_kinetic) = 0.5_real64*term(mass)*dot_product(own_v, own_v)
-      term(own_momentum:) = term(mass)*own_v
+      term(own_momentum:own_momentum + 1) = term(mass)*own_v
+      if (sim%with%stress) term(flow:) = carried(term(mass), own_v)
       sums(:size(term), s) = sums(:size(term), s) + term
       if (.not. driven) cycle
       do k = kinetic, rotational

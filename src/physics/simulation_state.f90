@@ -10,7 +10,7 @@ module simulation_state
   use features, only: features_t
   use free_flight, only: flight, flight_velocity
   use images, only: images_t
-  use tally, only: tally_t
+  use tally, only: carried, flights, tally_t
   implicit none
   private
   public :: given_t, simulation_t, system_t
@@ -72,6 +72,7 @@ module simulation_state
     procedure :: spin_up
     procedure :: turn
     procedure :: make_contact
+    procedure :: note_change
     procedure :: inertia_of
     procedure :: kinetic_energy
     procedure :: is_driven
@@ -292,6 +293,20 @@ contains
     end associate
   end subroutine make_contact
 
+  !> Books that the velocity of disk i was another until the time t. The integral of what it carries is its present value
+  !> times the time, less each change times its moment: exact, whenever it is asked for.
+  pure subroutine note_change(self, i, before, t)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    real(real64), intent(in) :: before(2)         !! [length/time]
+    real(real64), intent(in) :: t                 !! since the epoch [time]
+
+    if (.not. self%with%helfand) return
+    associate (mass => self%mass_of(i), sums => self%tally%sum(flights:flights + 4))
+      call sums%add((carried(mass, self%disk(i)%v) - carried(mass, before))*(self%box%epoch + t))
+    end associate
+  end subroutine note_change
+
   !> Moment of inertia of disk i.
   pure function inertia_of(self, i) result(inertia)
     class(simulation_t), intent(in) :: self
@@ -351,7 +366,7 @@ contains
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
     real(real64), dimension(size(self%species)) :: mass, kicked    ! [mass, (length/time)**2]
-    real(real64) :: energy, impulse
+    real(real64) :: energy, impulse, length
     integer :: s
 
     mass = self%species%mass
@@ -359,9 +374,10 @@ contains
     energy = self%most_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
       + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
     impulse = sqrt(8*maxval(mass))*sqrt(energy)
+    length = maxval(self%box%edges())
     call self%tally%make_room(size(self%box%surface))
     call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven()) &
-      *[energy, impulse, impulse*2*maxval(self%disk%radius)])
+      *[energy, impulse, impulse*2*maxval(self%disk%radius), energy*length, sqrt(energy*maxval(mass))*length])
   end subroutine choose_units
 
 end module simulation_state

@@ -5,10 +5,10 @@ module tally
   use kinds, only: int64, never, real64
   implicit none
   private
-  public :: tally_t
+  public :: carried, tally_t
 
   !> What one term of a sum may amount to, and so how fine it must be: see `simulation_state: choose_units`.
-  integer, parameter, public :: energies = 1, impulses = 2, moments = 3
+  integer, parameter, public :: energies = 1, impulses = 2, moments = 3, transfers = 4, passages = 5
 
   type :: sum_t
     character(len=16) :: name
@@ -17,6 +17,7 @@ module tally
 
   !> The sums over collisions, each by its number. Units, checkpoints, domains and their merging go by this list.
   integer, parameter, public :: virial = 1, dissipated = 2, heat = 3, work = 4, drive_energy = 5, stress = 6
+  integer, parameter, public :: heat_virial = 10, flights = 12     ! after the four of the stress, the two of heat
   type(sum_t), parameter :: sums(*) = [ &
     sum_t("virial", moments), &                    ! impulse times distance over pair collisions [energy]
     sum_t("dissipated", energies), &               ! kinetic energy lost [energy]
@@ -24,7 +25,10 @@ module tally
     sum_t("work", energies), &                     ! done on disks by what moves them [energy]
     sum_t("drive_energy", energies), &             ! given to disks by kicks [energy]
     sum_t("stress_xx", moments), sum_t("stress_xy", moments), &   ! change of momentum times distance over pairs [energy]
-    sum_t("stress_yx", moments), sum_t("stress_yy", moments)]
+    sum_t("stress_yx", moments), sum_t("stress_yy", moments), &
+    sum_t("heat_virial_x", transfers), sum_t("heat_virial_y", transfers), &      ! energy times distance [energy length]
+    sum_t("flights_xx", passages), sum_t("flights_xy", passages), sum_t("flights_yy", passages), &   ! see `carried`
+    sum_t("flights_x", transfers), sum_t("flights_y", transfers)]
 
   !> And those at each surface of the box: the impulse given to it [mass length/time], and the energy that disks have gained.
   integer, parameter, public :: impulse = 1, gain = 3
@@ -66,6 +70,16 @@ contains
     call self%at_surface(:gain - 1, :)%choose_unit(bound(impulses))
     call self%at_surface(gain, :)%choose_unit(bound(energies))
   end subroutine choose_units
+
+  !> What a disk carries per time while it flies: momentum, xx, xy and yy [energy]; kinetic energy along x and y [energy
+  !> length/time]. Over time that is the part of Helfand's moments (Phys. Rev. 119, 1 (1960)) which collisions do not hand on.
+  pure function carried(mass, v)
+    real(real64), intent(in) :: mass
+    real(real64), intent(in) :: v(2)               !! [length/time]
+    real(real64) :: carried(5)
+
+    carried = mass*[v(1)*v(1), v(1)*v(2), v(2)*v(2), 0.5_real64*dot_product(v, v)*v]
+  end function carried
 
   !> A sum so far.
   elemental function total(self, k)

@@ -125,6 +125,12 @@ def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(rng):
     assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(20000), rel=0.4)
 
 
+def test_a_series_in_decades_is_worth_its_last_samples_and_has_no_error(rng):
+    times = np.diff(np.geomspace(1, 1e6, 200))
+    found = statistics.series_mean(times * rng.normal(5, 1, 199), times)
+    assert found.mean == pytest.approx(5, abs=1.5) and np.isnan(found.error) and found.samples < 3
+
+
 @pytest.mark.parametrize("memory", [0.5, 5, 20])
 def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memory):
     means = [

@@ -316,7 +316,7 @@ def test_completion_knows_options_variables_values_and_files(program):
     assert completed(program, "--res") == ["--resume"]
     assert completed(program, "input/gas") == ["input/gas.nml"]
     assert completed(program, "inp") == ["input"]
-    assert completed(program, "--explain", "restit") == ["restitution"]
+    assert completed(program, "--explain", "shear") == ["shear_rate"]
     assert {"contact", "contact_time", "contact.wall_rule"} <= {
         *completed(program, "--explain", "con")
     }

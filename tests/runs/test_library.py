@@ -189,11 +189,13 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
         return gas.observable("total_energy") + gas.observable("dissipated_energy") - sum(flows)
 
     before = balance()
-    gas.change({"box.gravity": (0, 3), "side.top.temperature": 2, "contact.restitution": 0.7})
+    soft = {"contact.restitution_law": "power", "contact.restitution_speed": 1}
+    gas.change({"box.gravity": (0, 3), "side.top.temperature": 2, **soft})
+    gas.advance(events=150).change({"contact.restitution": 0.7})
     gas.advance(events=200).velocity = 2 * gas.velocity
     gas.advance(events=300)
     assert balance() == pytest.approx(before, rel=1e-12)
-    assert {"changed", "thermal", "falling"} <= gas.nature
+    assert {"changed", "thermal", "falling", "soft"} <= gas.nature
     gas.save("gas.h5", input="changed.nml")
     told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet")
     assert told.returncode == 2 and "there box.gravity = [0, 3]" in told.stderr

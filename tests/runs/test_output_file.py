@@ -117,19 +117,23 @@ def test_the_origin_is_there(ran):
 @pytest.mark.parametrize(
     ("track", "cadence", "end", "expected"),
     [
-        ("frames", "time=0.1", "time=1", [k * 0.1 for k in range(11)]),
-        ("frames", "time=0.1", "time=1.03", [*(k * 0.1 for k in range(11)), 1.03]),
-        ("frames", "time=", "time=0.7", [0, 0.7]),
-        ("observables", "collisions=40", "collisions=250", [*range(0, 250, 40), 250]),
-        ("observables", "events=40", "events=250", [*range(0, 250, 40), 250]),
-        ("observables", "collisions_per_disk=1", "collisions=250", [*range(0, 250, 40), 250]),
+        ("frames", "every_time=0.1", "time=1", [k * 0.1 for k in range(11)]),
+        ("frames", "every_time=0.1", "time=1.03", [*(k * 0.1 for k in range(11)), 1.03]),
+        ("frames", "every_time=", "time=0.7", [0, 0.7]),
+        (
+            "frames",
+            "at=0.1,0.7500000000000001,9",
+            "time=0.8",
+            [0, 0.1, 0.25, 0.5, 0.7500000000000001, 0.8],
+        ),
+        ("observables", "every_collisions=40", "collisions=250", [*range(0, 250, 40), 250]),
+        ("observables", "every_events=40", "events=250", [*range(0, 250, 40), 250]),
+        ("observables", "every_collisions_per_disk=1", "collisions=250", [*range(0, 250, 40), 250]),
     ],
 )
 def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, end, expected):
     """A cadence that is set takes the place of another of the same samples in the input, only."""
-    file = ran(
-        MIXTURE, f"--set=output.{track}_every_{cadence}", "--set=stop.time=", f"--set=stop.{end}"
-    )
+    file = ran(MIXTURE, f"--set=output.{track}_{cadence}", "--set=stop.time=", f"--set=stop.{end}")
     disks, seen = file["particles/disks"], file["observables"]
     times, number = disks["position/time"][:], seen["collisions/value"][:]
     if "events" in cadence:

@@ -230,7 +230,14 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
     write_input(tmp_path, MIXTURE)
     assert ricochet(*COMMAND, "--set", "stop.time=1.3").returncode == FINISHED
     new = ["output.frames_every_time=0.5", "output.observables_every_events=100", "stop.time=3.1"]
-    new += ["run.title='longer'", "run.search='pairs'", "run.queue='heap'"]
+    many = sorted({0.01 * k for k in range(1, 130)} | {1.6})  # more than are kept as a text
+    new += [f"output.frames_at={','.join(map(repr, many))}", "output.frames_from=0.3"]
+    new += [
+        "output.frames_per_decade=1",
+        "run.title='longer'",
+        "run.search='pairs'",
+        "run.queue='heap'",
+    ]
     options = [word for value in new for word in ("--set", value)]
     assert ricochet(*COMMAND, *options, "--resume").returncode == FINISHED
     with h5py.File(tmp_path / "gas.h5") as file:
@@ -239,7 +246,7 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
         events = file["observables/collisions/value"][:]
         events = events + file["observables/wall_collisions/value"][:].sum(axis=1)
         sampled = file["observables/collisions/time"][:]
-    assert times.tolist() == [0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2, 2.5, 3, 3.1]
+    assert times.tolist() == [0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.6, 2, 2.5, 3, 3.1]
     assert {900, 1000, 1100, 1200, 1300} < set(events[sampled > 1.3])
     assert ricochet("gas.nml", "-o", "whole.h5", "--set", "stop.time=3.1").returncode == FINISHED
     here, there = contents(tmp_path / "gas.h5"), contents(tmp_path / "whole.h5")

@@ -16,7 +16,7 @@ MOST_EVENTS, MOST_OF_FEW = 40_000, 12_000  #: of many disks these are an epoch o
 SIDES = ("left", "right", "bottom", "top")
 CADENCES = ("time", "collisions", "events", "collisions_per_disk")
 #: Variables that hold a word which is a feature of its own.
-KINDS = r"(dynamics|motion|rule|placement|velocities|kind|side|precision) = '(\w+)'"
+KINDS = r"(dynamics|motion|rule|law|placement|velocities|kind|side|precision) = '(\w+)'"
 
 
 class System(NamedTuple):
@@ -67,6 +67,7 @@ class Draw:
         self.periodic = [self.chance(0.4), self.chance(0.4)]
         self.steps = self.chance(0.1)
         self.packing = rng.choice([0.01, 0.1, 0.2, 0.3, 0.4, 0.5])
+        self.least = 0.6 if self.chance(0.2) else 0  # restitution; of the viscoelastic law
         self.turns = self.chance(0.3)
         self.driven = self.chance(0.3)
         self.falls = self.chance(0.3) and not all(self.periodic)
@@ -127,7 +128,7 @@ class Draw:
         if self.chance(0.4):
             self.worked = True
             return f" temperature = {self.speed**2 * 10.0 ** rng.uniform(-1, 1)!r}{sliding}"
-        words = f" restitution = {rng.choice([0, 1, 0.9, rng.random()])}"
+        words = f" restitution = {max(self.least, rng.choice([0, 1, 0.9, rng.random()]))}"
         if self.chance(0.5):
             return words + rng.choice(["", " rule = 'velocity'", " rule = 'normal'"])
         self.worked = self.worked or bool(sliding)
@@ -305,17 +306,20 @@ class Draw:
 
     def contact(self) -> str:
         rng = self.rng
-        restitution = rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()])
+        restitution = max(self.least, rng.choice([0, 0, 1, 1, 0.5, 0.9, 0.99, rng.random()]))
         words = f"&contact restitution = {restitution}"
         if self.kinds > 1 and self.chance(0.4):
             table = [[rng.choice([0, 1, 0.9, rng.random()]) for _ in range(3)] for _ in range(3)]
             kinds = range(self.kinds)
-            pairs = [table[min(a, b)][max(a, b)] for a in kinds for b in kinds]
+            pairs = [max(self.least, table[min(a, b)][max(a, b)]) for a in kinds for b in kinds]
             words += f" pair_restitution = {numbers(*pairs)}"
-        on_walls = rng.choice([0, 1, 0.9, rng.random()])
+        on_walls = max(self.least, rng.choice([0, 1, 0.9, rng.random()]))
         words += self.maybe(0.5, f"wall_restitution = {on_walls}")
         if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
             self.drifts = True  # or comes to rest: without a time the run ends at some sample
+        if self.least or self.chance(0.2):
+            words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"
+            words += f" restitution_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
         if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
         if self.turns:
@@ -367,10 +371,17 @@ class Draw:
         rng = self.rng
         words = "&output" + self.maybe(0.4, "event_log = .true.")
         words += self.maybe(0.2, "precision = 'single'") + self.maybe(0.3, "virial_tensor = .true.")
+        words += "" if self.falls or self.sheared else self.maybe(0.3, "helfand = .true.")
         words += self.maybe(0.1, "checkpoint_every = 1e-3")
         for track in "frames", "observables":
             for kind in rng.sample(CADENCES, rng.choice([0, 1, 1, 1])):
                 words += f" {track}_every_{kind} = {self.cadence(kind)!r}"
+            if self.chance(0.3):
+                times = sorted(self.cadence("time") for _ in range(rng.randint(1, 9)))
+                words += f" {track}_at = {numbers(*times)}"
+            words += self.maybe(0.3, f"{track}_per_decade = {rng.randint(1, 9)}")
+        if "per_decade" in words:
+            words += f" frames_from = {self.cadence('time') / 100!r}"
         return words + " /"
 
     def cadence(self, kind: str) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ricochet import Run
 from ricochet import hard_disks as hd
+from ricochet.cooling import energy_left, exponent, soft_law
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, each, over
@@ -55,6 +56,29 @@ ENDLESS = tuple(
 )  # fmt: skip
 
 
+SOFT = {
+    law: gases(
+        20, 500, packing_fraction=ETA, periodic=True, temperature=1.0,
+        contact={"restitution": 0.8, "restitution_law": law, "restitution_speed": 20},
+        stop={"collisions_per_disk": 150},
+        output={"observables_per_decade": 20, "frames_from": 0.1},
+    )
+    for law in ("power", "viscoelastic")
+}  # fmt: skip
+
+
+def late_exponent(run: Run) -> float:
+    """The p of K ~ t^-p where t is thousands of the first mean free times."""
+    time, energy = run.observable("all/kinetic_energy")
+    return exponent(time, energy)
+
+
+def over_the_law(run: Run) -> float:
+    """K over the law of soft disks, at the end."""
+    law, (w0_t, _, left) = soft_law([run]), energy_left(run)
+    return float(left[-1] / np.exp(np.interp(w0_t[-1], law[0], np.log(law[2]))))
+
+
 def fall(run: Run) -> float:
     """Decades that the temperature has fallen."""
     kt = run.observable("all/temperature").value
@@ -94,6 +118,17 @@ GAS = [
         COOLING[0.9], over(lambda run: left_at_time(run, 12.8)),
         hd.haff_by_time(12.8, 0.9), relative(0.015), "Haff 1983; R",
     ),
+    *[
+        Case(
+            "P9-13", f"cooling, '{law}': {what}", SOFT[law], over(of), value, relative(part),
+            "Ramirez et al. 1999",
+        )
+        for law in SOFT
+        for what, of, value, part in (
+            ("exponent of K ~ t^-p at late times", late_exponent, 5 / 3, 0.02),
+            ("K by the law with Maxwell's velocities", over_the_law, 1.0, 0.05),
+        )
+    ],
     Case(
         "P9-12", "cooling without end: ends by itself, decades that T has fallen",
         ENDLESS, each(fall), 26, within(1), "D",

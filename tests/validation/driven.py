@@ -108,8 +108,7 @@ def flowing(eta: float) -> tuple[Member, ...]:
         8, 512, packing_fraction=eta, periodic=True, temperature=1.0,
         stop={"collisions_per_disk": 2500},
         output={
-            "frames_every_collisions": 640000, "observables_every_collisions": 512,
-            "event_log": True, "virial_tensor": True,
+            "frames_every_collisions": 640000, "observables_every_time": 0.004, "helfand": True,
         },
     )  # fmt: skip
 
