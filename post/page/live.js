@@ -2,9 +2,9 @@
 
 // A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
 // The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
-// As a part of another page it begins with the run, to be seen from its start.
+// As a part of the laboratory it shows what a worker does.
 const isPart = parent !== window;
-const live = { on: false, stamp: '', newest: !isPart, heard: 0, pace: 0 };
+const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
 
 async function ask() {
   const answer = await fetch('film?known=' + encodeURIComponent(live.stamp)).catch(() => null);
@@ -19,7 +19,7 @@ function receive(news) {
   const started = live.stamp !== '', { time } = moment, own = started ? kinds.map(kind => kind.own) : [];
   const now = performance.now(), taken = Math.min(10, (now - live.heard) / 1000);
   live.heard = now;
-  load(news);
+  loadFilm(news);
   kinds.forEach((kind, s) => { kind.own = own[s]; });
   live.stamp = news.stamp;
   live.on = !news.end;
@@ -29,7 +29,7 @@ function receive(news) {
   if (!started) begin();
   else prepareFilm();
   if (started && usual) pace = usualPace();
-  move(started ? time : live.newest ? last() : first());
+  source.move(started ? time : live.newest ? last() : first());
   refresh();
   if (!started) play(true);
 }
@@ -47,45 +47,20 @@ function follow(newest) {
   if (newest) { show(last(), true); play(true); }
 }
 
-// The run goes on after its end.
-function goOn() {
-  if (!live.on) {
-    live.on = true;
-    ask();
-  }
-  play(true);
-}
-
-// ---------- a part of another page ----------
-
-// The laboratory shows runs side by side: what is chosen in one of them can be chosen in the others.
-document.documentElement.classList.toggle('part', isPart);
-
-function choices(wish) {
-  if (wish) {
-    const { pace: own, speed, colour, ...rest } = wish;
-    if (own) [pace, usual] = [own, false];
-    $('pace').value = speed;
-    if ([...$('colour').options].some(({ value }) => value === colour)) $('colour').value = state.colour = colour;
-    Object.assign(state, rest);
-    refresh();
-  }
-  const { colour, arrows, sofar, total } = state;
-  return { pace, speed: $('pace').value, colour, arrows, sofar, total };
-}
-
 // ---------- here it begins ----------
 
 listen();
+document.documentElement.classList.toggle('part', isPart);
+if (isPart) addEventListener('keydown', event => parent.typed(event));
 const enclosed = JSON.parse($('film').textContent);
 $('film').remove();
 if (enclosed) {
-  load(enclosed);
+  loadFilm(enclosed);
   begin();
-  move(first());
+  source.move(first());
   refresh();
   if (!fromAddress() && !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
-} else {
+} else if (!isPart) {
   live.on = true;
   ask();
 }

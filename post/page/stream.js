@@ -1,0 +1,263 @@
+// ---------- a run of the laboratory: frames as a worker makes them ----------
+
+// The page draws the newest frame; those before are kept, as far as there is room, to go back to. A film that has been gone
+// back in plays until it is where the worker is, which goes on then.
+const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
+const stream = { socket: null, scene: null, past: [], live: true, fresh: false, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+
+const send = wish => stream.socket.readyState === 1 && stream.socket.send(JSON.stringify(wish));
+
+// The run that the laboratory wishes, on the same line for all runs of this film.
+function start(wish, address) {
+  stream.wish = wish;
+  const begin = () => send({ do: 'start', ...wish, pace: usual ? null : paceNow(), playing: true });
+  document.documentElement.classList.add('starting');
+  if (stream.socket?.readyState < 2) { begin(); return; }
+  stream.socket = new WebSocket(address);
+  stream.socket.binaryType = 'arraybuffer';
+  stream.socket.onopen = begin;
+  stream.socket.onmessage = ({ data }) => {
+    if (typeof data !== 'string') { take(data); return; }
+    const news = JSON.parse(data);
+    hear[news.is]?.(news);
+    parent.hear(window, news);
+  };
+  stream.socket.onclose = () => parent.hear(window, { is: 'gone' });
+}
+
+const hear = {
+  scene({ facts, blocks, run, changed }) {
+    Object.assign(facts, { events: facts.exact, colour: kinds?.length === facts.species.length ? state.colour : facts.species.length > 1 ? 'species' : 'speed' });
+    if (changed) {
+      film = { ...film, ...facts, scales: film.scales, speeds: film.speeds };
+      kinds.forEach(({ own }, s) => { film.species[s].own = own; });
+      kinds = film.species;
+      prepareFilm();
+      refresh();
+      return;
+    }
+    stream.scene = { facts, blocks, run };  // it is shown with its first frame
+  },
+  numbers(news) {
+    const { curves } = stream, { time } = news;
+    stream.numbers = news;
+    if (time <= curves.time.at(-1)) return;
+    curves.time.push(time);
+    for (const name of Object.keys(ENERGIES)) curves[name]?.forEach((values, s) => values.push(news[name]?.[s] ?? null));
+    curves.pressure.push(news.pressure);
+    if (curves.time.length > MOST_CURVE) {
+      const thin = list => Array.isArray(list?.[0]) ? list.map(thin) : list?.filter((_, k) => k % 2 === 0);
+      for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
+    }
+    if (news.mean_speed.value > 0.8 * film.scales.speed[1]) { setTop(2 * news.mean_speed.value); drawLegend(); }
+    film.settles = news.settles;
+  },
+  events(news) {
+    const own = ([time, i, j]) => [time, i - 1, j - 1];
+    Object.assign(stream.events, { next: news.next.map(own), happened: news.happened && own(news.happened) });
+    if (!state.playing && source) show(moment.time, true);
+  },
+  state({ playing, ended }) {
+    stream.ended = ended;
+    if (!playing && state.playing && stream.live && stream.past.length) play(false);
+  },
+  problems() { document.documentElement.classList.remove('starting'); },
+};
+
+function open({ facts, blocks, run }) {
+  const own = kinds?.map(kind => kind.own) ?? [];
+  setScene(facts, blocks);
+  kinds.forEach((kind, s) => { kind.own = own[s]; });
+  setTop(facts.top);
+  angles = facts.turning ? new Float32Array(disks) : null;
+  const each = there => there ? kinds.map(() => []) : null;
+  const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
+  Object.assign(stream, { past: [], live: true, fresh: false, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
+  source = fromWorker;
+}
+
+// The scale of speeds; the ends of the bins.
+function setTop(top) {
+  const rest = film.rest > 0.02, most = 1.3 * top;
+  film.scales = { speed: ['speed (reduced units)', top], displacement: ['displacement', Math.max(...film.edges) / 4] };
+  film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
+}
+
+function take(buffer) {
+  if (stream.scene) { open(stream.scene); stream.scene = null; }
+  const head = new Float64Array(buffer, 0, HEAD), floats = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
+  const { past } = stream, before = past.at(-1), frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: floats(0), velocity: floats(1) };
+  if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
+  if (film.periodic.some(Boolean)) frame.crossed = crossedSince(before, frame);
+  if (before?.time === frame.time) past.pop();  // as of the start, and of a change
+  past.push(frame);
+  while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
+  stream.fresh = true;
+  document.documentElement.classList.remove('starting');
+  if (past.length === 1 && !before) {
+    source.move(frame.time);
+    begin();
+    refresh();
+    play(!parent.isPaused?.());
+  } else if (!state.playing && stream.asked) show(frame.time, true);
+  if (!state.playing) send({ do: 'got' });
+  if (!state.playing) stream.fresh = stream.asked = false;
+}
+
+// Frames are so dense that no disk crosses half of the box between two.
+function crossedSince(before, { place }) {
+  const crossed = before ? before.crossed.slice() : new Int16Array(2 * disks);
+  for (let k = 0; before && k < 2 * disks; k++) {
+    const edge = film.edges[k % 2], moved = place[k] - before.place[k];
+    if (film.periodic[k % 2] && Math.abs(moved) > edge / 2) crossed[k] -= Math.sign(moved);
+  }
+  return crossed;
+}
+
+function moveInStream(time) {
+  const { past } = stream, index = indexAt(time), { place, velocity, angle, collisions, time: shown } = past[index];
+  for (let i = 0; i < disks; i++) {
+    X[i] = place[2 * i];
+    Y[i] = place[2 * i + 1];
+    VX[i] = velocity[2 * i];
+    VY[i] = velocity[2 * i + 1];
+  }
+  if (angle) angles.set(angle);
+  Object.assign(moment, { time: shown, shown, frame: index, collisions });
+  energiesNow(i => film.gravity[0] * unwrapped(index, i, 0) + film.gravity[1] * unwrapped(index, i, 1));
+}
+
+function indexAt(time) {
+  let low = 0, high = stream.past.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (stream.past[middle].time <= time) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+function unwrapped(index, i, axis) {
+  const { place, crossed } = stream.past[index], k = 2 * i + axis;
+  return place[k] + (crossed ? film.edges[axis] * crossed[k] : 0);
+}
+
+const fromWorker = {
+  grows: true,
+  first: () => stream.past[0].time,
+  last: () => stream.past.at(-1).time,
+  move: moveInStream,
+  frameTime: k => stream.past[clamp(k, 0, stream.past.length - 1)].time,
+  counted: () => stream.live ? 'now' : 'gone back',
+  curves: () => stream.curves,
+  numbers: () => stream.numbers,
+  sides: () => stream.past[moment.frame].sides,
+  trace(i) {
+    const place = k => [0, 1].map(axis => unwrapped(k, i, axis)), [old, recent] = [300, 30].map(k => Math.max(0, moment.frame - k));
+    const line = (from, to) => Array.from({ length: to - from }, (_, k) => ({ from: place(from + k), to: place(from + k + 1), bend: [0, 0], straight: 0 }));
+    return [line(old, recent), line(recent, moment.frame)];
+  },
+  displacement: i => Math.hypot(...[0, 1].map(axis => unwrapped(moment.frame, i, axis) - stream.past[0].place[2 * i + axis])),
+  eachSpeed(action) {
+    const some = Math.ceil((moment.frame + 1) / 60);
+    let samples = 0;
+    for (let k = moment.frame; k >= 0; k -= some, samples++)
+      for (let i = 0, { velocity } = stream.past[k]; i < disks; i++) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
+    return samples;
+  },
+  coming: () => stream.live ? stream.events : { next: [], happened: null },
+  hasEvents: () => !film.stepped,
+  goesOn: () => !stream.ended || !stream.live,
+  setPace(value) {
+    if (value === stream.sent) return;
+    stream.sent = value;
+    send({ do: 'pace', pace: value });
+  },
+  begins() {
+    stream.live = moment.time === last();
+    if (stream.live) send({ do: 'play' });
+  },
+  rest() { send({ do: 'pause' }); stream.live = moment.time === last(); },
+  // One step beyond what is there is the worker's.
+  goOn(what) {
+    play(false);
+    if (moment.time !== last()) return false;
+    stream.live = stream.asked = true;
+    send({ do: what, time: paceNow() / 30 });
+    return true;
+  },
+  newest(next) {
+    if (stream.live) {
+      if (!stream.fresh) return;
+      stream.fresh = false;
+      show(last());
+      send({ do: 'got' });
+    } else if (next < last()) show(next);
+    else {
+      show(last());
+      stream.live = true;
+      send({ do: 'play' });
+    }
+  },
+};
+
+// ---------- a part of the laboratory ----------
+
+// What the laboratory asks its films for, which stand side by side.
+function inside() { return { film, source, state, moment, kinds, stream, pace, camera }; }
+
+function overlay(list) {
+  overlaid = list;
+  if (film && source.curves()?.time.length) drawEnergies();
+}
+
+function choices(wish) {
+  if (wish) {
+    if (wish.pace) [pace, usual] = [wish.pace, false];
+    $('pace').value = wish.speed;
+    Object.assign(state, wish.state);
+    if (film) refresh();
+  }
+  const { colour, arrows, sofar, total } = state;
+  return { pace, speed: $('pace').value, state: { colour, arrows, sofar, total } };
+}
+
+// From the start of what is kept, as long as another run starts beside it.
+function replay() {
+  if (!film) return;
+  show(first(), true);
+  stream.live = false;
+  send({ do: 'pause' });
+  play(true);
+}
+
+// A box among others, with room for the stage of `size`; none: a page of its own.
+let boxSize = null;
+function arrange(size, bare) {
+  boxSize = size;
+  document.documentElement.classList.toggle('boxed', !!size);
+  document.documentElement.classList.toggle('bare', bare);
+  layout();
+}
+
+// Measured values of a scan and their errors against the variable, as far as they are there.
+function showScan({ x: variable, y: measured, log, points, values }) {
+  const canvas = $('curve'), scaled = value => log ? Math.log10(value) : value;
+  $('scan').hidden = false;
+  $('scan').querySelector('h2').textContent = `Scan: ${measured}`;
+  Object.assign(canvas, { width: canvas.clientWidth * page.dots, height: canvas.clientHeight * page.dots });
+  const plot = prepare(canvas), { pen } = plot, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
+  const low = Math.min(0, ...ends), high = Math.max(...ends, low + 1e-9), from = scaled(values[0]), to = scaled(values.at(-1)), more = 0.04 * (to - from);
+  const { x, y } = axes(plot, [from - more, to + more], [low, low + 1.1 * (high - low)], '', value => log ? short(+(10 ** value).toPrecision(1)) : short(value));
+  Object.assign(pen, { strokeStyle: ink.accent, fillStyle: ink.accent, lineWidth: 1.6 });
+  pen.beginPath();
+  for (const [value, mean] of points) pen.lineTo(x(scaled(value)), y(mean));
+  for (const [value, mean, error] of points) {
+    pen.moveTo(x(scaled(value)), y(mean - error));
+    pen.lineTo(x(scaled(value)), y(mean + error));
+  }
+  pen.stroke();
+  for (const [value, mean] of points) pen.fillRect(x(scaled(value)) - 3, y(mean) - 3, 6, 6);
+  const words = points.map(([value, mean, error]) => `${short(value)}: ${short(mean)} ± ${short(+error.toPrecision(2))}`).join('; ');
+  $('scan').querySelector('p').textContent = `Against ${variable}, with standard errors. ${words}`;
+  canvas.setAttribute('aria-label', `${measured} against ${variable}. ${words}`);
+}
