@@ -55,11 +55,14 @@ def picture(path: Path, at: float) -> bytes:
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
         walls = walls_of({k: np.asarray(v) for k, v in groups.get("wall", {}).items()})
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
-        size = 2 * np.maximum(run.radius, 0.006 * np.max(upper - lower))
+        least = min(0.006, 0.2 / np.sqrt(run.count)) * np.max(upper - lower)
+        size = 2 * np.maximum(run.radius, least)
         colours = [SPECIES[(k - 1) % len(SPECIES)] for k in run.species]
         if run.count <= FEW:
             way = np.array(way)
-            jumps = np.abs(np.diff(way, axis=0)).max(axis=2, keepdims=True) > (upper - lower).min() / 2
+            jumps = (
+                np.abs(np.diff(way, axis=0)).max(axis=2, keepdims=True) > (upper - lower).min() / 2
+            )
             way[1:][np.broadcast_to(jumps, way[1:].shape)] = np.nan
             for k in range(run.count):
                 axes.plot(*way[:, k].T, color=colours[k], lw=0.6)

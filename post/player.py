@@ -218,7 +218,11 @@ def curves(run: Run) -> dict:
     pressure before the first collision: a bed that nobody has hit has none.
     """
     series, found = {}, {}
-    for name in ("collisions", "pressure", *(f"{s}/{e}_energy" for s in run.names for e in ENERGIES)):
+    for name in (
+        "collisions",
+        "pressure",
+        *(f"{s}/{e}_energy" for s in run.names for e in ENERGIES),
+    ):
         with suppress(RunError):
             found["time"], series[name] = run.observable(name)
     time = found.get("time", run.time[[0, -1]])

@@ -7,7 +7,7 @@ let usual = true;  // whether that is for the length of this film, not of anothe
 function begin() {
   lookAtAll();
   const names = ['species', ...Object.keys(film.scales)];
-  if (!names.includes(state.colour)) state.colour = film.colour;
+  state.colour = film.colour;
   state.traced = film.traced ?? [];
   state.sofar ??= disks < 200;
   if (usual) pace = film.pace ?? usualPace();

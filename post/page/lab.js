@@ -227,7 +227,6 @@ function run() {
     filmOf(box).start(wish(), address);
   };
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
-  for (const kept of state.boxes.slice(0, -1)) if (kept.shown && isThere(kept)) filmOf(kept).replay();
 }
 
 // What acts on the running state does so at once, while the slider moves; the rest starts anew.
@@ -247,6 +246,7 @@ function hear(source, news) {
   if (news.is === 'scene' && !news.changed) {
     Object.assign(box, { run: news.run, command: news.command, words: box.wished.words, changes: [] });
     ready();
+    for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
     tell(state.boxes.length > 1 ? `run ${box.letter}` : '');
     arrangeAll();
   } else if (news.is === 'problems') {
@@ -318,7 +318,7 @@ function arrangeAll() {
   for (const box of state.boxes) {
     box.figure.style.gridColumn = many && box !== current() ? boxes.indexOf(box) + 1 : '';
     box.figure.hidden = !boxes.includes(box);
-    box.figure.style.height = many && box !== current() ? `${size.height + 54}px` : '';
+    box.figure.style.height = many && box !== current() ? `${size.height + 50}px` : '';
     box.figure.classList.toggle('current', box === current());
     if (isThere(box)) filmOf(box).arrange(size, many && box !== current());
   }

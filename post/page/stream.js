@@ -5,7 +5,7 @@
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
 const stream = { socket: null, scene: null, past: [], live: true, fresh: false, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
-const send = wish => stream.socket.readyState === 1 && stream.socket.send(JSON.stringify(wish));
+function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
 // The run that the laboratory wishes, on the same line for all runs of this film.
 function start(wish, address) {
@@ -27,7 +27,9 @@ function start(wish, address) {
 
 const hear = {
   scene({ facts, blocks, run, changed }) {
-    Object.assign(facts, { events: facts.exact, colour: kinds?.length === facts.species.length ? state.colour : facts.species.length > 1 ? 'species' : 'speed' });
+    Object.assign(facts, { events: facts.exact, colour: facts.species.length > 1 ? 'species' : 'speed' });
+    const names = list => list?.map(({ name }) => name).join();
+    if (names(kinds) === names(facts.species)) facts.colour = state.colour;
     if (changed) {
       film = { ...film, ...facts, scales: film.scales, speeds: film.speeds };
       kinds.forEach(({ own }, s) => { film.species[s].own = own; });
@@ -49,8 +51,8 @@ const hear = {
       const thin = list => Array.isArray(list?.[0]) ? list.map(thin) : list?.filter((_, k) => k % 2 === 0);
       for (const name of Object.keys(curves)) curves[name] = thin(curves[name]);
     }
-    if (news.mean_speed.value > 0.8 * film.scales.speed[1]) { setTop(2 * news.mean_speed.value); drawLegend(); }
     film.settles = news.settles;
+    fitScales(news.mean_speed.value);
   },
   events(news) {
     const own = ([time, i, j]) => [time, i - 1, j - 1];
@@ -74,6 +76,17 @@ function open({ facts, blocks, run }) {
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
   Object.assign(stream, { past: [], live: true, fresh: false, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
   source = fromWorker;
+}
+
+// Gases are heated and cooled, and disks that rest are set in motion.
+function fitScales(mean) {
+  const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / disks;
+  if (rest > 0.02 === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
+  film.rest = rest;
+  setTop(mean > 0.8 * top || mean < 0.1 * top ? 2.2 * mean || top : top);
+  prepareFilm();
+  layOutStage();
+  drawLegend();
 }
 
 // The scale of speeds; the ends of the bins.
