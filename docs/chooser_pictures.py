@@ -2,8 +2,8 @@
 
     python docs/chooser_pictures.py [NAME...]
 
-Each shows its input at the time that input/chooser.json says; few disks with their paths.  A picture
-holds the digest of the input that it shows, by which a test sees whether it is of now.
+Each shows its input at the time that input/chooser.json says; few disks with their paths.  A
+picture holds the digest of the input that it shows, by which a test sees whether it is of now.
 """
 
 import hashlib

@@ -29,7 +29,7 @@ from functools import partial
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, scale_top
+from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
 from ricochet.files import destination
 from ricochet.live import serve
 from ricochet.nature import KICKED, known, rows_of
@@ -430,6 +430,12 @@ def chosen_film(
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room, watched)
+
+
+def whole(run: Run, colour: str | None = None) -> str:
+    """The page with a film of the whole run, coloured as on the command line."""
+    args = Namespace(frames=None, count=None, colour=colour, disks=None)
+    return page(run, texts(*chosen_film(run, args, ROOM)[1]))
 
 
 def main() -> None:

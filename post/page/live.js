@@ -3,7 +3,8 @@
 // A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
 // The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
 // As a part of the laboratory it shows what a worker does.
-const isPart = parent !== window;
+const enclosed = JSON.parse($('film').textContent);
+const isPart = parent !== window && !enclosed;
 const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
 
 async function ask() {
@@ -52,7 +53,6 @@ function follow(newest) {
 listen();
 document.documentElement.classList.toggle('part', isPart);
 if (isPart) addEventListener('keydown', event => parent.typed(event));
-const enclosed = JSON.parse($('film').textContent);
 $('film').remove();
 if (enclosed) {
   loadFilm(enclosed);

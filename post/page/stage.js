@@ -84,7 +84,7 @@ function roomOfStage() {
 
 function drawStage() {
   aim();
-  radii = film.radii.map(radius => Math.max(0.6, radius * view.unit));
+  radii = film.radii.map(radius => Math.max(1.1, radius * view.unit));
   if (stamps.size > 2 * kinds.length * radii.length) stamps = new Map();  // the zoom has changed
   const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), slides() && moment.shown].join();
   if (groundShown !== seen) drawGround();

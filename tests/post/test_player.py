@@ -420,7 +420,8 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     assert np.array_equal(np.transpose([axes.get_xlim(), axes.get_ylim()]), run.room)
     plt.close()
     browser, some = playing(run.path), rng.uniform(*run.time[[0, -1]], 50)
-    act = "return arguments[0].map(t => { show(t); return [sidesAt(moment.shown), source.nextEvent()]; })"
+    act = """return arguments[0].map(t => {
+      show(t); return [sidesAt(moment.shown), source.nextEvent()]; })"""
     drawn, told = zip(*browser.run(act, some.tolist()), strict=True)
     expected = np.stack(run.sides_at(some), axis=-1).reshape(-1, 4)
     np.testing.assert_allclose(drawn, expected, atol=1e-12)
