@@ -31,7 +31,6 @@ from pathlib import Path
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
 from ricochet.files import destination
-from ricochet.live import serve
 from ricochet.nature import KICKED, known, rows_of
 from ricochet.paths import MOST_AT_ONCE, Paths
 from ricochet.reader import SIDES, span
@@ -451,6 +450,7 @@ def main() -> None:
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")
+        from ricochet.live import serve  # films need no server
 
         def newest(now: Run) -> dict:
             return texts(*chosen_film(now, args, LIVE_ROOM)[1])

@@ -25,12 +25,12 @@ ESCAPES = re.compile(r"\033\[\??\d*[A-Za-z]")
 
 
 class ProgramError(RunError):
-    """The program could not run or finish; the message is its own, `code` its exit code."""
+    """The program could not run or finish; `message` is its own, `code` its exit code."""
 
     def __init__(self, message: str, code: int):
         """The message may have several lines if the input has several mistakes."""
         super().__init__(message)
-        self.code = code
+        self.message, self.code = message, code
 
 
 def run(

@@ -59,8 +59,11 @@ class Simulation:
     ):
         """Problems with the input raise `ProgramError`, with the program's own lines."""
         text = namelist(system) if isinstance(system, Mapping) else read_input(system)
-        lines = [f"{name}={value_text(name, value)}\n" for name, value in (overrides or {}).items()]
-        words = text.encode(), "".join(lines).encode()
+        self._begin(text, lines_of(overrides or {}), threads)
+
+    def _begin(self, text: str, lines: str, threads: int | None = None) -> None:
+        """With overrides as lines `GROUP.VARIABLE=VALUE`."""
+        words = text.encode(), lines.encode()
         for word in words:
             if b"\0" in word:
                 raise ValueError("an input has no zero bytes")
@@ -162,11 +165,14 @@ class Simulation:
             raise ValueError("time: nan is no time")
         if limits[0] < self.time * (1 - ROUNDING):
             raise ValueError(f"time: {time} is past; it is {self.time:.6g}")
-        going_on = True
-        while going_on:
-            with self._open() as handle:
-                going_on = called(library().ricochet_advance, handle, *limits, PATIENCE)
+        while self._go_on(limits, PATIENCE):
+            pass
         return self
+
+    def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
+        """Towards these limits for some seconds; whether they are still ahead."""
+        with self._open() as handle:
+            return called(library().ricochet_advance, handle, *limits, patience)
 
     def change(self, values: Mapping[str, object]) -> Self:
         """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
@@ -175,7 +181,9 @@ class Simulation:
         their temperatures, speeds and motions.  What this does to the total energy counts as work.
         What cannot change raises `ProgramError`, and nothing changes.
         """
-        lines = "".join(f"{name}={value_text(name, value)}\n" for name, value in values.items())
+        return self._change(lines_of(values))
+
+    def _change(self, lines: str) -> Self:
         with self._open() as handle:
             called(library().ricochet_change, handle, lines.encode())
         return self
@@ -348,6 +356,11 @@ def read_input(system: str | Path) -> str:
         return Path(system).read_text(encoding="utf-8", errors="surrogateescape")
     except OSError as error:
         raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
+
+
+def lines_of(values: Mapping[str, object]) -> str:
+    """A line `GROUP.VARIABLE=VALUE` for each."""
+    return "".join(f"{name}={value_text(name, value)}\n" for name, value in values.items())
 
 
 def opened(make, *arguments: object) -> int:
