@@ -60,11 +60,9 @@ function layOutStage() {
   picture = disksBrush.createImageData(page.width, page.height);
   pixels = new Int32Array(picture.data.buffer);
   const colours = quantities[state.colour] ? Array.from({ length: 256 }, (_, k) => scaleColour(k)) : kinds.map(speciesColour);
-  const integer = ([r, g, b]) => 0xff000000 + (b << 16) + (g << 8) + r;
-  palette = Int32Array.from(colours, integer);
-  [paper] = Int32Array.of(integer([1, 3, 5].map(k => parseInt(ink.stage.slice(k, k + 2), 16))));
+  const paperParts = [1, 3, 5].map(k => parseInt(ink.stage.slice(k, k + 2), 16));
+  [paper, ...palette] = Int32Array.from([paperParts, ...colours], ([r, g, b]) => 0xff000000 + (b << 16) + (g << 8) + r);
   groundShown = '';
-  stamps = new Map();
 }
 
 // In CSS pixels: beside the controls on a flat screen, else above them. On a telephone the view has no card of its own,
@@ -85,7 +83,6 @@ function roomOfStage() {
 function drawStage() {
   aim();
   radii = film.radii.map(radius => Math.max(1.1, radius * view.unit));
-  if (stamps.size > 2 * kinds.length * radii.length) stamps = new Map();  // the zoom has changed
   const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), slides() && moment.shown].join();
   if (groundShown !== seen) drawGround();
   groundShown = seen;
@@ -173,90 +170,35 @@ function inBox(brush, action) {
 
 // ---------- disks ----------
 
-// Pixel by pixel into an array: far faster than thousands of arcs. Small disks are stamped; what a stamp looks like
-// depends on where in a pixel the centre is. Species have patterns where there is room: plain, a hole, a ring, both; whether
-// a place is part of one, by the square of its distance from the centre in radii.
-const PHASES = 8, LARGEST_STAMP = 16, SMALLEST_PATTERN = 2.5;
-const PATTERNS = [null, q => q < 0.18, q => q > 0.25 && q < 0.6, q => q < 0.1 || (q > 0.35 && q < 0.65)];
-let stamps = new Map();  // by radius and pattern
+// Pixel by pixel into an array: far faster than thousands of arcs. Species have patterns where there is room: plain, a hole,
+// a ring, both; the paper shows up to the first, and from the second to the third share of the square of the radius.
+const SMALLEST_PATTERN = 2.5, PATTERNS = [[0, 0, 0], [0.18, 0, 0], [0, 0.25, 0.6], [0.1, 0.35, 0.65]];
 
 function drawDisks() {
   const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
-  const { unit, x: x0, y: y0 } = view, high = page.height;
-  const looks = kinds.map((_, s) => radii.map(radius => lookOf(radius, s % PATTERNS.length)));
-  const [left, top, right, bottom] = seenBox();
-  const clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
+  const patterns = kinds.map((_, s) => radii.map(radius => PATTERNS[radius < SMALLEST_PATTERN * page.dots ? 0 : s % PATTERNS.length]));
+  const [left, top, right, bottom] = seenBox(), clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
   pixels.fill(0);
   for (let i = 0; i < disks; i++) {
-    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], colour = palette[code ? code[i] : kind], x = X[i], y = Y[i];
-    const look = looks[kind][size];
-    if (!wraps) {
-      drawDisk((x - x0) * unit, high - (y - y0) * unit, r, colour, look, clip);
-      continue;
-    }
-    const reach = r / unit, a1 = lastCopy(0, x - reach), b0 = firstCopy(1, y + reach), b1 = lastCopy(1, y - reach);
+    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], pattern = patterns[kind][size], colour = palette[code ? code[i] : kind];
+    const x = X[i], y = Y[i], reach = r / view.unit;
+    if (!wraps) { drawDisk(across(x), up(y), r, colour, pattern, clip); continue; }
+    const a1 = lastCopy(0, x - reach), b0 = firstCopy(1, y + reach), b1 = lastCopy(1, y - reach);
     for (let a = firstCopy(0, x + reach); a <= a1; a++)
-      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, look, clip);
+      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, pattern, clip);
   }
   disksBrush.putImageData(picture, 0, 0);
 }
 
-function drawDisk(x, y, radius, colour, look, clip) {
-  const cx = x - 0.5, cy = y - 0.5, reach = radius + 1, out = pixels, { stamp } = look;
-  if (cx + reach < clip[0] || cx - reach > clip[2] || cy + reach < clip[1] || cy - reach > clip[3]) return;
-  if (!stamp || cx - reach < clip[0] || cx + reach > clip[2] || cy - reach < clip[1] || cy + reach > clip[3]) {
-    drawPart(cx, cy, radius, colour, look.pattern, clip);
-    return;
-  }
-  const i = Math.floor(cx), j = Math.floor(cy), base = j * page.width + i, { list, holes, rims, ends } = stamp;
-  const phase = PHASES * Math.floor(PHASES * (cy - j)) + Math.floor(PHASES * (cx - i)), hole = holes[phase], rim = rims[phase], end = ends[phase];
-  for (let k = phase ? ends[phase - 1] : 0; k < hole; k++) out[base + list[k]] = colour;
-  for (let k = hole; k < rim; k++) out[base + list[k]] = paper;
-  for (let k = rim; k < end; k++) {
-    const edge = list[k], at = base + (edge >> 8), old = out[at];
-    if (old === 0) out[at] = colour & 0xffffff | edge << 24; else out[at] = painted(old, colour, edge & 255);
-  }
-}
-
-// A function of its own: what it hands on would make the one above slow.
-function drawPart(cx, cy, radius, colour, pattern, clip) {
-  eachPixel(cx, cy, radius, clip, (at, covered, q) => {
-    pixels[at] = pattern && covered === 255 && pattern(q) ? paper : painted(pixels[at], colour, covered);
-  });
-}
-
-function lookOf(radius, number) {
-  const pattern = radius < SMALLEST_PATTERN * page.dots ? null : PATTERNS[number], key = `${radius} ${pattern && number}`;
-  if (!stamps.has(key)) stamps.set(key, { pattern, stamp: radius > LARGEST_STAMP ? null : stampFor(radius, pattern) });
-  return stamps.get(key);
-}
-
-// Of each phase the pixels inside, from where the centre is, those in holes, and those on the rim: 256 times that, and how
-// much of 255 is covered.
-function stampFor(radius, pattern) {
-  const all = [], holes = [], rims = [], ends = [], size = Math.ceil(radius + 2);
-  for (let phase = 0; phase < PHASES * PHASES; phase++) {
-    const rim = [], hole = [], x = (phase % PHASES + 0.5) / PHASES, y = (Math.floor(phase / PHASES) + 0.5) / PHASES;
-    eachPixel(x, y, radius, [-size, -size, size, size], (at, covered, q) => {
-      if (covered === 255) (pattern?.(q) ? hole : all).push(at); else if (covered) rim.push(256 * at + covered);
-    });
-    for (const [part, border] of [[hole, holes], [rim, rims], [[], ends]]) {
-      border.push(all.length);
-      all.push(...part);
-    }
-  }
-  return { list: Int32Array.from(all), holes: Int32Array.from(holes), rims: Int32Array.from(rims), ends: Int32Array.from(ends) };
-}
-
-// Row by row, the pixels that a disk covers, how much of 255, and the square of the distance from its centre in radii.
-function eachPixel(cx, cy, radius, [left, top, right, bottom], action) {
-  const reach = radius + 0.5, inner = radius > 0.5 ? (radius - 0.5) ** 2 : -1;
-  for (let j = Math.max(top, Math.ceil(cy - reach)); j <= Math.min(bottom, Math.floor(cy + reach)); j++) {
-    const dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), row = j * page.width;
-    const end = Math.min(right, Math.floor(cx + half));
-    for (let i = Math.max(left, Math.ceil(cx - half)); i <= end; i++) {
-      const square = (i - cx) * (i - cx) + dd, q = square / (radius * radius);
-      action(row + i, square <= inner ? 255 : Math.min(255, 255 * (reach - Math.sqrt(square)) | 0), q);
+function drawDisk(x, y, radius, colour, [hole, from, to], [left, top, right, bottom]) {
+  const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, whole = radius * radius, inner = (radius - 0.5) ** 2;
+  const low = Math.max(top, Math.ceil(cy - reach)), high = Math.min(bottom, Math.floor(cy + reach));
+  for (let j = low; j <= high; j++) {
+    const dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
+    for (let i = Math.max(left, Math.ceil(cx - half)), at = j * page.width + i; i <= end; i++, at++) {
+      const square = (i - cx) * (i - cx) + dd, share = square / whole;
+      if (square > inner) pixels[at] = painted(pixels[at], colour, 255 * (reach - Math.sqrt(square)) | 0);
+      else pixels[at] = share < hole || (share > from && share < to) ? paper : colour;
     }
   }
 }
@@ -264,7 +206,6 @@ function eachPixel(cx, cy, radius, [left, top, right, bottom], action) {
 // A pixel, so far `old`, on the rim of a disk: beside other disks the colours are mixed, what they cover adds up.
 function painted(old, colour, covered) {
   const there = old >>> 24;
-  if (covered === 255) return colour;
   if (there === 0) return colour & 0xffffff | covered << 24;
   const total = Math.min(255, covered + there), part = 256 * covered / total | 0, rest = 256 - part;
   const redBlue = (Math.imul(colour & 0xff00ff, part) + Math.imul(old & 0xff00ff, rest)) >>> 8 & 0xff00ff;
@@ -392,7 +333,7 @@ function drawNumbers() {
   marks.textBaseline = 'middle';
   for (let i = 0; i < disks; i++) {
     const r = radii[sizeOf[i]], inside = r > least, colour = palette[code ? code[i] : speciesOf[i]];
-    const light = (colour & 255) * 0.3 + (colour >> 8 & 255) * 0.59 + (colour >> 16 & 255) * 0.11 > 140;
+    const light = luminance([0, 8, 16].map(shift => colour >> shift & 255)) > 0.2;
     const reach = (r + 2 * least) / view.unit, away = inside ? 0 : r + least;
     marks.font = `600 ${Math.min(20 * page.dots, Math.max(12 * page.dots, r))}px system-ui, sans-serif`;
     marks.fillStyle = !inside ? ink.ink : light ? '#101418' : '#ffffff';

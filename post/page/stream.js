@@ -136,7 +136,7 @@ function moveInStream(time) {
     VY[i] = velocity[2 * i + 1];
   }
   if (angle) angles.set(angle);
-  Object.assign(moment, { time: shown, shown, frame: index, collisions });
+  Object.assign(moment, { time: clamp(time, first(), last()), shown, frame: index, collisions });
   energiesNow(i => film.gravity[0] * unwrapped(index, i, 0) + film.gravity[1] * unwrapped(index, i, 1));
 }
 
