@@ -25,10 +25,10 @@ from ricochet.script import Parser, launch
 from aiohttp import web
 
 #: A worker, which finds the player's module where this one is.
-WORKER = '''import sys; sys.path[:0] = [{!r}]
+WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
 from ricochet.worker import work
-work(scene)'''
+work(scene)"""
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 
 

@@ -70,9 +70,9 @@ class Bench:
     def start(self, wish: dict) -> None:
         """Another simulation in the place of this one, if it can be."""
         tell({"is": "starting"})
-        other, lines = Simulation.__new__(Simulation), settings_text(wish["settings"])
+        other = Simulation.__new__(Simulation)
         try:
-            other._begin(wish["text"], lines)
+            other._begin(wish["text"], settings_text(wish["settings"]))
             if other.count > DISKS:
                 raise ProgramError(f"{other.count} disks; here a run may have {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
