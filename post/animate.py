@@ -89,10 +89,9 @@ def animate(
     warn(figure, [run.shortcoming] if run.shortcoming else [])
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
-    film = animation.FuncAnimation(
+    return animation.FuncAnimation(
         figure, show, frames, interval=1000 / fps, cache_frame_data=False
     )
-    return film
 
 
 def main() -> None:

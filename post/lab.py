@@ -1,4 +1,4 @@
-"""The laboratory: a page of this computer's browser where disks move, and what acts on them changes.
+"""The laboratory: a page where disks move, and where what acts on them can be changed.
 
     python post/lab.py                 the inputs of the folder input/
     python post/lab.py my.nml          and one of your own

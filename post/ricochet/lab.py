@@ -8,14 +8,12 @@ laboratory that is killed.
 
 import asyncio
 import json
-import os
 import re
 import secrets
 import shlex
 import shutil
 import struct
 import subprocess
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -123,6 +121,7 @@ class Lab:
         self.waiting: list[str] = []  # numbers of pages that have not opened a socket yet
         self.workers: set[Worker] = set()
         self.spare: asyncio.Task | None = None
+        self.scans: set[asyncio.Task] = set()
         self.runs = 0
         self.closed = False
 
@@ -221,7 +220,9 @@ class Lab:
         if wish["do"] in ("start", "scan"):
             wish |= self.found(wish)
         if wish["do"] == "scan":
-            asyncio.create_task(self.scan(socket, wish))
+            task = asyncio.create_task(self.scan(socket, wish))
+            self.scans.add(task)
+            task.add_done_callback(self.scans.discard)
             return
         if wish["do"] == "start":
             self.runs += 1
@@ -314,7 +315,7 @@ class Lab:
 
 def path_of(folder: Path, name: str) -> Path:
     """A file in a folder, by its plain name."""
-    if name != os.path.basename(name) or not (folder / name).is_file():
+    if name != Path(name).name or not (folder / name).is_file():
         raise web.HTTPNotFound(text="no such file\n")
     return folder / name
 

@@ -358,8 +358,8 @@ def value_of(text: str) -> object:
         try:
             found.append(float(re.sub("[dD]", "e", word)))
         except ValueError:
-            word = {".true.": True, ".false.": False}.get(word.lower(), word.strip("'\""))
-            found.append(word)
+            truth = {".true.": True, ".false.": False}
+            found.append(truth.get(word.lower(), word.strip("'\"")))
     return found[0] if len(found) == 1 else tuple(found)
 
 

@@ -216,7 +216,8 @@ def test_a_wrong_value_gets_one_line_and_the_run_goes_on(address, settings, plac
                 '{"do": "start"}',
             ):
                 await one.socket.send_str(wrong)
-            assert "not understood" in (await one.until("state"))["reason"]
+            while "not understood" not in (await one.until("state"))["reason"]:
+                pass
             await one.until("frame")
             await one.say("change", settings={"species.gas.count": "3"})
             assert (await one.until("problems"))["change"] is True
