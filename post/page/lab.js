@@ -199,7 +199,7 @@ function buildInputs() {
 
 const current = () => state.boxes.at(-1), filmOf = box => box.frame.contentWindow, isThere = box => !!filmOf(box)?.start;
 const shownBoxes = () => state.boxes.filter(box => box.shown || box === current()), films = () => shownBoxes().filter(isThere).map(filmOf);
-const isPaused = () => state.paused;
+function isPaused() { return state.paused; }
 
 function newBox() {
   const taken = state.boxes.map(({ letter }) => letter), letter = [...'ABCDEFGHIJ'].find(one => !taken.includes(one));

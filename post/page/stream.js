@@ -9,8 +9,11 @@ function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSO
 
 // The run that the laboratory wishes, on the same line for all runs of this film.
 function start(wish, address) {
+  const same = stream.wish?.input === wish.input, begin = () => {
+    send({ do: 'start', ...wish, pace: same ? stream.sent : null, playing: !parent.isPaused() });
+    if (!same) stream.sent = 0;
+  };
   stream.wish = wish;
-  const begin = () => send({ do: 'start', ...wish, pace: usual ? null : paceNow(), playing: true });
   document.documentElement.classList.add('starting');
   if (stream.socket?.readyState < 2) { begin(); return; }
   stream.socket = new WebSocket(address);
@@ -111,7 +114,7 @@ function take(buffer) {
     source.move(frame.time);
     begin();
     refresh();
-    play(!parent.isPaused?.());
+    play(!parent.isPaused());
   } else if (!state.playing && stream.asked) show(frame.time, true);
   if (!state.playing) send({ do: 'got' });
   if (!state.playing) stream.fresh = stream.asked = false;

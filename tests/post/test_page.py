@@ -2,13 +2,14 @@
 
 import importlib.util
 import json
+from itertools import pairwise
 
 import pytest
 from PIL import Image
 
 import player
 from ricochet import Simulation
-from ricochet.lab import groups_of
+from ricochet.lab import form
 from synthetic_run import ROOT
 
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
@@ -34,18 +35,18 @@ def test_every_input_has_its_place_in_the_chooser_and_a_picture_of_now():
 @pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
 def test_both_ends_of_each_slider_run(path, monkeypatch, program):
     monkeypatch.setenv("RICOCHET", str(program))
-    given = {group["place"]: group["values"] for group in groups_of(path)}
+    given = {group["place"]: group["given"] for group in form(path)["groups"]}
     assert len(CHOOSER[path.stem]["sliders"]) == 5
     for name, words, *ends in CHOOSER[path.stem]["sliders"]:
         assert not set("&_'") & set(words), "in words, not in names of variables"
-        name, _, component = name.removesuffix("]").partition("[")
-        group, _, variable = name.rpartition(".")
+        variable, _, component = name.removesuffix("]").partition("[")
+        place, _, own = variable.rpartition(".")
         for end in ends[:2]:
             value = end
             if component:
-                value = list(given.get(group, {}).get(variable, [0, 0]))
+                value = [*map(float, given.get(place, {}).get(own, "0,0").split(","))]
                 value[int(component)] = end
-            with Simulation(path, {name: value}) as run:
+            with Simulation(path, {variable: value}) as run:
                 run.advance(time=1e-3)
 
 
@@ -68,4 +69,4 @@ def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, brow
             assert (high + 0.05) / (low + 0.05) >= 3
         assert scale[::8] == sorted(scale[::8])
         greys = sorted(disks)
-        assert all(b + 0.05 > 1.25 * (a + 0.05) for a, b in zip(greys, greys[1:], strict=False))
+        assert all(b + 0.05 > 1.25 * (a + 0.05) for a, b in pairwise(greys))
