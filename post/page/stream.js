@@ -3,7 +3,7 @@
 // The page draws the newest frame; those before are kept, as far as there is room, to go back to. A film that has been gone
 // back in plays until it is where the worker is, which goes on then.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
-const stream = { socket: null, scene: null, past: [], live: true, fresh: false, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+const stream = { socket: null, scene: null, past: [], live: true, fresh: 0, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
@@ -77,7 +77,7 @@ function open({ facts, blocks, run }) {
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
-  Object.assign(stream, { past: [], live: true, fresh: false, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
+  Object.assign(stream, { past: [], live: true, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
   source = fromWorker;
 }
 
@@ -108,7 +108,7 @@ function take(buffer) {
   if (before?.time === frame.time) past.pop();  // as of the start, and of a change
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
-  stream.fresh = true;
+  stream.fresh++;
   document.documentElement.classList.remove('starting');
   if (past.length === 1 && !before) {
     source.move(frame.time);
@@ -116,9 +116,11 @@ function take(buffer) {
     refresh();
     play(!parent.isPaused());
   } else if (!state.playing && stream.asked) show(frame.time, true);
-  if (!state.playing) send({ do: 'got' });
-  if (!state.playing) stream.fresh = stream.asked = false;
+  if (!state.playing) { drawn(); stream.asked = false; }
 }
+
+// Each frame is answered: the worker is never more than two ahead.
+function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
 // Frames are so dense that no disk crosses half of the box between two.
 function crossedSince(before, { place }) {
@@ -204,11 +206,11 @@ const fromWorker = {
   newest(next) {
     if (stream.live) {
       if (!stream.fresh) return;
-      stream.fresh = false;
       show(last());
-      send({ do: 'got' });
-    } else if (next < last()) show(next);
-    else {
+      drawn();
+    } else {
+      drawn();
+      if (next < last()) { show(next); return; }
       show(last());
       stream.live = true;
       send({ do: 'play' });
