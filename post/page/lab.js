@@ -70,8 +70,8 @@ function sliderOf([name, text, from, to, log]) {
 const read = ({ key, at }) => parseFloat(at < 0 ? valueOf(key) : split(valueOf(key))[at]);
 const acts = key => ACTS.test(key);
 
-// The largest value that has room: all disks fill no more than a share of their region.
-function mostOf({ key, to }) {
+// The largest value that has room, up to another limit: all disks fill no more than a share of their region.
+function mostOf({ key, to = Infinity }) {
   const [kind, name, variable] = key.split('.');
   if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
   const sizes = {}, all = state.groups.filter(group => group.kind === 'species').map(({ place }) => {
@@ -100,7 +100,7 @@ function buildSlider(spec) {
     set(key, at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(','));
   };
   range.addEventListener('input', () => {
-    const share = range.value / 1000, low = scaled(from), value = low + share * (scaled(most()) - low), step = (most() - from) / 200;
+    const share = range.value / 1000, low = scaled(from), value = low + share * (scaled(most()) - low), step = 10 ** Math.floor(Math.log10((spec.to - from) / 100));
     put(log ? Math.exp(value) : Math.round(value / step) * step);
   });
   field.addEventListener('change', () => put(parseFloat(field.value.replace(',', '.')) || 0));
@@ -269,7 +269,10 @@ function ready() {
 // Once, where it belongs; only that value waits, the others act.
 function showProblems(problems) {
   const known = problems.filter(({ place }) => place in state.settings && !state.waiting[place]);
-  for (const { place, text } of problems) if (place in state.settings) state.waiting[place] = text;
+  for (const { place, text } of known) {
+    const most = mostOf({ key: place });
+    state.waiting[place] = most < numberOf(place) ? `too full: at most ${short(most)}` : text;
+  }
   sync();
   tell(known.length ? 'one value waits: see the form' : problems[0].text, true);
   if (known.length) again = true;

@@ -221,7 +221,7 @@ const fromWorker = {
 // ---------- a part of the laboratory ----------
 
 // What the laboratory asks its films for, which stand side by side.
-function inside() { return { film, source, state, moment, kinds, stream, pace, camera }; }
+function inside() { return { film, source, state, moment, kinds, stream, overlaid }; }
 
 function overlay(list) {
   overlaid = list;
