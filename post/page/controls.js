@@ -41,7 +41,7 @@ function prepareFilm() {
 let told = 0;  // when words and plots were renewed
 
 function show(time, anew = false) {
-  source.move(time);
+  move(time);
   drawStage();
   if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // they may come later than disks
   told = performance.now();
@@ -123,8 +123,8 @@ function go(time) {
   remember();
 }
 
-const step = frame => go(source.frameTime(frame));
-const back = () => step(source.frameTime(moment.frame) < moment.time ? moment.frame : moment.frame - 1);
+const step = frame => go(frameTime(frame));
+const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : moment.frame - 1);
 const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
 const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 

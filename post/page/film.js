@@ -6,8 +6,11 @@ const $ = id => document.getElementById(id);
 let film, disks, kinds;         // facts; the number of disks; species
 let speciesOf, sizeOf, masses;  // by disk
 let X, Y, VX, VY;               // of all disks at the moment; inside the box along a periodic axis
-let angles, HITS;               // orientations at the moment, if disks have them; collisions since the frame before
-let source;                     // the file, or what comes from a worker: how to get to a moment, and what is known of it
+let UX, UY, HITS;               // places without jumps since the frame before; collisions since then
+let angles;                     // orientations at the moment, if disks have them
+let source;                     // the file, or what comes from a worker: what goes on, and what comes next
+let past = [];                  // frames: time, place and velocity (x1 y1 x2 y2 ...), angle, crossed (periods since the first), ...
+let origins;                    // x1 y1 x2 y2 ... where displacements count from
 const moment = { time: 0, shown: 0, frame: 0, kinetic: [], potential: [], collisions: 0 };
 
 function bytes(text) {
@@ -24,102 +27,57 @@ function setScene(facts, blocks) {
   sizeOf = bytes(blocks.sizes);
   masses = new Float32Array(bytes(blocks.mass).buffer);
   disks = speciesOf.length;
-  [X, Y, VX, VY, HITS] = Array.from({ length: 5 }, () => new Float64Array(disks));
+  [X, Y, VX, VY, UX, UY, HITS] = Array.from({ length: 7 }, () => new Float64Array(disks));
+  past = [];
 }
 
-const first = () => source.first(), last = () => source.last();
+const first = () => past[0].time, last = () => past.at(-1).time;
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
 // How many of these ascending numbers are not larger.
-function upTo(values, value) {
+function upTo(values, value, number = one => one) {
   let low = 0, high = values.length;
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (values[middle] <= value) low = middle + 1; else high = middle;
+    if (number(values[middle]) <= value) low = middle + 1; else high = middle;
   }
   return low;
 }
 
-// The mean energies of the disks of each species at the moment.
-function energiesNow(height) {
-  const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0);
-  for (let i = 0; i < disks; i++) {
-    kinetic[speciesOf[i]] += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
-    potential[speciesOf[i]] -= masses[i] * height(i);
-  }
-  const mean = (sum, s) => sum / kinds[s].count;
-  Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
+const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last one that is not later
+const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
+
+// The periods that disks have crossed since the first frame, x1 y1 x2 y2 ..., if there are any: `moved` tells them since the last.
+function cross(frame, moved) {
+  const before = past.at(-1);
+  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
+  return frame;
 }
 
-// Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
-function sidesAt(time) {
-  return source.sides?.() ?? film.sides.map(({ place, motion, amplitude, period, phase }, k) => {
-    if (!period) return place;
-    const s = time / period + phase, part = s - Math.floor(s);
-    const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));
-    return place + (k % 2 ? -1 : 1) * amplitude * f;
-  });
-}
+// ---------- the way from frame to frame ----------
 
-// ---------- a film: frames, and what happens between them ----------
+// In the time between two frames a disk flies from the first one on, by way of its turns; each flight is straight, or a parabola
+// under gravity. A disk whose path is not known stands still until the next frame; where many do, all stand: the frame is shown
+// as it is. What comes from a worker has no ways, but frames that are close enough.
+const MANY = 0.1;              // of the disks
+let ways;                      // of a film: what is known between frames
+// start: the first collision after each frame; disk, and share of the time, new velocity of each; bits: disks whose paths are
+// not known, of `row` bytes a gap; pairs, others: times of all collisions of two disks, and of other ones, if they are known
+const isGuessed = (k, disk) => !ways || ways.bits[k * ways.row + (disk >> 3)] >> (disk & 7) & 1;
+const stands = k => !ways || film.guesses[k] > MANY * disks;
 
-// A gap is the time between two frames. In it a disk flies from the first one on, by way of its turns; each flight is
-// straight, or a parabola under gravity. A disk whose path is not known stands still until the next frame; where many do,
-// all stand: the frame is shown as it is.
-const MANY = 0.1;                // of the disks
-let frames;                      // their number
-let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the room
-let velocities, fastest;         // the same, in units of 1 / 32767 of the fastest component of each frame
-let turnings, shifts, hits;      // orientations, not wrapped; periods crossed since the frame before, x + 8 and y + 8 in four
-                                 // bits each; places on the scale of collisions: frame by frame, if there are any
-let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, new velocity
-let guessed, guessedRow;         // bits, gap by gap: disks whose paths there are not known; bytes of a gap
-let pairs, others;               // times of all collisions of two disks, and of other ones, if they are known
-let origins;                     // x1 y1 x2 y2 ... where displacements count from
-let crossed;                     // periods crossed since the first frame, x1 y1 x2 y2 ..., until a frame
-let UX, UY;                      // places of all disks at the moment without jumps since the frame before
-
-function loadFilm({ facts, blocks }) {
-  setScene(facts, blocks);
-  frames = film.time.length;
-  const block = (name, kind) => new kind(bytes(blocks[name]).buffer), real = film.exact ? Float64Array : Float32Array;
-  positions = block('positions', film.exact ? Float64Array : Uint16Array);
-  velocities = block('velocities', film.exact ? Float64Array : Int16Array);
-  fastest = block('fastest', Float64Array).map(speed => film.exact ? 1 : speed / 32767);
-  grain = film.exact ? 1 : 65535;
-  turnings = blocks.angles && block('angles', Float32Array);
-  angles = turnings && new Float32Array(disks);
-  [shifts, hits] = ['shifts', 'hits'].map(name => blocks[name] && bytes(blocks[name]));
-  gapStart = [0];
-  block('gaps', Uint32Array).forEach((count, gap) => gapStart.push(gapStart[gap] + count));
-  turning = block('turning', Uint32Array);
-  turns = block('turns', real);
-  [pairs, others] = [block('pairs', Float64Array), block('others', Float64Array)];
-  origins = block('origins', Float32Array).map((place, k) => place * film.edges[k % 2]);
-  guessed = bytes(blocks.guessed);
-  guessedRow = Math.ceil(disks / 8);
-  crossed = { frame: 0, sum: new Int32Array(2 * disks) };
-  [UX, UY] = [new Float64Array(disks), new Float64Array(disks)];
-  source = fromFile;
-}
-
-const isGuessed = (gap, disk) => guessed[gap * guessedRow + (disk >> 3)] >> (disk & 7) & 1;
-const stands = gap => film.guesses[gap] > MANY * disks;
-const frameAt = time => Math.max(0, upTo(film.time, time) - 1);  // the last one that is not later
-
-function moveInFilm(time) {
+function move(time) {
   moment.time = clamp(time, first(), last());
-  const frame = moment.frame = frameAt(moment.time), [width, height] = film.edges, [left, bottom] = film.lower;
-  const h = (film.time[frame + 1] ?? film.time[frame]) - film.time[frame], stop = gapStart[frame + 1];
-  const passed = stands(frame) ? 0 : moment.time - film.time[frame], share = h > 0 ? passed / h : 0;
-  const [wrapX, wrapY] = film.periodic, [gx, gy] = film.gravity, unit = fastest[frame], unknown = film.guesses[frame];
-  moment.shown = film.time[frame] + passed;
-  for (let i = 0, at = 2 * frame * disks, turn = gapStart[frame]; i < disks; i++, at += 2) {
-    let x = width * positions[at] / grain, y = height * positions[at + 1] / grain, met = 0;
-    let vx = unit * velocities[at], vy = unit * velocities[at + 1], since = 0, dt;
-    if (!(unknown && isGuessed(frame, i))) {
-      for (; turn < stop && turning[turn] === i && turns[3 * turn] <= share; turn++) {
-        dt = h * turns[3 * turn] - since;
+  const k = moment.frame = frameAt(moment.time), here = past[k], then = past[k + 1], { place, velocity, crossed } = here;
+  const passed = stands(k) ? 0 : moment.time - here.time, share = passed && then ? passed / (then.time - here.time) : 0;
+  const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic, [gx, gy] = film.gravity;
+  const { start, disk, turns } = ways ?? {}, stop = start?.[k + 1], unknown = film.guesses?.[k];
+  moment.shown = here.time + passed;
+  for (let i = 0, turn = start?.[k]; i < disks; i++) {
+    let x = place[2 * i], y = place[2 * i + 1], vx = velocity[2 * i], vy = velocity[2 * i + 1], since = 0, met = 0, dt;
+    if (passed && !(unknown && isGuessed(k, i))) {
+      for (; turn < stop && disk[turn] === i && turns[3 * turn] <= share; turn++) {
+        dt = (then.time - here.time) * turns[3 * turn] - since;
         x += (vx + 0.5 * gx * dt) * dt;
         y += (vy + 0.5 * gy * dt) * dt;
         vx = turns[3 * turn + 1];
@@ -133,85 +91,100 @@ function moveInFilm(time) {
       vx += gx * dt;
       vy += gy * dt;
     }
-    while (turn < stop && turning[turn] === i) turn++;
-    [UX[i], UY[i], VX[i], VY[i], HITS[i]] = [x, y, vx, vy, met];
-    if (wrapX) x -= width * Math.floor(x / width);
-    if (wrapY) y -= height * Math.floor(y / height);
-    X[i] = left + x;
-    Y[i] = bottom + y;
+    while (turn < stop && disk[turn] === i) turn++;
+    UX[i] = X[i] = x;
+    UY[i] = Y[i] = y;
+    VX[i] = vx;
+    VY[i] = vy;
+    HITS[i] = met;
+    if (wrapX) X[i] -= width * Math.floor((x - left) / width);
+    if (wrapY) Y[i] -= height * Math.floor((y - bottom) / height);
+    if (angles) angles[i] = here.angle[i] + (share && share * (then.angle[i] - here.angle[i]));
   }
-  if (shifts) crossUntil(frame);
-  for (let i = 0, at = frame * disks; angles && i < disks; i++, at++)
-    angles[i] = turnings[at] + share * ((turnings[at + disks] ?? turnings[at]) - turnings[at]);
-  const { sum } = crossed, [Gx, Gy] = [gx * width, gy * height];
-  energiesNow(i => gx * (left + UX[i]) + gy * (bottom + UY[i]) + Gx * sum[2 * i] + Gy * sum[2 * i + 1]);
-  moment.collisions = pairs.length ? film.collisions[0] + 2 * upTo(pairs, moment.shown) / disks : film.collisions[frame];
+  moment.collisions = ways?.pairs.length ? past[0].collisions + 2 * upTo(ways.pairs, moment.shown) / disks : here.collisions;
+  const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0), mean = (sum, s) => sum / kinds[s].count;
+  for (let i = 0; i < disks; i++) {
+    kinetic[speciesOf[i]] += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
+    potential[speciesOf[i]] -= masses[i] * (gx * (UX[i] + (crossed ? width * crossed[2 * i] : 0)) + gy * (UY[i] + (crossed ? height * crossed[2 * i + 1] : 0)));
+  }
+  Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
 }
 
-function crossUntil(frame) {
-  if (frame < crossed.frame) crossed = { frame: 0, sum: crossed.sum.fill(0) };
-  while (crossed.frame < frame) {
-    const row = ++crossed.frame * disks;
-    for (let i = 0; i < disks; i++) {
-      crossed.sum[2 * i] += (shifts[row + i] >> 4) - 8;
-      crossed.sum[2 * i + 1] += (shifts[row + i] & 15) - 8;
-    }
-  }
+// Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
+function sidesAt(time) {
+  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase }, k) => {
+    if (!period) return place;
+    const s = time / period + phase, part = s - Math.floor(s);
+    const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));
+    return place + (k % 2 ? -1 : 1) * amplitude * f;
+  });
 }
 
-// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight).
-function flightsInFilm(i, from, to) {
-  const result = [], [left, bottom] = film.lower;
-  for (let gap = frameAt(from); gap < frames - 1 && film.time[gap] < to; gap++) {
-    const h = film.time[gap + 1] - film.time[gap], at = 2 * (gap * disks + i), straight = isGuessed(gap, i);
-    let place = [0, 1].map(k => film.lower[k] + film.edges[k] * positions[at + k] / grain), since = 0;
-    let velocity = [0, 1].map(k => fastest[gap] * velocities[at + k]);
-    if (straight) {
-      const code = shifts ? shifts[(gap + 1) * disks + i] : 0x88, moved = [(code >> 4) - 8, (code & 15) - 8];
-      const end = [0, 1].map(k => film.lower[k] + film.edges[k] * (positions[at + 2 * disks + k] / grain + moved[k]));
-      velocity = [0, 1].map(k => (end[k] - place[k]) / h);
-    }
-    const g = straight ? [0, 0] : film.gravity, start = gapStart[gap], own = [];
-    for (let k = start + turning.subarray(start, gapStart[gap + 1]).indexOf(i); k >= start && turning[k] === i && k < gapStart[gap + 1]; k++)
-      own.push([h * turns[3 * k], [turns[3 * k + 1], turns[3 * k + 2]]]);
+function displacement(i) {
+  const { crossed } = past[moment.frame], [x, y] = [0, 1].map(k => crossed ? film.edges[k] * crossed[2 * i + k] : 0);
+  return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
+}
+
+// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight); whether it is guessed.
+function flights(i, from, to) {
+  const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
+  for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
+    const here = past[k], then = past[k + 1], h = then.time - here.time, guessed = isGuessed(k, i), own = [], { start, disk, turns } = ways ?? {};
+    const pair = array => [array[2 * i], array[2 * i + 1]], g = guessed ? [0, 0] : film.gravity;
+    let place = pair(here.place), velocity = pair(here.velocity), since = 0;
+    if (guessed) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
+    else for (let turn = start[k] + disk.subarray(start[k], start[k + 1]).indexOf(i); turn >= start[k] && turn < start[k + 1] && disk[turn] === i; turn++)
+      own.push([h * turns[3 * turn], [turns[3 * turn + 1], turns[3 * turn + 2]]]);
     for (const [end, after] of [...own, [h, velocity]]) {
-      const along = t => [0, 1].map(k => place[k] + (velocity[k] + 0.5 * g[k] * (t - since)) * (t - since));
-      const a = Math.max(since, from - film.time[gap]), b = Math.min(end, to - film.time[gap]);
-      if (b > a) result.push({ from: along(a), to: along(b), bend: g.map(one => one * (b - a) ** 2 / 4), straight });
+      const along = t => plus(place, velocity.map((v, axis) => (v + 0.5 * g[axis] * (t - since)) * (t - since)));
+      const a = Math.max(since, from - here.time), b = Math.min(end, to - here.time);
+      if (b > a) result.push({ from: along(a), to: along(b), bend: g.map(one => one * (b - a) ** 2 / 4), guessed: guessed && !!ways });
       [place, velocity, since] = [along(end), after, end];
     }
   }
   return result;
 }
 
+// The speeds of all disks in the frames up to the moment, in some of them if there are very many; returns how many.
+function eachSpeed(action) {
+  const some = Math.ceil((moment.frame + 1) * disks / 2e6);
+  let samples = 0;
+  for (let k = moment.frame; k >= 0; k -= some, samples++)
+    for (let i = 0, { velocity } = past[k]; i < disks; i++) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
+  return samples;
+}
+
+// ---------- a film: a file that holds all of it ----------
+
+function loadFilm({ facts, blocks }) {
+  setScene(facts, blocks);
+  const { exact, time, lower, edges } = film, real = exact ? Float64Array : Float32Array;
+  const block = (name, kind) => new kind(bytes(blocks[name]).buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
+  const positions = block('positions', exact ? Float64Array : Uint16Array), velocities = block('velocities', exact ? Float64Array : Int16Array);
+  const fastest = block('fastest', Float64Array), [shifts, hits] = ['shifts', 'hits'].map(name => blocks[name] && bytes(blocks[name]));
+  const turned = blocks.angles && block('angles', Float32Array);
+  const signs = (before, k) => (shifts[past.length * disks + (k >> 1)] >> (k % 2 ? 0 : 4) & 15) - 8;
+  time.forEach((when, k) => past.push(cross({
+    time: when, collisions: film.collisions[k], hits: part(hits, k, disks), angle: part(turned, k, disks),
+    place: real.from(part(positions, k, 2 * disks), (one, n) => lower[n % 2] + edges[n % 2] * one / (exact ? 1 : 65535)),
+    velocity: real.from(part(velocities, k, 2 * disks), one => exact ? one : one * fastest[k] / 32767),
+  }, signs)));
+  angles = turned && new Float32Array(disks);
+  origins = block('origins', Float32Array).map((one, k) => lower[k % 2] + edges[k % 2] * one);
+  ways = { disk: block('turning', Uint32Array), turns: block('turns', real), bits: bytes(blocks.guessed), row: Math.ceil(disks / 8), start: [0] };
+  block('gaps', Uint32Array).forEach((count, k) => ways.start.push(ways.start[k] + count));
+  for (const name of ['pairs', 'others']) ways[name] = block(name, Float64Array);
+  source = fromFile;
+}
+
 const fromFile = {
-  first: () => film.time[0],
-  last: () => film.time[frames - 1],
-  move: moveInFilm,
-  frameTime: k => film.time[clamp(k, 0, frames - 1)],
-  counted: () => `frame ${moment.frame + 1}/${frames}`,
+  counted: () => `frame ${moment.frame + 1}/${past.length}`,
   curves: () => film.curves,
-  // Where a disk was in the last frames: the older part, the newer one.
-  trace: i => [300, 30, 0].map(k => film.time[Math.max(0, moment.frame - k)]).map((from, k, all) => k < 2
-    && flightsInFilm(i, from, k ? moment.shown : all[1])).slice(0, 2),
-  displacement: i => Math.hypot(UX[i] + film.edges[0] * crossed.sum[2 * i] - origins[2 * i],
-    UY[i] + film.edges[1] * crossed.sum[2 * i + 1] - origins[2 * i + 1]),
-  collisions(i) {  // as a place on the scale
-    const scale = Math.log1p(film.scales.collisions[1]), before = hits[moment.frame * disks + i] / 255;
-    return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
-  },
-  // Each frame's speeds in turn, up to that of the moment.
-  eachSpeed(action) {
-    for (let frame = 0; frame <= moment.frame; frame++)
-      for (let i = 0, at = 2 * frame * disks; i < disks; i++, at += 2)
-        action(i, fastest[frame] * Math.hypot(velocities[at], velocities[at + 1]));
-    return moment.frame + 1;
-  },
   coming() {
     const { time, i, j } = film.events, next = upTo(time, moment.time), one = k => [time[k], i[k], j[k]];
     return { happened: next ? one(next - 1) : null, next: Array.from(time.slice(next, next + 20), (_, k) => one(next + k)) };
   },
-  nextEvent: () => Math.min(...[pairs, others].map(times => times[upTo(times, moment.time)] ?? last())),
-  hasEvents: () => pairs.length + others.length > 0,
+  nextEvent: () => Math.min(...[ways.pairs, ways.others].map(times => times[upTo(times, moment.time)] ?? last())),
+  hasEvents: () => ways.pairs.length + ways.others.length > 0,
   goesOn: () => live.on,
 };

@@ -30,7 +30,7 @@ function receive(news) {
   if (!started) begin();
   else prepareFilm();
   if (started && usual) pace = usualPace();
-  source.move(started ? time : live.newest ? last() : first());
+  move(started ? time : live.newest ? last() : first());
   refresh();
   if (!started) play(true);
 }
@@ -57,7 +57,7 @@ $('film').remove();
 if (enclosed) {
   loadFilm(enclosed);
   begin();
-  source.move(first());
+  move(first());
   refresh();
   if (!fromAddress() && !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
 } else if (!isPart) {

@@ -154,7 +154,7 @@ function speedsNow() {
     if (k <= bins) counts[speciesOf[i]][k]++;
   };
   if (state.sofar) {
-    if (sums?.time !== moment.time) sums = { time: moment.time, samples: source.eachSpeed(add), counts };
+    if (sums?.time !== moment.time) sums = { time: moment.time, samples: eachSpeed(add), counts };
     return sums;
   }
   for (let i = 0; i < disks; i++) add(i, Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]));

@@ -38,8 +38,11 @@ function scaleColour(place) {
 // The places of the disks on the scale of a quantity at the moment, 0 to 255; nothing for species.
 const quantities = {
   speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
-  displacement: i => source.displacement(i) / film.scales.displacement[1],
-  collisions: i => source.collisions(i),
+  displacement: i => displacement(i) / film.scales.displacement[1],
+  collisions(i) {  // by factors
+    const scale = Math.log1p(film.scales.collisions[1]), before = past[moment.frame].hits[i] / 255;
+    return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
+  },
 };
 
 function codesNow(name) {
@@ -248,12 +251,14 @@ function drawRadii() {
 
 // Where a disk was lately, the older part pale, dotted where the path is not known.
 function drawTrace(i) {
-  source.trace(i).forEach((part, newer) => {
-    for (const straight of [0, 1]) {
-      marks.setLineDash(straight ? [page.dots, 4 * page.dots] : []);
-      drawPath(part.filter(flight => flight.straight === straight), newer ? ink.ink : ink.soft, newer ? 1.6 : 0.9);
+  const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
+  for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
+    const all = flights(i, from, to);
+    for (const guessed of [false, true]) {
+      marks.setLineDash(guessed ? [page.dots, 4 * page.dots] : []);
+      drawPath(all.filter(flight => flight.guessed === guessed), colour, width);
     }
-  });
+  }
   marks.setLineDash([]);
   marks.lineWidth = 2 * page.dots;
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);

@@ -3,7 +3,7 @@
 // The page draws the newest frame; those before are kept, as far as there is room, to go back to. A film that has been gone
 // back in plays until it is where the worker is, which goes on then.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
-const stream = { socket: null, scene: null, past: [], live: true, fresh: 0, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+const stream = { socket: null, scene: null, live: true, fresh: 0, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
@@ -64,7 +64,7 @@ const hear = {
   },
   state({ playing, ended }) {
     stream.ended = ended;
-    if (!playing && state.playing && stream.live && stream.past.length) play(false);
+    if (!playing && state.playing && stream.live && past.length) play(false);
   },
   problems() { document.documentElement.classList.remove('starting'); },
 };
@@ -77,7 +77,7 @@ function open({ facts, blocks, run }) {
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
-  Object.assign(stream, { past: [], live: true, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
+  Object.assign(stream, { live: true, ended: false, curves, run, events: { next: [], happened: null }, numbers: {} });
   source = fromWorker;
 }
 
@@ -101,17 +101,20 @@ function setTop(top) {
 
 function take(buffer) {
   if (stream.scene) { open(stream.scene); stream.scene = null; }
-  const head = new Float64Array(buffer, 0, HEAD), floats = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
-  const { past } = stream, before = past.at(-1), frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: floats(0), velocity: floats(1) };
+  const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
+  const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
-  if (film.periodic.some(Boolean)) frame.crossed = crossedSince(before, frame);
-  if (before?.time === frame.time) past.pop();  // as of the start, and of a change
+  // Frames are so dense that no disk crosses half of the box between two.
+  cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
+  const isFirst = !past.length;
+  if (past.at(-1)?.time === frame.time) past.pop();  // as of the start, and of a change
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
   stream.fresh++;
   document.documentElement.classList.remove('starting');
-  if (past.length === 1 && !before) {
-    source.move(frame.time);
+  if (isFirst) {
+    origins = frame.place;
+    move(frame.time);
     begin();
     refresh();
     play(!parent.isPaused());
@@ -122,66 +125,11 @@ function take(buffer) {
 // Each frame is answered: the worker is never more than two ahead.
 function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' }); }
 
-// Frames are so dense that no disk crosses half of the box between two.
-function crossedSince(before, { place }) {
-  const crossed = before ? before.crossed.slice() : new Int16Array(2 * disks);
-  for (let k = 0; before && k < 2 * disks; k++) {
-    const edge = film.edges[k % 2], moved = place[k] - before.place[k];
-    if (film.periodic[k % 2] && Math.abs(moved) > edge / 2) crossed[k] -= Math.sign(moved);
-  }
-  return crossed;
-}
-
-function moveInStream(time) {
-  const { past } = stream, index = indexAt(time), { place, velocity, angle, collisions, time: shown } = past[index];
-  for (let i = 0; i < disks; i++) {
-    X[i] = place[2 * i];
-    Y[i] = place[2 * i + 1];
-    VX[i] = velocity[2 * i];
-    VY[i] = velocity[2 * i + 1];
-  }
-  if (angle) angles.set(angle);
-  Object.assign(moment, { time: clamp(time, first(), last()), shown, frame: index, collisions });
-  energiesNow(i => film.gravity[0] * unwrapped(index, i, 0) + film.gravity[1] * unwrapped(index, i, 1));
-}
-
-function indexAt(time) {
-  let low = 0, high = stream.past.length - 1;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (stream.past[middle].time <= time) low = middle; else high = middle - 1;
-  }
-  return low;
-}
-
-function unwrapped(index, i, axis) {
-  const { place, crossed } = stream.past[index], k = 2 * i + axis;
-  return place[k] + (crossed ? film.edges[axis] * crossed[k] : 0);
-}
-
 const fromWorker = {
   grows: true,
-  first: () => stream.past[0].time,
-  last: () => stream.past.at(-1).time,
-  move: moveInStream,
-  frameTime: k => stream.past[clamp(k, 0, stream.past.length - 1)].time,
   counted: () => stream.live ? 'now' : 'gone back',
   curves: () => stream.curves,
   numbers: () => stream.numbers,
-  sides: () => stream.past[moment.frame].sides,
-  trace(i) {
-    const place = k => [0, 1].map(axis => unwrapped(k, i, axis)), [old, recent] = [300, 30].map(k => Math.max(0, moment.frame - k));
-    const line = (from, to) => Array.from({ length: to - from }, (_, k) => ({ from: place(from + k), to: place(from + k + 1), bend: [0, 0], straight: 0 }));
-    return [line(old, recent), line(recent, moment.frame)];
-  },
-  displacement: i => Math.hypot(...[0, 1].map(axis => unwrapped(moment.frame, i, axis) - stream.past[0].place[2 * i + axis])),
-  eachSpeed(action) {
-    const some = Math.ceil((moment.frame + 1) / 60);
-    let samples = 0;
-    for (let k = moment.frame; k >= 0; k -= some, samples++)
-      for (let i = 0, { velocity } = stream.past[k]; i < disks; i++) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
-    return samples;
-  },
   coming: () => stream.live ? stream.events : { next: [], happened: null },
   hasEvents: () => !film.stepped,
   goesOn: () => !stream.ended || !stream.live,
