@@ -51,12 +51,9 @@ TURN = (16 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, an
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
-BINS = 40  # of the speed histogram
 MOST_SAMPLES = 2000  # of a plot
 ENERGIES = ("kinetic", "potential", "rotational")
 MOST_EVENTS = 20000  # to come
-RESTING = 0.02  # of the disks at rest at the end: no gas
-DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 
 
 def frames_that_fit(run: Run, room: float) -> int:
@@ -243,25 +240,6 @@ def curves(run: Run) -> dict:
     return found
 
 
-def speed_bins(run: Run, frames: list[int], top: float) -> dict:
-    """The axis of the histogram of speeds.
-
-    Where disks are at rest to the end, as around a crater, speeds have no Maxwell curve: bins grow
-    with the speed, up to the fastest disk.
-    """
-    last = run.speed(frames[-1])
-    if np.mean(last == 0) < RESTING or not last.any():
-        return {"edges": np.linspace(0, top, BINS + 1), "rest": False}
-    some = frames[:: max(1, len(frames) // 40)]
-    fastest = 1.01 * float(run.speed(some).max())
-    return {"edges": np.geomspace(fastest / DECADES, fastest, BINS + 1), "rest": True}
-
-
-def significant(value: float) -> float:
-    """Seven digits are enough for the eye and short in the file."""
-    return float(f"{value:.7g}")
-
-
 def scene(run: Run) -> tuple[dict, dict]:
     """What stays as it is: the box and what stands in it, species, and of each disk which it has.
 
@@ -309,7 +287,6 @@ def film(
     `watched` passes on the parts in which frames are read, as tqdm does.
     """
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
-    bins = speed_bins(run, frames, 1.3 * tops["speed"])
     parts, before, at_once = [], frames[0], max(1, MOST_AT_ONCE // run.count)
     for some in watched([frames[k : k + at_once] for k in range(0, len(frames), at_once)]):
         parts.append(moving(run, some, before, tops.get("collisions", 1)))
@@ -328,8 +305,7 @@ def film(
         "time": run.time[frames].tolist(),
         "guesses": guesses,
         "curves": curves(run),
-        "speeds": bins | {"edges": [significant(edge) for edge in bins["edges"]]},
-        "scales": {name: [LABELS[name], significant(top)] for name, top in tops.items()},
+        "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
         "logged": has_log(run),

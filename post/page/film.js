@@ -175,6 +175,10 @@ function loadFilm({ facts, blocks }) {
   block('gaps', Uint32Array).forEach((count, k) => ways.start.push(ways.start[k] + count));
   for (const name of ['pairs', 'others']) ways[name] = block(name, Float64Array);
   source = fromFile;
+  const atRest = past.at(-1).velocity.filter((v, k, all) => v === 0 && all[k ^ 1] === 0).length / (2 * disks);
+  let most = 1.3 * film.scales.speed[1];
+  if (atRest > RESTING) past.forEach(({ velocity }) => velocity.forEach((v, k) => { most = Math.max(most, 1.01 * Math.hypot(v, velocity[k ^ 1])); }));
+  setBins(most, atRest);
 }
 
 const fromFile = {

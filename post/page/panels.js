@@ -145,6 +145,14 @@ const FEWEST = 10;  // disks of a species that has a histogram
 let counted;        // species that have one
 let sums;           // the histograms of all frames so far, and of which frame they are
 
+// The axis of the histogram, up to a speed: where disks rest it grows by factors, for a bar of resting disks beside Maxwell's
+// curve would say nothing.
+const RESTING = 0.02;  // of the disks
+function setBins(most, resting) {
+  const rest = resting > RESTING && resting < 1;
+  film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
+}
+
 // Shares of the disks of each species in each bin: of the moment, or of all frames up to it.
 function speedsNow() {
   const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];

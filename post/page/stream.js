@@ -84,7 +84,7 @@ function open({ facts, blocks, run }) {
 // Gases are heated and cooled, and disks that rest are set in motion.
 function fitScales(mean) {
   const [, top] = film.scales.speed, rest = VX.filter((vx, i) => vx === 0 && VY[i] === 0).length / disks;
-  if (rest > 0.02 === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
+  if ((rest > RESTING && rest < 1) === film.speeds.rest && !(mean > 0.8 * top) && !(mean && mean < 0.1 * top && !film.speeds.rest)) return;
   film.rest = rest;
   setTop(mean > 0.8 * top || mean < 0.1 * top ? 2.2 * mean || top : top);
   prepareFilm();
@@ -92,11 +92,9 @@ function fitScales(mean) {
   drawLegend();
 }
 
-// The scale of speeds; the ends of the bins.
 function setTop(top) {
-  const rest = film.rest > 0.02, most = 1.3 * top;
   film.scales = { speed: ['speed (reduced units)', top], displacement: ['displacement', Math.max(...film.edges) / 4] };
-  film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
+  setBins(1.3 * top, film.rest);
 }
 
 function take(buffer) {
