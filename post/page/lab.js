@@ -247,7 +247,7 @@ function hear(source, news) {
     Object.assign(box, { run: news.run, command: news.command, words: box.wished.words, changes: [] });
     ready();
     for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
-    tell(state.boxes.length > 1 ? `run ${box.letter}` : '');
+    tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
     arrangeAll();
   } else if (news.is === 'problems') {
     if (news.change) { run(); return; }  // it does not act on what runs

@@ -82,7 +82,7 @@ function prepare(canvas) {
 }
 
 // Axes from (x0, y0) to (x1, y1) with three or so round numbers each; returns the maps to pixels.
-function axes(plot, [x0, x1], [y0, y1], words, name = short) {
+function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
   const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
   const y = value => bottom - (value - y0) / (y1 - y0) * (bottom - top);
@@ -93,7 +93,7 @@ function axes(plot, [x0, x1], [y0, y1], words, name = short) {
     pen.moveTo(left, y(value));
     pen.lineTo(right, y(value));
     pen.stroke();
-    pen.fillText(name(value), left - 6, y(value));
+    pen.fillText(nameOfY(value), left - 6, y(value));
   }
   Object.assign(pen, { textAlign: 'center', textBaseline: 'top' });
   for (const value of round(x0, x1)) if (x(value) < right - 40 * size) pen.fillText(name(value), x(value), bottom + 5);

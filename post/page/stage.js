@@ -14,7 +14,7 @@ const css = rgb => `rgb(${rgb})`;
 // Colours of disks have at least 3:1 of contrast with the ground, in both themes; a scale grows in luminance from end to end,
 // and species differ in it, so both can be told in grey, too.
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
-const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.3, 0.62, 0.16, 0.45, 0.22]] };
+const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
 const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
 const fromLinear = part => Math.round(255 * (part <= 0.0031308 ? 12.92 * part : 1.055 * part ** (1 / 2.4) - 0.055));
 const luminance = rgb => rgb.map(toLinear).reduce((sum, part, k) => sum + part * [0.2126, 0.7152, 0.0722][k], 0);

@@ -73,7 +73,6 @@ function open({ facts, blocks, run }) {
   const own = kinds?.map(kind => kind.own) ?? [];
   setScene(facts, blocks);
   kinds.forEach((kind, s) => { kind.own = own[s]; });
-  setTop(facts.top);
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };
@@ -112,6 +111,8 @@ function take(buffer) {
   document.documentElement.classList.remove('starting');
   if (isFirst) {
     origins = frame.place;
+    const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
+    setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // of those that move
     move(frame.time);
     begin();
     refresh();
@@ -211,7 +212,7 @@ function showScan({ x: variable, y: measured, log, points, values }) {
   Object.assign(canvas, { width: canvas.clientWidth * page.dots, height: canvas.clientHeight * page.dots });
   const plot = prepare(canvas), { pen } = plot, ends = points.flatMap(([, mean, error]) => [mean - error, mean + error]);
   const low = Math.min(0, ...ends), high = Math.max(...ends, low + 1e-9), from = scaled(values[0]), to = scaled(values.at(-1)), more = 0.04 * (to - from);
-  const { x, y } = axes(plot, [from - more, to + more], [low, low + 1.1 * (high - low)], '', value => log ? short(+(10 ** value).toPrecision(1)) : short(value));
+  const { x, y } = axes(plot, [from - more, to + more], [low, low + 1.1 * (high - low)], '', value => short(log ? +(10 ** value).toPrecision(1) : value), short);
   Object.assign(pen, { strokeStyle: ink.accent, fillStyle: ink.accent, lineWidth: 1.6 });
   pen.beginPath();
   for (const [value, mean] of points) pen.lineTo(x(scaled(value)), y(mean));
