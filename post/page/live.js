@@ -52,6 +52,7 @@ function follow(newest) {
 
 listen();
 document.documentElement.classList.toggle('part', isPart);
+document.documentElement.classList.toggle('empty', isPart);
 if (isPart) addEventListener('keydown', event => parent.typed(event));
 $('film').remove();
 if (enclosed) {

@@ -23,9 +23,9 @@ function start(wish, address) {
     if (typeof data !== 'string') { take(data); return; }
     const news = JSON.parse(data);
     hear[news.is]?.(news);
-    parent.hear(window, news);
+    parent.hear?.(window, news);
   };
-  stream.socket.onclose = () => parent.hear(window, { is: 'gone' });
+  stream.socket.onclose = () => parent.hear?.(window, { is: 'gone' });  // none: the page goes as well
 }
 
 const hear = {
@@ -110,6 +110,7 @@ function take(buffer) {
   stream.fresh++;
   document.documentElement.classList.remove('starting');
   if (isFirst) {
+    document.documentElement.classList.remove('empty');
     origins = frame.place;
     const squares = Array.from({ length: disks }, (_, i) => frame.velocity[2 * i] ** 2 + frame.velocity[2 * i + 1] ** 2).filter(Boolean);
     setTop(1.5 * Math.sqrt(2 * squares.reduce((sum, one) => sum + one, 0) / squares.length) || 1);  // of those that move
