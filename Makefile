@@ -211,7 +211,7 @@ film: $(if $(wildcard $(BUILD)/ricochet),,all)  ## runs INPUT=FILE.nml SET="grou
 
 lab:  ## sets up, builds, opens the laboratory in your browser
 	@.ci/set-up demo
-	@$(MAKE) $(jobs) all
+	@$(MAKE) $(jobs) all library
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) post/lab.py --open
 
 notebook:  ## sets up, and opens the tour in JupyterLab

@@ -11,12 +11,27 @@ from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import plt
+from ricochet.drawing import (
+    LABELS,
+    aspect_of,
+    caption,
+    chosen_colour,
+    colour_map,
+    disk_collection,
+    draw_box,
+    plt,
+    radius_marks,
+    scale_top,
+    species_colours,
+    species_legend,
+    values_of,
+    warn,
+)
 from ricochet.files import destination
-from ricochet.film import animate
 from ricochet.script import chosen_frames, command_line, launch, positive, report
 
 from matplotlib import animation
+from matplotlib.collections import EllipseCollection
 from tqdm import tqdm
 
 
@@ -36,6 +51,47 @@ def film_path(wish: Path | None, run: Run) -> Path:
     if path.suffix not in (".mp4", ".gif"):
         raise RunError(f"{path}: a film ends in .mp4 or .gif")
     return path
+
+
+def animate(
+    run: Run, frames: list[int], colour: str | None = None, fps: float = 25
+) -> animation.FuncAnimation:
+    """A film of these frames, `fps` of them per second.
+
+    `colour` is "species" or a word of `LABELS`.
+    """
+    colour = chosen_colour(run, colour)
+    aspect = aspect_of(run)
+    height = min(6.4, 6.4 * aspect)
+    width = height / aspect + (1.2 if colour != "species" else 0.2)
+    figure, axes = plt.subplots(figsize=(max(width, 3.6), height + 0.6), dpi=100)
+    style = {}
+    if colour != "species":
+        limits = (-180, 180) if colour == "psi6" else (0, scale_top(run, frames, colour))
+        style = {"cmap": colour_map(colour), "clim": limits}
+
+    def show(frame: int) -> EllipseCollection:
+        axes.clear()
+        draw_box(axes, run, run.time[frame])
+        if colour == "species":
+            style["facecolors"] = species_colours(run)
+        else:
+            style["array"] = values_of(run, frame, colour)
+        radius_marks(axes, run, frame)
+        axes.set_title(f"{caption([run])},  t = {run.time[frame]:.4g}")
+        return disk_collection(axes, run, run.position[frame], **style)
+
+    disks = show(frames[0])
+    if colour == "species":
+        species_legend(figure, run)
+    else:
+        figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
+    warn(figure, [run.shortcoming] if run.shortcoming else [])
+    figure.canvas.draw()
+    figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
+    return animation.FuncAnimation(
+        figure, show, frames, interval=1000 / fps, cache_frame_data=False
+    )
 
 
 def main() -> None:

@@ -29,12 +29,11 @@ from functools import partial
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, plt, scale_top, values_of
+from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
 from ricochet.files import destination
-from ricochet.live import serve
-from ricochet.nature import KICKED
+from ricochet.nature import KICKED, known, rows_of
 from ricochet.paths import MOST_AT_ONCE, Paths
-from ricochet.reader import SIDES, amplitude, span
+from ricochet.reader import SIDES, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 from ricochet.thermodynamics import has_log
 
@@ -43,34 +42,32 @@ from matplotlib.colors import to_hex
 from tqdm import tqdm
 
 PAGE = Path(__file__).with_name("page")  # what the page is made of
-SCRIPTS = ("film", "motion", "camera", "stage", "panels", "queue", "controls", "live")
-MOTION = ("motion", "amplitude", "period", "phase")  # of a side
+INPUTS = Path(__file__).resolve().parents[1] / "input"
+SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
+LAWS = ("motion", "amplitude", "period", "phase", "temperature", "speed")  # of a side
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
-TURN = (20 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, and of its time
+TURN = (16 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, and of its time
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
-BINS = 40  # of the speed histogram
-FEWEST = 10  # disks of a species that has a histogram
-MOST_SAMPLES = 500  # of a plot
+MOST_SAMPLES = 2000  # of a plot
+ENERGIES = ("kinetic", "potential", "rotational")
 MOST_EVENTS = 20000  # to come
-RESTING = 0.02  # of the disks at rest at the end: no gas
-DECADES = 1e4  # between the ends of an axis of speeds that grows by factors
 
 
 def frames_that_fit(run: Run, room: float) -> int:
     """How many frames the file can hold.
 
-    Each disk needs two 16-bit positions, an 8-bit colour per quantity, 32 bits of an angle; time,
-    energies and histograms are in words.  Up to half of the room is for collisions between frames.
+    Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
+    Up to half of the room is for collisions between frames.
     """
-    turning = 4 * ("orientation" in run.elements)
-    one = run.count * (4 + len(quantities(run)) + (run.image is not None) + turning + 1 / 8) * 4 / 3
-    words = 50 + 200 * len(run.names)
+    more = (run.collisions is not None) + (run.image is not None)
+    more += 4 * ("orientation" in run.elements)
+    one = run.count * (8 + more + 1 / 8) * 4 / 3
     fixed = run.count * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
     turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
-    return int(np.clip((room - fixed - min(turns, room / 2)) / (one + words), 2, MOST_FRAMES))
+    return int(np.clip((room - fixed - min(turns, room / 2)) / (one + 50), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:
@@ -85,27 +82,39 @@ def in_room(run: Run, place: np.ndarray) -> np.ndarray:
 
 
 def sides(run: Run) -> list[dict]:
-    """Of each side its place, and how it moves about it; nothing of the latter if it stays."""
+    """Of each side its place, and how it moves about it, heats and slides."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
-    moves = [{k: side[k] for k in MOTION} if amplitude(side) else {} for side in run.sides]
-    return [{"place": float(at), **move} for at, move in zip(places, moves, strict=True)]
+    return [
+        {"place": float(at)} | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
+        for at, side in zip(places, run.sides, strict=True)
+    ]
 
 
-def moving(run: Run, frames: list[int], before: int, tops: dict) -> dict[str, np.ndarray]:
+def laws_of(run: Run, group: str) -> list[dict]:
+    """How each obstacle or wall heats and slides."""
+    rows = rows_of(run.parameters.get(group, {}))
+    return [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
+
+
+def moving(run: Run, frames: list[int], before: int, top: float) -> dict[str, np.ndarray]:
     """(T, N, ...) what differs from frame to frame; `before` is the frame before them.
 
-    Positions in units of the room, as 16-bit integers, of few disks with every digit; colours as
-    places 0 to 255 on their scales; periods crossed along x and y since the frame before, four bits
-    each; angles.
+    Positions in units of the room, as 16-bit integers, velocities in those of the fastest component
+    in the frame, likewise; of few disks with every digit.  Collisions as places 0 to 255 on their
+    scale up to `top`; periods crossed along x and y since the frame before, four bits each; angles.
     """
-    inside = in_room(run, run.position[frames])
+    inside, velocity = in_room(run, run.position[frames]), run.velocity[frames]
     if run.count > FEW_DISKS:
-        inside = np.round(65535 * np.clip(inside, 0, 1))
-    found = {"positions": inside.astype("<u2" if run.count > FEW_DISKS else "<f8")}
-    for name, top in tops.items():
-        scale = np.log1p if name == "collisions" else np.asarray
-        share = scale(values_of(run, frames, name)) / scale(top)
-        found[name] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
+        inside = np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
+        fastest = np.abs(velocity).max(axis=(1, 2), keepdims=True)
+        velocity = velocity / np.where(fastest > 0, fastest, 1)
+        velocity = np.round(32767 * velocity).astype("<i2")
+    else:
+        fastest = np.ones(len(frames))
+    found = {"positions": inside, "velocities": velocity, "fastest": fastest.astype("<f8")}
+    if run.collisions is not None:
+        share = np.log1p(run.collisions[frames]) / np.log1p(top)
+        found["hits"] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
     if run.image is not None:
         x, y = np.moveaxis(np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8, -1, 0)
         found["shifts"] = (16 * x + y).astype("u1")
@@ -119,27 +128,20 @@ def coded_turns(
 ) -> tuple[dict[str, bytearray], list[int]]:
     """Collisions between the frames, and how many disks have unknown paths.
 
-    Of each gap between two frames the number of collisions; of each collision its disk, three
-    numbers: when, as share of the gap, and where, in units of the room; and the kinetic energy that
-    the disk gains.  Of disks with unknown paths the heading in the first frame.
+    Of each gap between two frames the number of collisions; of each collision its disk, and three
+    numbers: when, as share of the gap, and the velocity afterwards.
     """
     kind = "<f8" if run.count <= FEW_DISKS else "<f4"
-    names = ("gaps", "turning", "turns", "gains", "guessed", "headings")
-    blocks = {name: bytearray() for name in names}
+    blocks = {name: bytearray() for name in ("gaps", "turning", "turns", "guessed")}
     guesses = []
     for k, turns in enumerate(paths.along(frames)):
         start, end = run.time[[frames[k], frames[k + 1]]]
         when = (turns.time - start) / (end - start if end > start else 1)
-        where = in_room(run, turns.place)
         blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
         blocks["turning"] += turns.disk.astype("<u4").tobytes()
-        blocks["turns"] += np.column_stack([when, where]).astype(kind).tobytes()
-        blocks["gains"] += turns.gain.astype(kind).tobytes()
+        blocks["turns"] += np.column_stack([when, turns.velocity]).astype(kind).tobytes()
         blocks["guessed"] += np.packbits(turns.guessed, bitorder="little").tobytes()
         guesses.append(int(turns.guessed.sum()))
-        if guesses[-1]:  # directions, a full turn in 256 parts
-            angle = np.arctan2(*run.velocity[frames[k]][turns.guessed].T[::-1])
-            blocks["headings"] += (np.round(128 * angle / np.pi) % 256).astype("u1").tobytes()
     return blocks, guesses
 
 
@@ -164,6 +166,17 @@ def told_by_log(
     if run.count <= FEW_DISKS:
         parts = {"time": time, "i": i - 1, "j": j - 1}
         facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
+    return facts, moments
+    time, i, j = paths.log[:3]
+    before = np.searchsorted(time[j > 0], run.time[frames], "right")
+    facts["collisions"] = (2 * before / run.count).tolist()
+    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
+    time, i, j = time[some], i[some], j[some]
+    if len(time) <= most:
+        moments = {"pairs": time[j > 0], "others": time[j <= 0]}
+    if run.count <= FEW_DISKS:
+        parts = {"time": time, "i": i - 1, "j": j - 1}
+        facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
         facts["surfaces"] = [f"the {side} side" for side in SIDES]  # what j < 0 is called
         facts["surfaces"] += [f"obstacle {k + 1}" for k in range(len(run.obstacles))]
         facts["surfaces"] += [f"wall {k + 1}" for k in range(len(run.walls))]
@@ -178,6 +191,7 @@ def species(run: Run) -> list[dict]:
             "name": kind.name,
             "count": int(kind.disks.sum()),
             "mass": kind.mass,
+            "alike": kind.alike,
             "sizes": f"m = {span(kind.masses)}, r = {span(kind.radii)}",
             "colour": colours[k % len(colours)],
         }
@@ -193,57 +207,71 @@ def radii_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
     return radii, np.searchsorted((radii[1:] + radii[:-1]) / 2, run.radius)
 
 
-def pressure(run: Run) -> dict | None:
-    """The pressure against time, of as many samples as a plot can show; None without a cadence."""
-    with suppress(RunError):
-        series = run.observable("pressure")
-        some = np.linspace(0, len(series.time) - 1, min(len(series.time), MOST_SAMPLES)).astype(int)
-        if len(some) > 2 and np.isfinite(series.value[some]).all():
-            value = list(map(significant, series.value[some]))
-            return {"time": list(map(significant, series.time[some])), "value": value}
-    return None
+def curves(run: Run) -> dict:
+    """Of as many samples as a plot can show: time, energies of each species, pressure.
 
-
-def speed_bins(run: Run, frames: list[int], top: float) -> dict:
-    """The axis of the histogram of speeds.
-
-    Where disks are at rest to the end, as around a crater, speeds have no Maxwell curve: bins grow
-    with the speed, up to the fastest disk.
+    The observables are closer together than frames.  What is not there is None, and so is the
+    pressure before the first collision: a bed that nobody has hit has none.
     """
-    last = run.speed(frames[-1])
-    if np.mean(last == 0) < RESTING or not last.any():
-        return {"edges": np.linspace(0, top, BINS + 1), "rest": False}
-    some = frames[:: max(1, len(frames) // 40)]
-    fastest = 1.01 * float(run.speed(some).max())
-    return {"edges": np.geomspace(fastest / DECADES, fastest, BINS + 1), "rest": True}
+    series, found = {}, {}
+    for name in (
+        "collisions",
+        "pressure",
+        *(f"{s}/{e}_energy" for s in run.names for e in ENERGIES),
+    ):
+        with suppress(RunError):
+            found["time"], series[name] = run.observable(name)
+    time = found.get("time", run.time[[0, -1]])
+    some = np.unique(np.linspace(0, len(time) - 1, min(len(time), MOST_SAMPLES)).astype(int))
+
+    def rounded(name: str) -> list | None:
+        values = series.get(name, np.full(len(time), np.nan))
+        return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values[some]]
+
+    if "pressure" in series:
+        series["pressure"] = np.where(series["collisions"] > 0, series["pressure"], np.nan)
+    found = {"time": list(map(float, time[some])), "pressure": None}
+    if len(some) > 2 and np.isfinite(series.get("pressure", np.nan)).any():
+        found["pressure"] = rounded("pressure")
+    for kind in ENERGIES:
+        names = [f"{name}/{kind}_energy" for name in run.names]
+        there = kind == "kinetic" or any(series.get(name, time[:0]).any() for name in names)
+        found[kind] = [rounded(name) for name in names] if there else None
+    return found
 
 
-def speed_counts(run: Run, frames: list[int], bins: dict) -> list[list[list[int]]]:
-    """Histograms of the speeds of each species, frame by frame.
+def scene(run: Run) -> tuple[dict, dict]:
+    """What stays as it is: the box and what stands in it, species, and of each disk which it has.
 
-    Empty for a species of few or unequal disks if the histogram is to be compared with a Maxwell
-    curve; else the first number is that of the disks at rest.
+    `run` may also be anything else that has these attributes of a run.
     """
-    speeds, size = run.speed(frames), BINS + 2
-    places = np.searchsorted(bins["edges"], speeds, "right")
-    if bins["rest"]:
-        places = np.where(speeds > 0, np.maximum(places, 1), 0)
-    places += size * np.arange(len(frames))[:, None]
-    first = 0 if bins["rest"] else 1
-    counts = [
-        np.bincount(places[:, kind.disks].ravel(), minlength=size * len(frames))
-        .reshape(-1, size)[:, first : BINS + 1]
-        .tolist()
-        if bins["rest"] or (len(kind.masses) >= FEWEST and np.ptp(kind.masses) == 0)
-        else [[]] * len(frames)
-        for kind in run.by_species
-    ]
-    return list(map(list, zip(*counts, strict=True)))
-
-
-def significant(value: float) -> float:
-    """Seven digits are enough for the eye and short in the file."""
-    return float(f"{value:.7g}")
+    radii, own = radii_of(run)
+    facts = {
+        "exact": run.count <= FEW_DISKS,
+        "kicked": bool(run.nature & KICKED),
+        "settles": run.nature.in_equilibrium,
+        "gravity": run.gravity.tolist(),
+        "lower": run.room[0].tolist(),
+        "edges": (run.room[1] - run.room[0]).tolist(),
+        "sides": sides(run),
+        "periodic": run.periodic.tolist(),
+        "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
+        "walls": run.walls.tolist(),
+        "laws": {group: laws_of(run, group) for group in ("obstacle", "wall")},
+        "species": species(run),
+        "radii": radii.tolist(),
+        "surfaces": [
+            *(f"the {side} side" for side in SIDES),  # what j < 0 in the log is called
+            *(f"obstacle {k + 1}" for k in range(len(run.obstacles))),
+            *(f"wall {k + 1}" for k in range(len(run.walls))),
+        ],
+    }
+    blocks = {
+        "mass": run.mass.astype("<f4"),
+        "species": (run.species - 1).astype("<u2"),
+        "sizes": own.astype("u1"),
+    }
+    return facts, {name: block.tobytes() for name, block in blocks.items()}
 
 
 def film(
@@ -259,61 +287,31 @@ def film(
     `watched` passes on the parts in which frames are read, as tqdm does.
     """
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
-    bins = speed_bins(run, frames, 1.3 * tops["speed"])
-    parts, kinetic, potential, counts = [], [], [], []
-    before, at_once = frames[0], max(1, MOST_AT_ONCE // run.count)
+    parts, before, at_once = [], frames[0], max(1, MOST_AT_ONCE // run.count)
     for some in watched([frames[k : k + at_once] for k in range(0, len(frames), at_once)]):
-        parts.append(moving(run, some, before, tops))
+        parts.append(moving(run, some, before, tops.get("collisions", 1)))
         before = some[-1]
-        heights = run.unwrapped(some) @ run.gravity
-        for means, energy in (kinetic, run.kinetic_energy(some)), (potential, -run.mass * heights):
-            each = [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
-            means += [list(map(significant, row)) for row in np.transpose(each)]
-        counts += speed_counts(run, some, bins)
     blocks = {name: b"".join(part[name].tobytes() for part in parts) for name in parts[0]}
-    most = 0.4 * room // TURN  # the rest of its half is for headings
+    most = 0.4 * room // TURN  # the rest of its half is for the moments of events
     paths = Paths(run, most)
     turns, guesses = coded_turns(run, paths, frames)
     told, moments = told_by_log(run, paths, frames, most / 2)
     blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
-    blocks["mass"] = run.mass.astype("<f4").tobytes()
     # Where displacements count from, without jumps until the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
-    blocks["species"] = (run.species - 1).astype("<u2").tobytes()
-    radii, own = radii_of(run)
-    blocks["sizes"] = own.astype("u1").tobytes()
-    blocks["palette"] = plt.get_cmap()(range(256), bytes=True)[:, :3].tobytes()
-    facts = {
+    facts, own = scene(run)
+    facts |= {
         "time": run.time[frames].tolist(),
-        "exact": run.count <= FEW_DISKS,
         "guesses": guesses,
-        "kicked": bool(run.nature & KICKED),
-        "settles": run.nature.in_equilibrium,
-        "gravity": run.gravity.tolist(),
-        "lower": run.room[0].tolist(),
-        "edges": (run.room[1] - run.room[0]).tolist(),
-        "sides": sides(run),
-        "periodic": run.periodic.tolist(),
-        "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
-        "walls": run.walls.tolist(),
-        "species": species(run),
-        "radii": radii.tolist(),
-        "kinetic": kinetic,
-        "potential": potential if run.gravity.any() else None,
-        "pressure": pressure(run),
-        "speeds": {
-            "edges": [significant(edge) for edge in bins["edges"]],
-            "rest": bins["rest"],
-            "counts": counts,
-        },
-        "scales": {name: [LABELS[name], significant(top)] for name, top in tops.items()},
+        "curves": curves(run),
+        "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
         "logged": has_log(run),
         **told,
     }
-    return facts, blocks
+    return facts, blocks | own
 
 
 def texts(facts: dict, blocks: dict) -> dict:
@@ -325,19 +323,54 @@ def page(run: Run, film: dict | None) -> str:
     """The whole file; without a film it asks the server of --live for one."""
     title = str(run.parameter("run", "title", "")) or run.path.stem
     commit = run.provenance.get("git_commit", "unknown")
+    words = {
+        "title": title,
+        "caption": caption([run]),
+        "warning": run.shortcoming if film else "",
+        "source": f"{run.path.name} (ricochet {commit})",
+    }
+    return paged(film, words)
+
+
+def view() -> str:
+    """The page as a part of the laboratory, which tells it what to show."""
+    return paged(None, dict.fromkeys(("title", "caption", "warning", "source"), ""))
+
+
+def paged(film: dict | None, words: dict[str, str]) -> str:
+    """The page with these words; without a film it may ask its server."""
     style = text_of("style.css")
     script = "\n".join(text_of(f"{name}.js") for name in SCRIPTS)
-    fillings = {
+    fillings = {name: html.escape(text) for name, text in words.items()} | {
         "policy": policy(style, script, *["connect-src 'self'"] * (film is None)),
-        "title": html.escape(title),
-        "caption": html.escape(caption([run])),
-        "warning": html.escape(run.shortcoming if film else ""),
-        "source": html.escape(f"{run.path.name} (ricochet {commit})"),
         "style": style,
         "data": enclosed(film),
         "script": script,
     }
     return filled("page.html", fillings)
+
+
+def lab_page(data: dict) -> str:
+    """The laboratory: `data` has the number of the page, the table of variables, the inputs."""
+    style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
+    more = "connect-src 'self'", "img-src 'self'", "frame-src 'self'"
+    fillings = {"policy": policy(style, script, *more), "style": style, "script": script}
+    return filled("lab.html", fillings | {"data": enclosed(data)})
+
+
+def chooser(paths: list[Path]) -> list[dict]:
+    """What the laboratory shows of each input: title, subject, sentence, sliders, picture."""
+    known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
+    found = []
+    for path in paths:
+        own = known.get(path.stem) if path.resolve().parent == INPUTS else None
+        if own is None:
+            words = {"title": path.stem, "subject": "Your own", "sentence": ""}
+            found.append({"name": path.stem, **words, "sliders": [], "picture": None})
+        else:
+            found.append({"name": path.stem, **own, "picture": f"pictures/{path.stem}.png"})
+    order = [*known]
+    return sorted(found, key=lambda one: order.index(one["name"]) if one["picture"] else -1)
 
 
 def filled(name: str, fillings: dict[str, str]) -> str:
@@ -374,6 +407,12 @@ def chosen_film(
     return frames, film(run, frames, chosen_colour(run, args.colour), traced, room, watched)
 
 
+def whole(run: Run, colour: str | None = None) -> str:
+    """The page with a film of the whole run, coloured as on the command line."""
+    args = Namespace(frames=None, count=None, colour=colour, disks=None)
+    return page(run, texts(*chosen_film(run, args, ROOM)[1]))
+
+
 def main() -> None:
     parser = command_line(
         __doc__, "RUN.html", one=True, csv=False, frames=None, count=None, colour=None, disks=None
@@ -387,6 +426,7 @@ def main() -> None:
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")
+        from ricochet.live import serve  # films need no server
 
         def newest(now: Run) -> dict:
             return texts(*chosen_film(now, args, LIVE_ROOM)[1])

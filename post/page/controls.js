@@ -1,40 +1,39 @@
 // ---------- what the user chooses ----------
 
-const state = { playing: false, colour: '', traced: [], arrows: false, sofar: false, total: false };
+const state = { playing: false, colour: '', traced: [], arrows: false, sofar: null, total: false };
 let pace;          // time of the film per second, at speed 1
 let usual = true;  // whether that is for the length of this film, not of another one
 
 function begin() {
-  [X, Y, VX, VY, UX, UY, HITS, ANCHOR, FALL] = Array.from({ length: 9 }, () => new Float64Array(disks));
   lookAtAll();
+  const names = ['species', ...Object.keys(film.scales)];
   state.colour = film.colour;
-  state.traced = film.traced;
-  state.sofar = disks < 200;
-  pace = usualPace();
-  const quantities = ['species', ...Object.keys(film.scales)];
-  $('colour').replaceChildren(...quantities.map(name => new Option(name, name, false, name === state.colour)));
+  state.traced = film.traced ?? [];
+  state.sofar ??= disks < 200;
+  if (usual) pace = film.pace ?? usualPace();
+  $('colour').replaceChildren(...names.map(name => new Option(name, name, false, name === state.colour)));
   prepareFilm();
 }
 
 // The whole film takes a quarter of a minute or more; no usual disk crosses more than half of the box in a second.
 function usualPace() {
-  const most = Math.min((last() - first()) / 15, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
+  const most = Math.min((last() - first()) / 15 || Infinity, 0.5 * Math.max(...film.edges) / film.scales.speed[1]) || 1;
   const power = 10 ** Math.floor(Math.log10(most));
   return power * Math.floor(most / power);
 }
 
 // What depends on the frames that there are.
 function prepareFilm() {
-  sums = crossings = null;
-  counted = kinds.map((_, s) => s).filter(s => film.speeds.counts[0][s].length);
+  sums = null;
+  const alike = s => kinds[s].count >= FEWEST && kinds[s].alike;
+  counted = kinds.map((_, s) => s).filter(s => film.speeds.rest || alike(s));
   $('coming').hidden = !film.events;
   $('speeds').hidden = !counted.length;
-  $('pressures').hidden = !film.pressure;
   $('sofar').hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed.'
     + (film.settles ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
-  $('guess').hidden = !film.guesses.some(count => count);
-  $('event').hidden = !(pairs.length + others.length);
+  $('guess').hidden = !film.guesses?.some(count => count);
+  $('event').hidden = !source.hasEvents();
 }
 
 // ---------- what is shown ----------
@@ -44,18 +43,17 @@ let told = 0;  // when words and plots were renewed
 function show(time, anew = false) {
   move(time);
   drawStage();
-  if (state.playing && !anew && performance.now() - told < 80) return;  // they may come later than disks
+  if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // they may come later than disks
   told = performance.now();
+  if (source.grows) drawEnergies();
   $('cursor').style.transform = `translateX(${cursorAt(moment.time)}px)`;
-  drawHistogram(moment.frame);
-  kinds.forEach((_, s) => {
-    const cells = $('energies').rows[s + 1].cells;
-    cells[2].textContent = short(moment.kinetic[s] * share(s));
-    if (film.potential) cells[3].textContent = short(moment.potential[s] * share(s));
-  });
+  drawHistogram();
   drawPressure();
+  tellNumbers();
+  tellEnergies();
   tell();
   tellQueue();
+  if (!state.playing) describe();
 }
 
 function layout() {
@@ -66,7 +64,8 @@ function layout() {
     const { clientWidth, clientHeight } = canvas;  // asked for once, for it takes long
     Object.assign(canvas, { width: Math.round(clientWidth * page.dots), height: Math.round(clientHeight * page.dots) });
   }
-  layEnergyOut();
+  layTableOut();
+  drawEnergies();
   show(moment.time, true);
 }
 
@@ -80,8 +79,10 @@ function refresh() {
     sofar: state.sofar, total: state.total, arrows: state.arrows, follow: camera.follow >= 0,
   });
   const speed = 10 ** +$('pace').value;
-  const perSecond = short(+(pace * speed).toPrecision(2));
-  $('times').innerHTML = `×${+speed.toPrecision(2)} (${perSecond} time unit${perSecond === '1' ? '' : 's'} per second)`;
+  const perSecond = short(+(pace * speed).toPrecision(2)), words = `×${+speed.toPrecision(2)} (${perSecond} time unit${perSecond === '1' ? '' : 's'} per second)`;
+  $('times').textContent = words;
+  $('pace').setAttribute('aria-valuetext', words);
+  source.setPace?.(paceNow());
   layout();
 }
 
@@ -95,19 +96,23 @@ function play(on) {
   state.playing = on;
   press({ play: on });
   $('play').setAttribute('aria-label', on ? 'pause' : 'play');
+  if (isPart) parent.played(window, on);
   if (!on) {
     cancelAnimationFrame(ticking);
+    source.rest?.();
     show(moment.time, true);
     remember();
     return;
   }
-  if (moment.time === last() && !live.on) show(first());
+  if (moment.time === last() && !source.goesOn()) show(first());
+  source.begins?.();
   let before = performance.now();
   ticking = requestAnimationFrame(function tick(stamp) {
     const passed = Math.min(0.1, Math.max(0, stamp - before) / 1000);
     before = stamp;
-    show(moment.time + passed * paceNow());
-    if (moment.time === last() && !live.on) play(false); else ticking = requestAnimationFrame(tick);
+    const next = moment.time + passed * paceNow();
+    if (source.newest) source.newest(next); else show(next);
+    if (moment.time === last() && !source.goesOn()) play(false); else ticking = requestAnimationFrame(tick);
   });
 }
 
@@ -118,14 +123,16 @@ function go(time) {
   remember();
 }
 
-const step = frame => go(film.time[Math.max(0, Math.min(frames - 1, frame))]);
-const back = () => step(film.time[moment.frame] < moment.time ? moment.frame : moment.frame - 1);
+const step = frame => go(frameTime(frame));
+const back = () => step(frameTime(moment.frame) < moment.time ? moment.frame : moment.frame - 1);
+const next = () => { if (!source.goOn?.('step')) step(moment.frame + 1); };
+const toEvent = () => { if (!$('event').hidden && !source.goOn?.('event')) go(source.nextEvent()); };
 
 // A paused film has its moment in the address, as a link to it.
 let remembering;
 function remember() {
   clearTimeout(remembering);
-  remembering = setTimeout(() => history.replaceState(null, '', '#t=' + +moment.time.toPrecision(10)), 300);
+  if (source === fromFile) remembering = setTimeout(() => history.replaceState(null, '', '#t=' + +moment.time.toPrecision(10)), 300);
 }
 
 function fromAddress() {
@@ -201,7 +208,7 @@ function on(id, action) { $(id).addEventListener('click', action); }
 
 const turn = name => () => { state[name] = !state[name]; refresh(); };
 const actions = {
-  play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else step(frames - 1); }, back, next: () => step(moment.frame + 1), event: () => $('event').hidden || go(nextEvent()),
+  play: () => play(!state.playing), first: () => step(0), last: () => { if (live.on) follow(true); else go(last()); }, back, next, event: toEvent,
   clear: () => trace([]), follow: followOrNot, arrows: turn('arrows'), sofar: turn('sofar'), total: turn('total'),
   nearer: () => zoomBy(1.5), farther: () => zoomBy(1 / 1.5),
   whole: () => { lookAtAll(); look(); }, theme: () => { theme(!dark()); refresh(); },
@@ -212,7 +219,7 @@ const keys = {
   0: 'whole', f: 'full', v: 'arrows',
 };
 
-function pressed(key) { actions[keys[key]]?.(); }
+function pressed(key) { if (film) actions[keys[key]]?.(); }
 
 function theme(night) { document.documentElement.dataset.theme = night ? 'dark' : 'light'; }
 
@@ -222,7 +229,7 @@ function listen() {
   for (const [id, action] of Object.entries(actions)) on(id, action);
   $('full').hidden = !document.fullscreenEnabled;
   $('scrub').addEventListener('input', () => go(first() + $('scrub').value * (last() - first())));
-  $('pace').addEventListener('input', () => { follow(false); refresh(); });
+  $('pace').addEventListener('input', () => { follow(false); refresh(); if (isPart) parent.paced(window); });
   $('colour').addEventListener('change', () => { state.colour = $('colour').value; refresh(); });
   const stage = $('stage');
   stage.addEventListener('pointerdown', event => {

@@ -1,52 +1,194 @@
 'use strict';
 
-// ---------- what the file holds ----------
+// ---------- what is shown, whatever it comes from ----------
 
 const $ = id => document.getElementById(id);
-let film, frames, disks, kinds;  // facts; the number of frames, of disks; species
-let positions, grain;            // frame by frame x1 y1 x2 y2 ..., in units of 1 / grain of the room
-let speciesOf, sizeOf, masses;   // by disk
-let origins;                     // x1 y1 x2 y2 ... where displacements count from, in units of the room
-let codes, viridis;              // places on the colour scales, frame by frame; the colours of the scale
-let angles;                      // orientations frame by frame, not wrapped; none if disks have none
-let shifts;                      // periods crossed since the frame before, x + 8 and y + 8 in four bits each
-let gapStart, turning, turns;    // collisions between frames: first one of each gap; disk; share of the gap, x, y in the room
-let gains;                       // kinetic energy that the disk has from each of them
-let guessed, guessedRow;         // bits, gap by gap: disks whose paths there are not known; bytes of a gap
-let headings, headingsStart;     // of these disks in the frame before, a full turn in 256 parts; first one of each gap
-let pairs, others;               // times of all collisions of two disks, and of other ones, if they are known
+let film, disks, kinds;         // facts; the number of disks; species
+let speciesOf, sizeOf, masses;  // by disk
+let X, Y, VX, VY;               // of all disks at the moment; inside the box along a periodic axis
+let UX, UY, HITS;               // places without jumps since the frame before; collisions since then
+let angles;                     // orientations at the moment, if disks have them
+let source;                     // the file, or what comes from a worker: what goes on, and what comes next
+let past = [];                  // frames: time, place and velocity (x1 y1 x2 y2 ...), angle, crossed (periods since the first), ...
+let origins;                    // x1 y1 x2 y2 ... where displacements count from
+const moment = { time: 0, shown: 0, frame: 0, kinetic: [], potential: [], collisions: 0 };
 
-function load({ facts, blocks }) {
-  const bytes = name => {
-    const text = atob(blocks[name]), array = new Uint8Array(text.length);
-    for (let k = 0; k < text.length; k++) array[k] = text.charCodeAt(k);
-    return array;
-  };
-  film = facts;
-  frames = film.time.length;
-  kinds = film.species;
-  speciesOf = new Uint16Array(bytes('species').buffer);
-  sizeOf = bytes('sizes');
-  disks = speciesOf.length;
-  positions = new (film.exact ? Float64Array : Uint16Array)(bytes('positions').buffer);
-  grain = film.exact ? 1 : 65535;
-  codes = Object.fromEntries(Object.keys(film.scales).map(name => [name, bytes(name)]));
-  viridis = bytes('palette');
-  angles = blocks.angles && new Float32Array(bytes('angles').buffer);
-  shifts = blocks.shifts && bytes('shifts');
-  gapStart = [0];
-  new Uint32Array(bytes('gaps').buffer).forEach((count, gap) => gapStart.push(gapStart[gap] + count));
-  turning = new Uint32Array(bytes('turning').buffer);
-  [turns, gains] = ['turns', 'gains'].map(name => new (film.exact ? Float64Array : Float32Array)(bytes(name).buffer));
-  headings = bytes('headings');
-  headingsStart = [0];
-  film.guesses.forEach((count, gap) => headingsStart.push(headingsStart[gap] + count));
-  [pairs, others] = ['pairs', 'others'].map(name => new Float64Array(bytes(name).buffer));
-  masses = new Float32Array(bytes('mass').buffer);
-  origins = new Float32Array(bytes('origins').buffer);
-  guessed = bytes('guessed');
-  guessedRow = Math.ceil(disks / 8);
+function bytes(text) {
+  const letters = atob(text), array = new Uint8Array(letters.length);
+  for (let k = 0; k < letters.length; k++) array[k] = letters.charCodeAt(k);
+  return array;
 }
 
-const first = () => film.time[0], last = () => film.time[frames - 1];
-const isGuessed = (gap, disk) => guessed[gap * guessedRow + (disk >> 3)] >> (disk & 7) & 1;
+// The box, its disks, and which of them has what.
+function setScene(facts, blocks) {
+  film = facts;
+  kinds = film.species;
+  speciesOf = new Uint16Array(bytes(blocks.species).buffer);
+  sizeOf = bytes(blocks.sizes);
+  masses = new Float32Array(bytes(blocks.mass).buffer);
+  disks = speciesOf.length;
+  [X, Y, VX, VY, UX, UY, HITS] = Array.from({ length: 7 }, () => new Float64Array(disks));
+  past = [];
+}
+
+const first = () => past[0].time, last = () => past.at(-1).time;
+const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
+
+// How many of these ascending numbers are not larger.
+function upTo(values, value, number = one => one) {
+  let low = 0, high = values.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (number(values[middle]) <= value) low = middle + 1; else high = middle;
+  }
+  return low;
+}
+
+const frameAt = time => Math.max(0, upTo(past, time, frame => frame.time) - 1);  // the last one that is not later
+const frameTime = k => past[clamp(k, 0, past.length - 1)].time;
+
+// The periods that disks have crossed since the first frame, x1 y1 x2 y2 ..., if there are any: `moved` tells them since the last.
+function cross(frame, moved) {
+  const before = past.at(-1);
+  if (film.periodic.some(Boolean)) frame.crossed = new Int16Array(2 * disks).map((_, k) => before ? before.crossed[k] + moved(before, k) : 0);
+  return frame;
+}
+
+// ---------- the way from frame to frame ----------
+
+// In the time between two frames a disk flies from the first one on, by way of its turns; each flight is straight, or a parabola
+// under gravity. A disk whose path is not known stands still until the next frame; where many do, all stand: the frame is shown
+// as it is. What comes from a worker has no ways, but frames that are close enough.
+const MANY = 0.1;              // of the disks
+let ways;                      // of a film: what is known between frames
+// start: the first collision after each frame; disk, and share of the time, new velocity of each; bits: disks whose paths are
+// not known, of `row` bytes a gap; pairs, others: times of all collisions of two disks, and of other ones, if they are known
+const isGuessed = (k, disk) => !ways || ways.bits[k * ways.row + (disk >> 3)] >> (disk & 7) & 1;
+const stands = k => !ways || film.guesses[k] > MANY * disks;
+
+function move(time) {
+  moment.time = clamp(time, first(), last());
+  const k = moment.frame = frameAt(moment.time), here = past[k], then = past[k + 1], { place, velocity, crossed } = here;
+  const passed = stands(k) ? 0 : moment.time - here.time, share = passed && then ? passed / (then.time - here.time) : 0;
+  const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic, [gx, gy] = film.gravity;
+  const { start, disk, turns } = ways ?? {}, stop = start?.[k + 1], unknown = film.guesses?.[k];
+  moment.shown = here.time + passed;
+  for (let i = 0, turn = start?.[k]; i < disks; i++) {
+    let x = place[2 * i], y = place[2 * i + 1], vx = velocity[2 * i], vy = velocity[2 * i + 1], since = 0, met = 0, dt;
+    if (passed && !(unknown && isGuessed(k, i))) {
+      for (; turn < stop && disk[turn] === i && turns[3 * turn] <= share; turn++) {
+        dt = (then.time - here.time) * turns[3 * turn] - since;
+        x += (vx + 0.5 * gx * dt) * dt;
+        y += (vy + 0.5 * gy * dt) * dt;
+        vx = turns[3 * turn + 1];
+        vy = turns[3 * turn + 2];
+        since += dt;
+        met++;
+      }
+      dt = passed - since;
+      x += (vx + 0.5 * gx * dt) * dt;
+      y += (vy + 0.5 * gy * dt) * dt;
+      vx += gx * dt;
+      vy += gy * dt;
+    }
+    while (turn < stop && disk[turn] === i) turn++;
+    UX[i] = X[i] = x;
+    UY[i] = Y[i] = y;
+    VX[i] = vx;
+    VY[i] = vy;
+    HITS[i] = met;
+    if (wrapX) X[i] -= width * Math.floor((x - left) / width);
+    if (wrapY) Y[i] -= height * Math.floor((y - bottom) / height);
+    if (angles) angles[i] = here.angle[i] + (share && share * (then.angle[i] - here.angle[i]));
+  }
+  moment.collisions = ways?.pairs.length ? past[0].collisions + 2 * upTo(ways.pairs, moment.shown) / disks : here.collisions;
+  const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0), mean = (sum, s) => sum / kinds[s].count;
+  for (let i = 0; i < disks; i++) {
+    kinetic[speciesOf[i]] += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
+    potential[speciesOf[i]] -= masses[i] * (gx * (UX[i] + (crossed ? width * crossed[2 * i] : 0)) + gy * (UY[i] + (crossed ? height * crossed[2 * i + 1] : 0)));
+  }
+  Object.assign(moment, { kinetic: kinetic.map(mean), potential: potential.map(mean) });
+}
+
+// Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
+function sidesAt(time) {
+  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase }, k) => {
+    if (!period) return place;
+    const s = time / period + phase, part = s - Math.floor(s);
+    const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));
+    return place + (k % 2 ? -1 : 1) * amplitude * f;
+  });
+}
+
+function displacement(i) {
+  const { crossed } = past[moment.frame], [x, y] = [0, 1].map(k => crossed ? film.edges[k] * crossed[2 * i + k] : 0);
+  return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
+}
+
+// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight); whether it is guessed.
+function flights(i, from, to) {
+  const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
+  for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
+    const here = past[k], then = past[k + 1], h = then.time - here.time, guessed = isGuessed(k, i), own = [], { start, disk, turns } = ways ?? {};
+    const pair = array => [array[2 * i], array[2 * i + 1]], g = guessed ? [0, 0] : film.gravity;
+    let place = pair(here.place), velocity = pair(here.velocity), since = 0;
+    if (guessed) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
+    else for (let turn = start[k] + disk.subarray(start[k], start[k + 1]).indexOf(i); turn >= start[k] && turn < start[k + 1] && disk[turn] === i; turn++)
+      own.push([h * turns[3 * turn], [turns[3 * turn + 1], turns[3 * turn + 2]]]);
+    for (const [end, after] of [...own, [h, velocity]]) {
+      const along = t => plus(place, velocity.map((v, axis) => (v + 0.5 * g[axis] * (t - since)) * (t - since)));
+      const a = Math.max(since, from - here.time), b = Math.min(end, to - here.time);
+      if (b > a) result.push({ from: along(a), to: along(b), bend: g.map(one => one * (b - a) ** 2 / 4), guessed: guessed && !!ways });
+      [place, velocity, since] = [along(end), after, end];
+    }
+  }
+  return result;
+}
+
+// The speeds of all disks in the frames up to the moment, in some of them if there are very many; returns how many.
+function eachSpeed(action) {
+  const some = Math.ceil((moment.frame + 1) * disks / 2e6);
+  let samples = 0;
+  for (let k = moment.frame; k >= 0; k -= some, samples++)
+    for (let i = 0, { velocity } = past[k]; i < disks; i++) action(i, Math.hypot(velocity[2 * i], velocity[2 * i + 1]));
+  return samples;
+}
+
+// ---------- a film: a file that holds all of it ----------
+
+function loadFilm({ facts, blocks }) {
+  setScene(facts, blocks);
+  const { exact, time, lower, edges } = film, real = exact ? Float64Array : Float32Array;
+  const block = (name, kind) => new kind(bytes(blocks[name]).buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
+  const positions = block('positions', exact ? Float64Array : Uint16Array), velocities = block('velocities', exact ? Float64Array : Int16Array);
+  const fastest = block('fastest', Float64Array), [shifts, hits] = ['shifts', 'hits'].map(name => blocks[name] && bytes(blocks[name]));
+  const turned = blocks.angles && block('angles', Float32Array);
+  const signs = (before, k) => (shifts[past.length * disks + (k >> 1)] >> (k % 2 ? 0 : 4) & 15) - 8;
+  time.forEach((when, k) => past.push(cross({
+    time: when, collisions: film.collisions[k], hits: part(hits, k, disks), angle: part(turned, k, disks),
+    place: real.from(part(positions, k, 2 * disks), (one, n) => lower[n % 2] + edges[n % 2] * one / (exact ? 1 : 65535)),
+    velocity: real.from(part(velocities, k, 2 * disks), one => exact ? one : one * fastest[k] / 32767),
+  }, signs)));
+  angles = turned && new Float32Array(disks);
+  origins = block('origins', Float32Array).map((one, k) => lower[k % 2] + edges[k % 2] * one);
+  ways = { disk: block('turning', Uint32Array), turns: block('turns', real), bits: bytes(blocks.guessed), row: Math.ceil(disks / 8), start: [0] };
+  block('gaps', Uint32Array).forEach((count, k) => ways.start.push(ways.start[k] + count));
+  for (const name of ['pairs', 'others']) ways[name] = block(name, Float64Array);
+  source = fromFile;
+  const atRest = past.at(-1).velocity.filter((v, k, all) => v === 0 && all[k ^ 1] === 0).length / (2 * disks);
+  let most = 1.3 * film.scales.speed[1];
+  if (atRest > RESTING) past.forEach(({ velocity }) => velocity.forEach((v, k) => { most = Math.max(most, 1.01 * Math.hypot(v, velocity[k ^ 1])); }));
+  setBins(most, atRest);
+}
+
+const fromFile = {
+  counted: () => `frame ${moment.frame + 1}/${past.length}`,
+  curves: () => film.curves,
+  coming() {
+    const { time, i, j } = film.events, next = upTo(time, moment.time), one = k => [time[k], i[k], j[k]];
+    return { happened: next ? one(next - 1) : null, next: Array.from(time.slice(next, next + 20), (_, k) => one(next + k)) };
+  },
+  nextEvent: () => Math.min(...[ways.pairs, ways.others].map(times => times[upTo(times, moment.time)] ?? last())),
+  hasEvents: () => ways.pairs.length + ways.others.length > 0,
+  goesOn: () => live.on,
+};

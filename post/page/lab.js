@@ -1,24 +1,20 @@
 'use strict';
 
-// ---------- the laboratory: a form made from the program's table of variables, and runs in players ----------
+// ---------- the laboratory: a form, and runs in films, each of them with a worker of its own ----------
 
 const $ = id => document.getElementById(id);
-const lab = JSON.parse($('data').textContent);  // page: its number; table: group -> variable; inputs: names
-// Of each variable its default or an example as --set has it, what it may be, and from where to where.
-for (const variable of Object.values(lab.table).flatMap(Object.values)) {
-  const { type, choices, above, from, below, to } = variable, value = variable.default ?? variable.example;
-  const words = [value].flat().map(one => type === 'logical' ? `.${one}.` : String(one));
-  Object.assign(variable, { value: words.join(','), low: above ?? from, high: below ?? to, open: above !== null });
-  variable.choices = type === 'logical' ? ['.true.', '.false.'] : choices;
-}
+const lab = JSON.parse($('data').textContent);  // page: its number; table: group -> variable; inputs: what there is to choose
 const state = {
-  input: '', groups: [],       // the input file: kind, place, given values of each group
-  settings: {}, added: [],     // what the form changes: variable -> text; groups that are not in the file: [kind, name]
-  cadences: {},                // those of the settings that the laboratory proposes
-  running: false, stopped: false,  // the newest run goes on; or it can go on
-  paused: false,               // films stand, also the one that is coming
-  shown: [],                   // runs side by side: { number, figure }, the newest last
+  input: null, groups: [],   // the input: name, title, sliders, ...; kind, place, given values of each group of its file
+  settings: {}, added: [],   // what the form changes: variable -> text; groups that are not in the file: [kind, name]
+  waiting: {},               // variables whose values cannot be: what is said about them
+  boxes: [],                 // runs: { figure, frame, letter, words, run, shown }, the newest last; the others are kept
+  paused: false,
 };
+// What acts on the disks that move; all else starts anew.
+const ACTS = /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|motion|amplitude|period|velocity))/;
+const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', pressure: 'pressure', dissipated_energy: 'energy lost', collisions: 'collisions' };
+const MOST_KEPT = 3, FULL = 0.5;  // runs on the shelf; share of the area that random placing fills with ease
 
 function make(tag, more = {}, ...children) {
   const element = Object.assign(document.createElement(tag), more);
@@ -26,321 +22,351 @@ function make(tag, more = {}, ...children) {
   return element;
 }
 
-async function ask(path, wish) {
-  const options = wish && { method: 'POST', body: JSON.stringify({ page: lab.page, ...wish }) };
-  const answer = await fetch(path, options).catch(() => null);
-  if (answer?.ok) return answer.json();
-  tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true);
-  return null;
-}
-
 function tell(text, wrong = false) {
   $('status').textContent = $('status').title = text;
   $('status').classList.toggle('problem', wrong);
 }
 
-// ---------- the form ----------
+const short = value => String(+(+value).toPrecision(3)).replace('-', '−');
 
-const valueOf = (place, name) => state.settings[`${place}.${name}`] ?? givenIn(place)[name] ?? '';
+// ---------- values ----------
+
 const givenIn = place => state.groups.find(group => group.place === place)?.given ?? {};
-const isNamed = kind => 'name' in lab.table[kind];
+const placeOf = key => key.slice(0, key.lastIndexOf('.')), nameOf = key => key.slice(key.lastIndexOf('.') + 1);
+const variableOf = key => lab.table[key.split('.')[0]][nameOf(key)];
+const words = value => value === null || value === undefined ? '' : [value].flat().map(one => typeof one === 'boolean' ? `.${one}.` : String(one)).join(',');
+const givenAs = key => givenIn(placeOf(key))[nameOf(key)] ?? '';
+const textOf = key => state.settings[key] ?? givenAs(key);
+const valueOf = key => textOf(key) || words(variableOf(key).default ?? variableOf(key).example);
+const split = text => text.split(/\s*,\s*|\s+/);
+const numberOf = key => parseFloat(valueOf(key).replace(/d/i, 'e'));
 
-async function choose(name) {
-  const form = await ask('form?' + encodeURIComponent(name));
-  if (!form) return;
-  Object.assign(state, { input: name, groups: form.groups, settings: form.settings, cadences: { ...form.settings }, added: [] });
-  $('name').textContent = name;
-  $('own').src = 'picture?' + encodeURIComponent(name);
-  const [first, ...rest] = form.about.split(/\n\n+/);
-  $('about').replaceChildren(make('summary', { textContent: first }), ...rest.map(part => make('p', { textContent: part })));
-  $('about').open = false;
-  buildForm();
-  run();
+function set(key, text) {
+  if (text === givenAs(key)) delete state.settings[key]; else state.settings[key] = text;
+  delete state.waiting[key];
+  sync();
+  changed(key);
 }
 
-// Groups of the file and added ones, and those without a name that the file leaves at their defaults; first what is open.
-function buildForm() {
-  const added = state.added.map(([kind, name]) => ({ kind, place: `${kind}.${name}`, added: true }));
-  const there = [...state.groups, ...added];
-  const rest = Object.keys(lab.table).filter(kind => !isNamed(kind) && !there.some(group => group.kind === kind));
-  const all = [...there.filter(({ kind }) => lab.table[kind]), ...rest.map(kind => ({ kind, place: kind }))];
-  const order = Object.keys(lab.table), rank = group => order.indexOf(group.kind) + (isOpen(group) ? 0 : order.length);
-  all.sort((a, b) => rank(a) - rank(b));
-  $('groups').replaceChildren(...all.map(buildGroup));
-  const names = order.filter(isNamed).flatMap(kind => {
-    const { choices } = lab.table[kind].name, taken = new Set(all.map(({ place }) => place));
-    const free = k => taken.has(`${kind}.${kind}${k}`) ? free(k + 1) : `${kind}${k}`;
-    return (choices ?? [free(1)]).filter(name => !taken.has(`${kind}.${name}`)).map(name => [kind, name]);
+// The values that can be: one that cannot waits, the others act.
+const wish = () => ({
+  input: state.input.name, added: state.added,
+  settings: Object.fromEntries(Object.entries(state.settings).filter(([key]) => !state.waiting[key])),
+});
+
+const changesInWords = () => Object.entries(wish().settings).map(([key, value]) => {
+  const slider = state.input.sliders.find(one => one.key === key);
+  return `${slider ? slider.words : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
+}).join(' · ') || 'as in the file';
+
+// ---------- sliders with words ----------
+
+// [variable or variable[component], words, from, to, 'log' or nothing]
+function sliderOf([name, text, from, to, log]) {
+  const [key, at] = name.replace(']', '').split('[');
+  return { key, at: at === undefined ? -1 : +at, words: text, from, to, log: !!log };
+}
+
+const read = ({ key, at }) => parseFloat(at < 0 ? valueOf(key) : split(valueOf(key))[at]);
+const acts = key => ACTS.test(key);
+
+// The largest value that has room, up to another limit: all disks fill no more than a share of their region.
+function mostOf({ key, to = Infinity }) {
+  const [kind, name, variable] = key.split('.');
+  if (kind !== 'species' || !['count', 'radius'].includes(variable) || textOf(`species.${name}.placement`)) return to;
+  const sizes = {}, all = state.groups.filter(group => group.kind === 'species').map(({ place }) => {
+    const other = textOf(`${place}.relative_to`), radius = numberOf(`${place}.radius`);
+    sizes[place] = other ? radius * sizes[`species.${other}`] : radius;
+    return { place, area: Math.PI * sizes[place] ** 2 * (textOf(`${place}.position`) ? 1 : numberOf(`${place}.count`)), region: textOf(`${place}.region`) };
   });
-  const option = pair => make('option', { value: pair.join(' '), textContent: '&' + pair.join(' ') });
-  $('add').replaceChildren(make('option', { value: '', textContent: 'choose …' }), ...names.map(option));
+  const own = all.find(({ place }) => place === `species.${name}`), [x0, y0] = split(valueOf('box.lower')).map(Number);
+  const [x1, y1] = split(valueOf('box.upper')).map(Number), box = own.region ? split(own.region).map(Number) : [x0, x1, y0, y1];
+  const rest = all.filter(one => one !== own && one.region === own.region).reduce((sum, { area }) => sum + area, 0);
+  const room = (FULL * (box[1] - box[0]) * (box[3] - box[2]) - rest) / own.area, value = numberOf(key);
+  const most = room > 0 ? value * (variable === 'count' ? room : Math.sqrt(room)) : value;
+  return isFinite(most) ? Math.min(to, most) : to;
 }
 
-// Open is where more is given than texts.
-function isOpen({ kind, place, added }) {
-  return added || Object.entries(lab.table[kind]).some(([name, { type, choices }]) => (type !== 'text' || choices) && valueOf(place, name));
-}
-
-function buildGroup({ kind, place, added }) {
-  const names = Object.keys(lab.table[kind]).filter(name => name !== 'name');
-  const used = names.filter(name => valueOf(place, name)), rest = names.filter(name => !valueOf(place, name));
-  const rows = some => make('div', { className: 'group' }, ...some.map(name => buildVariable(place, lab.table[kind][name], name)));
-  const summary = make('summary', { textContent: '&' + place.replace('.', ' ') });
-  const details = make('details', { open: isOpen({ kind, place, added }) }, summary);
-  if (added) {
-    const remove = make('button', { type: 'button', className: 'reset', textContent: 'remove this group' });
-    remove.addEventListener('click', () => {
-      state.added = state.added.filter(pair => pair.join('.') !== place);
-      state.settings = Object.fromEntries(Object.entries(state.settings).filter(([key]) => !key.startsWith(place + '.')));
-      buildForm();
-      changed();
-    });
-    details.append(make('div', { className: 'group' }, remove));
-  }
-  if (used.length) details.append(rows(used));
-  if (rest.length && used.length) details.append(make('details', {}, make('summary', { textContent: `${rest.length} more` }), rows(rest)));
-  else details.append(rows(rest));
-  return details;
-}
-
-function addGroup(kind, name) {
-  state.added.push([kind, name]);
-  for (const [own, { needed, value }] of Object.entries(lab.table[kind]))
-    if (needed && own !== 'name') state.settings[`${kind}.${name}.${own}`] = value;
-  buildForm();
-  $('groups').querySelector(`[data-place="${kind}.${name}.${Object.keys(lab.table[kind])[1]}"]`)?.scrollIntoView({ block: 'center' });
-  changed();
-}
-
-// A row: name and unit, controls, help, and what the program says against the value.
-function buildVariable(place, variable, name) {
-  const key = `${place}.${name}`, given = givenIn(place)[name] ?? '', value = valueOf(place, name);
-  const wanted = split(variable.value, variable), parts = split(value, variable);
-  const count = variable.size || (parts.length === 2 ? 2 : 1), few = variable.choices || count <= 2;
-  const controls = few ? Array.from({ length: count }, (_, k) => control(variable, parts[k] ?? '', wanted[k] ?? '')) : [control({ type: 'text' }, value, variable.value)];
-  const row = make('div', { className: 'variable' }), reset = make('button', { type: 'button', className: 'reset', textContent: 'reset', title: 'as in the file' });
-  const id = 'v.' + key, words = `${variable.help}; allowed: ${variable.allowed}`;
-  row.dataset.place = key;
-  controls.forEach(({ input, slider }, k) => {
-    input.id = k ? `${id}.${k}` : id;
-    for (const part of [input, slider]) part?.setAttribute('aria-label', count > 1 && few ? `${key}, value ${k + 1}` : key);
-    input.setAttribute('aria-describedby', id + '.help');
+function buildSlider(spec) {
+  const { key, at, from, log } = spec, integer = variableOf(key).type === 'integer', id = 'slide.' + key + at;
+  const range = make('input', { type: 'range', min: 0, max: 1000, step: 1, id });
+  const field = make('input', { inputMode: 'text', spellcheck: false });
+  const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
+    make('small', { textContent: acts(key) ? 'acts at once' : 'starts anew' }), make('div', {}, range, field), make('p', { className: 'problem' }));
+  field.setAttribute('aria-label', `${spec.words}: value`);
+  const scaled = value => log ? Math.log(value) : value, most = () => mostOf(spec);
+  const put = value => {
+    const text = String(integer ? Math.round(value) : +(+value).toPrecision(3));
+    set(key, at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(','));
+  };
+  range.addEventListener('input', () => {
+    const share = range.value / 1000, low = scaled(from), value = low + share * (scaled(most()) - low), step = 10 ** Math.floor(Math.log10((spec.to - from) / 100));
+    put(log ? Math.exp(value) : Math.round(value / step) * step);
   });
-  const mark = () => {
+  field.addEventListener('change', () => put(parseFloat(field.value.replace(',', '.')) || 0));
+  row.sync = () => {
+    const value = read(spec), top = most(), place = 1000 * (scaled(value) - scaled(from)) / (scaled(top) - scaled(from));
+    if (document.activeElement !== range) range.value = clampTo(place);
+    if (document.activeElement !== field) field.value = short(value).replace('−', '-');
+    range.setAttribute('aria-valuetext', `${short(value)}, from ${short(from)} to ${short(top)}`);
     row.classList.toggle('changed', key in state.settings);
-    reset.hidden = !(key in state.settings);
+    row.classList.toggle('wrong', key in state.waiting);
+    row.lastChild.textContent = state.waiting[key] ?? '';
   };
-  const take = () => {
-    const values = controls.map(({ input }) => input.value.trim());
-    const text = values.every(one => !one) ? '' : values.map((one, k) => one || wanted[k] || '').join(',');
-    if (text === given) delete state.settings[key]; else state.settings[key] = text;
-    mark();
-    changed();
-  };
-  for (const { input, slider } of controls) {
-    input.addEventListener('change', () => { slider?.follow(); take(); });
-    slider?.addEventListener('input', () => { input.value = slider.read(); take(); });
-  }
-  reset.addEventListener('click', () => {
-    delete state.settings[key];
-    row.replaceWith(buildVariable(place, variable, name));
-    changed();
-  });
-  const unit = variable.unit ? make('small', { textContent: ` [${variable.unit}]` }) : '';
-  row.append(make('header', {}, make('label', { htmlFor: id }, ...name.split('_').flatMap((word, k) => k ? ['_', make('wbr'), word] : word), unit), reset),
-    ...controls.map(({ input, slider }) => make('div', {}, ...(slider ? [slider] : []), input)),
-    make('p', { id: id + '.help', textContent: words }));
-  mark();
   return row;
 }
 
-const split = (value, { size, type, choices }) => size === 1 && type === 'text' && !choices ? [value] : value ? value.split(/\s*,\s*|\s+/) : [];
+const clampTo = place => Math.max(0, Math.min(1000, place || 0));
 
-// A menu for words, a field for text, a field with a slider for a number.
-function control(variable, value, wanted) {
-  if (variable.choices) {
-    const option = word => make('option', { value: word, textContent: word || `(${wanted})`, selected: word === value });
-    return { input: make('select', {}, ...['', ...variable.choices].map(option)) };
-  }
-  const input = make('input', { value, placeholder: wanted, spellcheck: false });
-  if (variable.type === 'text') return { input };
-  input.inputMode = variable.type === 'integer' ? 'numeric' : 'text';  // decimal keyboards have no minus and no e
-  return { input, slider: sliderFor(variable, input, wanted) };
+// ---------- everything: by the program's own table ----------
+
+function buildEverything() {
+  if (!$('everything').open) { $('groups').replaceChildren(); return; }
+  const added = state.added.map(([kind, name]) => ({ kind, place: `${kind}.${name}` })), there = [...state.groups, ...added];
+  const isNamed = kind => 'name' in lab.table[kind], order = Object.keys(lab.table);
+  const rest = order.filter(kind => !isNamed(kind) && !there.some(group => group.kind === kind)).map(kind => ({ kind, place: kind }));
+  const all = [...there, ...rest].filter(({ kind }) => lab.table[kind]).sort((a, b) => order.indexOf(a.kind) - order.indexOf(b.kind));
+  $('groups').replaceChildren(...all.map(({ kind, place }) => {
+    const names = Object.keys(lab.table[kind]).filter(name => name !== 'name');
+    return make('details', { open: names.some(name => textOf(`${place}.${name}`)) }, make('summary', { textContent: '&' + place.replace('.', ' ') }),
+      ...names.map(name => buildVariable(`${place}.${name}`)));
+  }));
+  const free = (kind, k = 1) => all.some(({ place }) => place === `${kind}.${kind}${k}`) ? free(kind, k + 1) : `${kind}${k}`;
+  const more = order.filter(isNamed).flatMap(kind => (lab.table[kind].name.choices ?? [free(kind)])
+    .filter(name => !all.some(({ place }) => place === `${kind}.${name}`)).map(name => `${kind} ${name}`));
+  $('add').replaceChildren(new Option('choose …', ''), ...more.map(pair => new Option('&' + pair, pair)));
 }
 
-// ---------- sliders ----------
-
-// Linear in a narrow range, or about 0 where every number is allowed; else by factors, with 0 at the left if it is allowed.
-function scaleFor({ low, high, open }, about) {
-  const size = Math.abs(about);
-  if (low === null) return { from: -3 * size || -1, to: 3 * size || 1 };
-  if (high !== null && high - low <= 10 && !(low > 0 && high / low > 1000)) return { from: low, to: high };
-  const from = Math.max(low, size / 100 || 1e-6), to = Math.min(high ?? Infinity, 100 * size || 10);
-  return { from: Math.log(from), to: Math.log(to), log: true, zero: low === 0 && !open };
-}
-
-function sliderFor(variable, input, wanted) {
-  const slider = make('input', { type: 'range', min: 0, max: 1000, step: 1 }), number = text => parseFloat(String(text).replace(/d/i, 'e'));
-  const now = () => number(input.value || wanted) || 0;
-  let scale = scaleFor(variable, now());
-  slider.follow = () => {
-    const place = () => {
-      const value = scale.log ? Math.log(now()) : now();
-      return 1000 * (value - scale.from) / (scale.to - scale.from);
-    };
-    if (now() && (place() < 0 || place() > 1000)) scale = scaleFor(variable, now());  // typed: a value farther away
-    slider.value = now() || !scale.log ? place() : 0;
+function buildVariable(key) {
+  const { choices, type, help, allowed, unit } = variableOf(key), id = 'v.' + key, fallback = words(variableOf(key).default ?? variableOf(key).example);
+  const menu = type === 'logical' ? ['.true.', '.false.'] : choices?.length && variableOf(key).size === 1 ? choices : null;
+  const input = menu ? make('select', { id }, ...['', ...menu].map(word => new Option(word || `(${fallback})`, word))) : make('input', { id, placeholder: fallback, spellcheck: false });
+  const row = make('div', { className: 'variable' }, make('label', { htmlFor: id, textContent: nameOf(key) + (unit ? ` [${unit}]` : '') }),
+    input, make('p', { id: id + '.help', textContent: `${help}; allowed: ${allowed}` }), make('p', { className: 'problem' }));
+  row.dataset.place = key;
+  input.setAttribute('aria-describedby', id + '.help');
+  input.addEventListener('change', () => set(key, input.value.trim()));
+  row.sync = () => {
+    if (document.activeElement !== input || menu) input.value = textOf(key);
+    row.classList.toggle('changed', key in state.settings);
+    row.classList.toggle('wrong', key in state.waiting);
+    row.lastChild.textContent = state.waiting[key] ?? '';
   };
-  slider.read = () => {
-    const share = slider.value / 1000, value = scale.from + share * (scale.to - scale.from);
-    if (scale.log && scale.zero && !share) return '0';
-    const exact = scale.log ? Math.exp(value) : value, step = scale.log ? 0 : (scale.to - scale.from) / 200;
-    const kept = variable.type === 'integer' ? Math.round(exact) : step ? Math.round(exact / step) * step : exact;
-    const bounded = variable.open && kept <= variable.low ? step : variable.open && kept >= variable.high && variable.high ? variable.high - step : kept;
-    return String(variable.type === 'integer' && bounded < 1000 ? bounded : +bounded.toPrecision(3));
-  };
-  slider.follow();
-  return slider;
+  row.sync();
+  return row;
 }
 
-// ---------- values and their problems ----------
+function sync() { for (const row of document.querySelectorAll('.slider, .variable')) row.sync(); }
 
-let timer;
-function changed() {
-  clearTimeout(timer);
-  timer = setTimeout($('follow').checked ? run : check, 250);
+function addGroup(kind, name) {
+  state.added.push([kind, name]);
+  for (const [own, { needed, default: usual, example }] of Object.entries(lab.table[kind]))
+    if (needed && own !== 'name') state.settings[`${kind}.${name}.${own}`] = words(usual ?? example);
+  buildEverything();
+  run();
 }
 
-const wish = () => ({ input: state.input, settings: state.settings, added: state.added });
+// ---------- an input ----------
 
-async function check() {
-  const answer = await ask('check', wish());
-  if (answer) showProblems(answer.problems);
+async function choose(name) {
+  const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
+  if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
+  const form = await answer.json(), input = lab.inputs.find(one => one.name === name);
+  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: form.groups, settings: {}, waiting: {}, added: [] });
+  $('name').textContent = input.title;
+  $('own').hidden = !input.picture;
+  if (input.picture) $('own').src = input.picture;
+  $('sentence').textContent = input.sentence;
+  $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
+  $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
+  $('scanned').replaceChildren(...state.input.sliders.map((slider, k) => new Option(slider.words, k)));
+  buildEverything();
+  sync();
+  run();
 }
 
-function showProblems(problems) {
-  document.querySelectorAll('.variable.wrong').forEach(row => row.classList.remove('wrong'));
-  document.querySelectorAll('#form .problem').forEach(line => line.remove());
-  for (const { place, text } of problems) {
-    const row = [...document.querySelectorAll('.variable')].find(({ dataset }) => dataset.place === place);
-    const line = make('p', { className: 'problem', textContent: text });
-    if (!row) {
-      $('problems').append(line);
-      continue;
-    }
-    row.append(line);
-    row.classList.add('wrong');
-    for (let around = row.closest('details'); around; around = around.parentElement.closest('details')) around.open = true;
-  }
-  if (problems.length) tell(problems[0].text, true);
+function buildInputs() {
+  const subjects = [...new Set(lab.inputs.map(({ subject }) => subject))];
+  $('inputs').replaceChildren(make('header', {}, make('h2', { textContent: 'What shall run?' }), make('button', { type: 'button', textContent: 'Close', onclick: () => $('inputs').close() })),
+    ...subjects.flatMap(subject => [make('h3', { textContent: subject }), make('div', {}, ...lab.inputs.filter(one => one.subject === subject).map(({ name, title, sentence, picture }) => {
+      const button = make('button', { type: 'button' }, ...(picture ? [make('img', { src: picture, alt: '', width: 144, height: 144 })] : []), make('b', { textContent: title }), make('span', { textContent: sentence }));
+      button.addEventListener('click', () => { $('inputs').close(); choose(name); });
+      return button;
+    }))]));
 }
 
 // ---------- runs ----------
 
-let busy = false, again = false;  // one wish at a time; whether values have changed meanwhile
-async function run(resume = false) {
+const current = () => state.boxes.at(-1), filmOf = box => box.frame.contentWindow, isThere = box => !!filmOf(box)?.start;
+const shownBoxes = () => state.boxes.filter(box => box.shown || box === current()), films = () => shownBoxes().filter(isThere).map(filmOf);
+function isPaused() { return state.paused; }
+
+function newBox() {
+  const taken = state.boxes.map(({ letter }) => letter), letter = [...'ABCDEFGHIJ'].find(one => !taken.includes(one));
+  const frame = make('iframe', { title: 'the run', allow: 'fullscreen', src: 'view' });
+  const figure = make('section', { className: 'run' }, make('p', { className: 'caption' }), frame), box = { letter, figure, frame, words: '', changes: [], shown: true };
+  state.boxes.push(box);
+  $('runs').append(figure);
+  return box;
+}
+
+// One start at a time; values that change meanwhile are the next one's.
+let busy = false, again = false, timer, latest = {};
+function run() {
   clearTimeout(timer);
-  state.paused = false;
-  if (busy) {
-    again = true;
-    return;
-  }
+  latest = {};
+  const box = current() ?? newBox();
+  if (busy) { again = true; return; }
   busy = true;
-  const keep = state.shown.length > 1 || isComparing() ? state.shown[0]?.number : undefined;
-  const answer = await ask('start', { ...wish(), keep, resume: resume === true });
-  busy = false;
-  if (answer) showProblems(answer.problems);
-  if (answer?.run) {
-    state.running = true;
-    tell('running');
-    show(answer);
-    look();
-  }
-  if (again) {
-    again = false;
-    run();
-  }
-}
-
-const isComparing = () => $('compare').ariaPressed === 'true';
-
-const changes = () => Object.entries(state.settings).filter(([name, value]) => state.cadences[name] !== value)
-  .map(([name, value]) => `${name} = ${value}`).join(' · ');
-
-// A run beside the one that is kept, or in the place of the one before.
-function show({ run: number, command }) {
-  const most = isComparing() ? 2 : 1, same = state.shown.at(-1)?.number === number;
-  const before = same || state.shown.length === most ? state.shown.pop() : null;
-  const figure = before?.figure ?? make('section', { className: 'run' }, make('header'), make('div'));
-  const base = `${lab.page}/${number}/`, name = `${state.input}_${number}`;
-  const link = (words, part, ending) => make('a', { textContent: words, href: base + part, download: name + ending });
-  const copy = make('button', { type: 'button', textContent: 'Command', title: command });
-  copy.addEventListener('click', async () => {
-    await navigator.clipboard.writeText(command).then(() => tell('copied: ' + command), () => prompt('The command:', command));
-  });
-  const words = make('p', { textContent: changes() || 'as in the file' });
-  figure.firstChild.replaceChildren(words, link('Input', 'input', '.nml'), link('Output', 'output', '.h5'), copy);
-  state.shown.push({ number, figure });
-  if (!figure.isConnected) $('runs').append(figure);  // moved, it would load its film again
-  if (!same || figure.querySelector('.coming')) place(figure, base);
-  else films().forEach(one => { if (one === film(figure)) one.goOn(); else one.play(true); });
-}
-
-// The film of a new run replaces the one before when it is there, and keeps what was chosen in it.
-function place(figure, base) {
-  const holder = figure.lastChild, frame = make('iframe', { title: 'the run', allow: 'fullscreen', className: 'coming' });
-  while (holder.children.length > 1) holder.lastChild.remove();
-  holder.append(frame);
-  frame.dataset.input = state.input;
-  frame.src = base;
-  const kept = state.shown.length > 1 ? film(state.shown[0].figure) : null;
-  const wait = () => {
-    if (!frame.isConnected) return;
-    if (!isThere(frame)) {
-      setTimeout(wait, 30);
-      return;
-    }
-    const player = frame.contentWindow, before = holder.firstChild;
-    const old = before !== frame && before.dataset.input === frame.dataset.input ? before.contentWindow : kept;
-    player.theme(isDark());
-    player.choices(old?.choices && { ...old.choices(), pace: kept?.choices?.().pace });
-    player.addEventListener('keydown', typed);
-    while (holder.firstChild !== frame) holder.firstChild.remove();
-    frame.className = '';
-    for (const one of films()) { one.go(-Infinity); one.play(!state.paused); }
+  tell('starting …');
+  state.paused = false;
+  const address = new URL(`ws?page=${lab.page}`, location.href.replace(/^http/, 'ws')), begin = () => {
+    filmOf(box).theme(isDark());
+    if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
+    box.wished = { wish: wish(), words: changesInWords() };
+    filmOf(box).start(wish(), address);
   };
-  wait();
+  if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
 
-const frameOf = figure => figure.querySelector('iframe'), film = figure => frameOf(figure)?.contentWindow;
-const isThere = frame => frame?.contentDocument?.getElementById('clock')?.textContent;
-const films = () => state.shown.map(({ figure }) => frameOf(figure)).filter(isThere).map(frame => frame.contentWindow);
-const inFilm = (one, id) => one.document.getElementById(id);
-const isPlaying = one => inFilm(one, 'play').ariaPressed === 'true';
-
-const isGoing = () => state.running || films().some(isPlaying) || (!state.paused && (busy || document.querySelector('.coming')));
-function pauseOrGoOn() {
-  state.paused = isGoing();
-  if (state.paused) {
-    films().forEach(one => one.play(false));
-    if (state.running) ask('stop', {});
-  } else if (state.stopped || films().every(one => +inFilm(one, 'scrub').value === 1)) run(true);
-  else films().forEach(one => one.play(true));
+// What acts on the running state does so at once, while the slider moves; the rest starts anew.
+function changed(key) {
+  clearTimeout(timer);
+  const box = current();
+  if (acts(key) && box?.run && !busy) {
+    latest[key] = state.settings[key] ?? givenAs(key);
+    timer = setTimeout(() => { filmOf(box).send({ do: 'change', settings: latest }); latest = {}; }, 25);
+  } else timer = setTimeout(run, 60);
 }
 
-// ---------- heartbeats ----------
-
-async function look() {
-  const news = await ask('state?' + lab.page);
-  if (!news) return;
-  if (state.running && !news.running) tell(news.reason, !news.reason.startsWith('stopped'));
-  Object.assign(state, { running: news.running, stopped: news.stopped });
+// What a film hears from its worker.
+function hear(source, news) {
+  const box = state.boxes.find(one => one.frame.contentWindow === source);
+  if (!box) return;
+  if (news.is === 'scene' && !news.changed) {
+    Object.assign(box, { run: news.run, command: news.command, words: box.wished.words, changes: [] });
+    ready();
+    for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
+    tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
+    arrangeAll();
+  } else if (news.is === 'problems') {
+    if (news.change) { run(); return; }  // it does not act on what runs
+    showProblems(news.problems);
+    ready();
+  } else if (news.is === 'state') {
+    box.changes = news.changes;
+    if (news.reason) tell(news.reason, !news.ended);
+    tellShelf();
+  } else if (news.is === 'scan') addToScan(news);
+  else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
 }
 
-setInterval(look, 2000);
-setInterval(() => { $('pause').textContent = isGoing() ? 'Pause' : 'Go on'; }, 200);
-addEventListener('pagehide', () => navigator.sendBeacon('leave', JSON.stringify({ page: lab.page })));
-addEventListener('pageshow', event => { if (event.persisted) location.reload(); });
+function ready() {
+  busy = false;
+  if (again) { again = false; run(); }
+}
+
+// Once, where it belongs; only that value waits, the others act.
+function showProblems(problems) {
+  const known = problems.filter(({ place }) => place in state.settings && !state.waiting[place]);
+  for (const { place, text } of known) {
+    const most = mostOf({ key: place });
+    state.waiting[place] = most < numberOf(place) ? `too full: at most ${short(most)}` : text;
+  }
+  sync();
+  tell(known.length ? 'one value waits: see the form' : problems[0].text, true);
+  if (known.length) again = true;
+}
+
+// ---------- the shelf of kept runs ----------
+
+function keep() {
+  if (!current()?.run) return;
+  if (state.boxes.length > MOST_KEPT) { tell(`${MOST_KEPT} runs are kept, which is all that may be: remove one`, true); return; }
+  newBox();
+  arrangeAll();
+  run();
+}
+
+function remove(box) {
+  box.figure.remove();
+  state.boxes.splice(state.boxes.indexOf(box), 1);
+  arrangeAll();
+}
+
+function tellShelf() {
+  $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
+    const base = `keep/${lab.page}/${box.run}/`, link = part => make('a', { textContent: part, href: base + part, download: '' });
+    const copy = make('button', { type: 'button', textContent: 'command', title: box.command });
+    copy.addEventListener('click', () => navigator.clipboard.writeText(box.command).then(() => tell('copied: ' + box.command), () => prompt('The command:', box.command)));
+    const seen = make('input', { type: 'checkbox', checked: box.shown, ariaLabel: `run ${box.letter} is seen` });
+    seen.addEventListener('change', () => { box.shown = seen.checked; arrangeAll(); });
+    const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
+    away.addEventListener('click', () => remove(box));
+    const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), box.words + (box.changes.length ? ', then changed' : '')];
+    return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, link('input'), copy, ...(box.changes.length ? [link('script')] : []), link('output'), ...(own ? [] : [away])));
+  }));
+  const changes = current()?.changes ?? [];
+  $('changes').replaceChildren(...changes.slice(-6).map(([time, name, value]) => make('li', { textContent: `t = ${short(time)}: ${name} = ${value}` })));
+  state.boxes.forEach(({ figure, letter, words: text }) => { figure.firstChild.textContent = `${letter}: ${text}`; });
+}
+
+// Boxes of one size side by side; the newest has all plots, with the curves of the others in them.
+function arrangeAll() {
+  const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
+  const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
+  const size = many ? { width: width - 12, height: Math.floor(clientHeight * (upright ? 0.36 : 0.46)) - 26 } : null;
+  $('runs').classList.toggle('many', many);
+  $('runs').style.gridTemplateColumns = `repeat(${count}, minmax(0, 1fr))`;
+  for (const box of state.boxes) {
+    box.figure.style.gridColumn = many && box !== current() ? boxes.indexOf(box) + 1 : '';
+    box.figure.hidden = !boxes.includes(box);
+    box.figure.style.height = many && box !== current() ? `${size.height + 50}px` : '';
+    box.figure.classList.toggle('current', box === current());
+    if (isThere(box)) filmOf(box).arrange(size, many && box !== current());
+  }
+  tellShelf();
+  overlayAll();
+}
+
+function overlayAll() {
+  const box = current();
+  if (!box || !isThere(box)) return;
+  const others = shownBoxes().filter(one => one !== box && isThere(one) && one.run);
+  filmOf(box).overlay(others.map(one => ({ letter: one.letter, curves: filmOf(one).inside().stream.curves, kinds: filmOf(one).inside().kinds })));
+}
+setInterval(() => { if (shownBoxes().length > 1) overlayAll(); }, 1000);
+
+// What is done in one film is done in all that stand beside it.
+function played(source, on) {
+  if (source === filmOf(current())) state.paused = !on;
+  for (const one of films()) if (one !== source && one.inside().film) one.play(on);
+  $('pause').textContent = on ? 'Pause' : 'Go on';
+}
+
+function paced(source) {
+  const { pace, speed } = source.choices();
+  for (const one of films()) if (one !== source) one.choices({ pace, speed });
+}
+
+// ---------- a scan: one variable, five values, one curve that grows ----------
+
+let scan;
+function beginScan() {
+  const spec = state.input.sliders[$('scanned').value], { key, at, from, log } = spec, to = mostOf(spec), integer = variableOf(key).type === 'integer';
+  const values = [0, 1, 2, 3, 4].map(k => log ? from * (to / from) ** (k / 4) : from + k / 4 * (to - from)).map(value => integer ? Math.round(value) : +value.toPrecision(3));
+  const texts = values.map(value => at < 0 ? String(value) : split(valueOf(key)).map((one, k) => k === at ? value : one).join(','));
+  scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values };
+  filmOf(current()).showScan(scan);
+  filmOf(current()).send({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value });
+  tell('scanning …');
+}
+
+function addToScan({ index, mean, error, text }) {
+  if (text) tell(text, true); else scan.points.push([scan.values[index], mean, error]);
+  filmOf(current()).showScan(scan);
+  if (scan.points.length === 5) tell('');
+}
 
 // ---------- what acts ----------
 
@@ -348,33 +374,28 @@ const isDark = () => document.documentElement.dataset.theme === 'dark';
 
 function theme(night) {
   document.documentElement.dataset.theme = night ? 'dark' : 'light';
-  for (const one of films()) {
-    one.theme(night);
-    one.refresh();
-  }
+  for (const box of state.boxes) if (isThere(box)) { filmOf(box).theme(night); filmOf(box).refresh(); }
 }
 
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
+  arrangeAll();
+}
+
+function larger() {
+  const on = $('larger').ariaPressed !== 'true';
+  $('larger').ariaPressed = on;
+  for (const one of [window, ...state.boxes.filter(isThere).map(filmOf)]) one.document.documentElement.classList.toggle('larger', on);
+  arrangeAll();
 }
 
 const actions = {
-  run, pause: pauseOrGoOn, settings: () => bare(!document.body.classList.contains('bare')),
-  theme: () => theme(!isDark()),
-  compare: () => {
-    const on = !isComparing();
-    $('compare').ariaPressed = on;
-    if (!on && state.shown.length > 1) state.shown.shift().figure.remove();
-    else if (on) tell('this run stays; the next one will stand beside it');
-  },
-  choose: () => {  // pictures are asked for while one looks at them: a choice need not wait for the rest
-    for (const image of $('inputs').querySelectorAll('img:not([src])')) image.src = image.dataset.src;
-    $('inputs').showModal();
-  },
+  run, keep, larger, scan: beginScan, theme: () => theme(!isDark()), choose: () => $('inputs').showModal(),
+  pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
-const keys = { r: 'run', p: 'pause', c: 'compare', s: 'settings' };
+const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
 
 // A key of the laboratory, wherever the focus is; its other keys are for all films, while none has the focus.
 function typed(event) {
@@ -387,16 +408,15 @@ function typed(event) {
 }
 
 addEventListener('keydown', typed);
-$('form').addEventListener('submit', event => { event.preventDefault(); run(); });
+addEventListener('resize', () => arrangeAll());
+$('form').addEventListener('submit', event => event.preventDefault());
+$('everything').addEventListener('toggle', buildEverything);
 $('add').addEventListener('change', () => { if ($('add').value) addGroup(...$('add').value.split(' ')); });
-$('inputs').append(...lab.inputs.map(name => {
-  const image = make('img', { loading: 'lazy', alt: '' });
-  image.dataset.src = 'picture?' + encodeURIComponent(name);
-  const button = make('button', { type: 'button' }, image, name);
-  button.addEventListener('click', () => { $('inputs').close(); choose(name); });
-  return button;
-}));
-$('inputs').addEventListener('close', () => { for (const image of $('inputs').querySelectorAll('img')) image.complete || image.removeAttribute('src'); });
+for (const button of $('heat').querySelectorAll('button')) button.addEventListener('click', () => filmOf(current()).send({ do: 'heat', factor: +button.dataset.factor }));
+$('measured').replaceChildren(...Object.entries(MEASURED).map(([name, text]) => new Option(text, name)));
+addEventListener('pageshow', event => { if (event.persisted) location.reload(); });
 theme(matchMedia('(prefers-color-scheme: dark)').matches);
-bare(matchMedia('(max-width: 900px), (max-height: 500px)').matches);
-choose(lab.inputs.includes('gas') ? 'gas' : lab.inputs[0]);
+buildInputs();
+newBox();
+bare(matchMedia('(max-height: 500px)').matches);
+choose((lab.inputs.find(({ name }) => name === 'gas') ?? lab.inputs[0]).name);

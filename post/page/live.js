@@ -2,9 +2,10 @@
 
 // A page without a film asks the server of `player.py --live` for one, and goes on asking until the run has ended.
 // The film goes as fast as brings it to the newest frame when the next answer is due, until one goes elsewhere.
-// As a part of another page it begins with the run, to be seen from its start.
-const isPart = parent !== window;
-const live = { on: false, stamp: '', newest: !isPart, heard: 0, pace: 0 };
+// As a part of the laboratory it shows what a worker does.
+const enclosed = JSON.parse($('film').textContent);
+const isPart = parent !== window && !enclosed;
+const live = { on: false, stamp: '', newest: true, heard: 0, pace: 0 };
 
 async function ask() {
   const answer = await fetch('film?known=' + encodeURIComponent(live.stamp)).catch(() => null);
@@ -19,7 +20,7 @@ function receive(news) {
   const started = live.stamp !== '', { time } = moment, own = started ? kinds.map(kind => kind.own) : [];
   const now = performance.now(), taken = Math.min(10, (now - live.heard) / 1000);
   live.heard = now;
-  load(news);
+  loadFilm(news);
   kinds.forEach((kind, s) => { kind.own = own[s]; });
   live.stamp = news.stamp;
   live.on = !news.end;
@@ -47,45 +48,20 @@ function follow(newest) {
   if (newest) { show(last(), true); play(true); }
 }
 
-// The run goes on after its end.
-function goOn() {
-  if (!live.on) {
-    live.on = true;
-    ask();
-  }
-  play(true);
-}
-
-// ---------- a part of another page ----------
-
-// The laboratory shows runs side by side: what is chosen in one of them can be chosen in the others.
-document.documentElement.classList.toggle('part', isPart);
-
-function choices(wish) {
-  if (wish) {
-    const { pace: own, speed, colour, ...rest } = wish;
-    if (own) [pace, usual] = [own, false];
-    $('pace').value = speed;
-    if ([...$('colour').options].some(({ value }) => value === colour)) $('colour').value = state.colour = colour;
-    Object.assign(state, rest);
-    refresh();
-  }
-  const { colour, arrows, sofar, total } = state;
-  return { pace, speed: $('pace').value, colour, arrows, sofar, total };
-}
-
 // ---------- here it begins ----------
 
 listen();
-const enclosed = JSON.parse($('film').textContent);
+document.documentElement.classList.toggle('part', isPart);
+document.documentElement.classList.toggle('empty', isPart);
+if (isPart) addEventListener('keydown', event => parent.typed(event));
 $('film').remove();
 if (enclosed) {
-  load(enclosed);
+  loadFilm(enclosed);
   begin();
   move(first());
   refresh();
   if (!fromAddress() && !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
-} else {
+} else if (!isPart) {
   live.on = true;
   ask();
 }

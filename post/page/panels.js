@@ -8,45 +8,67 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
 function tell() {
-  const { time, frame, gap } = moment;
-  $('scrub').value = (time - first()) / (last() - first() || 1);
-  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · frame ${frame + 1}/${frames}`
-    + (disks > 1 ? ` · ${short(+collisionsNow().toPrecision(3))} collisions per disk` : '');
+  const { time, frame, collisions } = moment, unknown = film.guesses?.[frame];
+  const share = (time - first()) / (last() - first() || 1);
+  $('scrub').value = share;
+  $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
+  $('clock').innerHTML = `t = <b>${long(+moment.shown.toPrecision(5))}</b> · ${source.counted()}`
+    + (disks > 1 ? ` · ${short(+collisions.toPrecision(3))} collisions per disk` : '');
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
-  const unknown = film.guesses[gap];
-  $('guess').textContent = !film.guesses.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
+  $('guess').textContent = !film.guesses?.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
     : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
-    : (stands(gap) ? `Here the film shows frames as they are: ${unknown} of ${disks} disks collide between two.`
+    : (stands(frame) ? `Here the film shows frames as they are: ${unknown} of ${disks} disks collide between two.`
       : `Here ${unknown} of ${disks} disks, which collide, stand until the next frame.`)
       + (film.logged ? '' : ' output.event_log = .true. in the input would tell their paths.');
 }
+
+// What is seen, for those who do not: of the stage, and of each plot.
+const listed = words => words.filter(Boolean).join(', ');
+function describe() {
+  const [width, height] = film.edges, each = kinds.map(({ name, count, sizes }) => `${count} ${name} (${sizes})`);
+  const surfaces = film.sides.map((law, k) => describeLaw(film.surfaces[k], law));
+  const kinetic = kinds.map(({ name }, s) => `${name} ${short(moment.kinetic[s])}`), pressure = lastOf('pressure');
+  const words = {
+    stage: `${listed(each)} in a box of ${short(width)} by ${short(height)}; time ${short(moment.shown)}; `
+      + `coloured by ${state.colour}. ${listed(surfaces)} A click on a disk shows its trace.`,
+    histogram: `Histogram of the speeds. ${$('bars').textContent}`,
+    energy: `Energies against time. Mean kinetic energy of a disk now: ${listed(kinetic)}.`,
+    pressure: `Pressure against time.${pressure === null ? '' : ` Now: ${short(pressure)}.`}`,
+  };
+  for (const [id, text] of Object.entries(words)) $(id).setAttribute('aria-label', text);
+}
+
+const describeLaw = (name, { temperature, speed, motion }) => (temperature || speed || motion) && `${name} ${listed([
+  temperature && `heats: kT = ${short(temperature)}`, speed && `slides with ${short(speed)}`, motion && `moves (${motion})`])}`;
 
 // The colour of a species, to be chosen by the user.
 function chooser(kind) {
   const label = document.createElement('label'), input = document.createElement('input');
   const hex = speciesColour(kind).map(part => part.toString(16).padStart(2, '0')).join('');
+  const pattern = ['', ', with a hole', ', with a ring', ', with hole and ring'][kinds.indexOf(kind) % 4];
   Object.assign(input, { type: 'color', value: '#' + hex, title: `another colour for ${kind.name}` });
   input.addEventListener('input', () => { kind.own = input.value; layOutStage(); show(moment.time, true); });
   input.addEventListener('change', refresh);
   label.className = 'chip';
-  label.append(input, `${kind.name}, ${kind.sizes}`);
+  label.append(input, `${kind.name}, ${kind.sizes}${pattern}`);
   return label;
 }
 
 function drawLegend() {
   const scale = film.scales[state.colour], legend = $('legend');
   legend.replaceChildren();
-  if (!scale) {
-    legend.replaceChildren(...kinds.map(chooser));
-    return;
+  if (!scale) legend.replaceChildren(...kinds.map(chooser));
+  else {
+    const stops = Array.from({ length: 17 }, (_, k) => css(scaleColour(255 * k / 16)));
+    const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
+    legend.innerHTML = `<div id="scale"><i></i>
+      <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div><p>${scale[0]}</p>`;
+    legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the page's policy refuses it in the text
   }
-  const stops = Array.from({ length: 17 }, (_, k) => css(scaleColour(255 * k / 16)));
-  const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
-  legend.innerHTML = `<div id="scale"><i></i>
-    <span><b>0</b><b>${short(+middle.toPrecision(2))}</b><b>≥ ${short(+scale[1].toPrecision(2))}</b></span></div><p>${scale[0]}</p>`;
-  legend.querySelector('i').style.background = `linear-gradient(to right, ${stops})`;  // the page's policy refuses it in the text
+  const surfaces = film.sides.map((law, k) => describeLaw(film.surfaces[k], law)).filter(Boolean);
+  if (surfaces.length) legend.append(Object.assign(document.createElement('p'), { textContent: surfaces.join('; ') }));
 }
 
 // ---------- small plots ----------
@@ -55,30 +77,26 @@ function prepare(canvas) {
   const pen = canvas.getContext('2d'), width = canvas.width / page.dots, height = canvas.height / page.dots;
   pen.setTransform(page.dots, 0, 0, page.dots, 0, 0);
   pen.clearRect(0, 0, width, height);
-  return { pen, left: 42, right: width - 4, top: 6, bottom: height - 26 };
+  const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;  // larger on a projector
+  return { pen, size, left: 42 * size, right: width - 4, top: 6, bottom: height - 26 * size };
 }
 
 // Axes from (x0, y0) to (x1, y1) with three or so round numbers each; returns the maps to pixels.
-function axes(plot, [x0, x1], [y0, y1], words, name = short) {
-  const { pen, left, right, top, bottom } = plot;
+function axes(plot, [x0, x1], [y0, y1], words, name = short, nameOfY = name) {
+  const { pen, size, left, right, top, bottom } = plot;
   const x = value => left + (value - x0) / (x1 - x0) * (right - left);
   const y = value => bottom - (value - y0) / (y1 - y0) * (bottom - top);
-  pen.font = '11px system-ui, sans-serif';
-  pen.fillStyle = ink.soft;
-  pen.strokeStyle = ink.line;
-  pen.lineWidth = 1;
-  pen.textAlign = 'right';
-  pen.textBaseline = 'middle';
+  Object.assign(pen, { font: `${11 * size}px system-ui, sans-serif`, fillStyle: ink.soft, strokeStyle: ink.line, lineWidth: 1 });
+  Object.assign(pen, { textAlign: 'right', textBaseline: 'middle' });
   for (const value of round(y0, y1)) {
     pen.beginPath();
     pen.moveTo(left, y(value));
     pen.lineTo(right, y(value));
     pen.stroke();
-    pen.fillText(name(value), left - 6, y(value));
+    pen.fillText(nameOfY(value), left - 6, y(value));
   }
-  pen.textAlign = 'center';
-  pen.textBaseline = 'top';
-  for (const value of round(x0, x1)) if (x(value) < right - 40) pen.fillText(name(value), x(value), bottom + 5);
+  Object.assign(pen, { textAlign: 'center', textBaseline: 'top' });
+  for (const value of round(x0, x1)) if (x(value) < right - 40 * size) pen.fillText(name(value), x(value), bottom + 5);
   pen.textAlign = 'right';
   pen.fillText(words, right, bottom + 5);
   return { x, y };
@@ -92,51 +110,75 @@ function round(low, high) {
   return values;
 }
 
+// Lines { time, values, colour, dash, letter } in one plot, from 0 on if none is lower; the part that is still to come is
+// pale; null is a gap. Returns the map of times.
+function plotLines(canvas, lines, now) {
+  const range = lines.map(({ time }) => [time[0], time.at(-1)]), start = Math.min(...range.map(([t]) => t));
+  const end = Math.max(...range.map(([, t]) => t)), plot = prepare(canvas), { pen } = plot;
+  let low = 0, high = 0;
+  for (const { values } of lines) for (const value of values) if (value < low) low = value; else if (value > high) high = value;
+  const { x, y } = axes(plot, [start, end > start ? end : start + 1], [low, low + 1.06 * (high - low || 1)], 'time');
+  pen.lineJoin = 'round';
+  for (const { time, values, colour, dash = [], letter } of lines) {
+    const seen = upTo(time, now);
+    Object.assign(pen, { lineWidth: letter ? 1.2 : 1.8, strokeStyle: colour, fillStyle: colour });
+    pen.setLineDash(dash);
+    for (const [from, to, alpha] of [[0, seen, 1], [Math.max(0, seen - 1), time.length, 0.35]]) {
+      pen.globalAlpha = alpha;
+      pen.beginPath();
+      for (let k = from, drawn = false; k < to; k++) {
+        if (values[k] !== null) pen[drawn ? 'lineTo' : 'moveTo'](x(time[k]), y(values[k]));
+        drawn = values[k] !== null;
+      }
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+    if (letter) pen.fillText(letter, Math.min(plot.right, x(time.at(-1)) + 10), y(values.at(-1) ?? 0) - 12);
+  }
+  pen.setLineDash([]);
+  return x;
+}
+
 // ---------- speeds ----------
 
-let counted;  // species that have a histogram
+const FEWEST = 10;  // disks of a species that has a histogram
+let counted;        // species that have one
+let sums;           // the histograms of all frames so far, and of which frame they are
 
-// Sums over the frames up to each one are computed once, on first use.
-let sums;
-function speedsUpTo(frame) {
-  if (!sums) {
-    const counts = film.speeds.counts[0].map(row => new Float64Array(row.length)), energies = kinds.map(() => 0);
-    sums = film.speeds.counts.map((own, k) => {
-      counted.forEach(s => own[s].forEach((n, bin) => { counts[s][bin] += n; }));
-      kinds.forEach((_, s) => { energies[s] += film.kinetic[k][s]; });
-      return { counts: counts.map(c => c.slice()), energies: energies.map(e => e / (k + 1)) };
-    });
-  }
-  return sums[frame];
+// The axis of the histogram, up to a speed: where disks rest it grows by factors, for a bar of resting disks beside Maxwell's
+// curve would say nothing.
+const RESTING = 0.02;  // of the disks
+function setBins(most, resting) {
+  const rest = resting > RESTING && resting < 1;
+  film.speeds = { rest, edges: Array.from({ length: 41 }, (_, k) => rest ? most * 10 ** (k / 10 - 4) : most * k / 40) };
 }
 
-// Of the moment if velocities are known well enough then, else of the frame before.
+// Shares of the disks of each species in each bin: of the moment, or of all frames up to it.
 function speedsNow() {
-  const { frame, gap, share } = moment, h = (film.time[gap + 1] ?? film.time[gap]) - film.time[gap];
-  const rounding = Math.max(...film.edges) / grain / h;
-  if (!share || frame !== gap || film.guesses[gap] || rounding > 1e-3 * film.scales.speed[1]) return { counts: film.speeds.counts[frame], energies: film.kinetic[frame] };
-  const bins = film.speeds.edges.length - 1, width = film.speeds.edges[1];
-  const counts = kinds.map(() => new Array(bins).fill(0));
-  for (let i = 0; i < disks; i++) {
-    const bin = Math.floor(Math.hypot(VX[i], VY[i]) / width);
-    if (bin < bins) counts[speciesOf[i]][bin]++;
+  const { edges, rest } = film.speeds, bins = edges.length - 1, width = edges[1] - edges[0];
+  const bin = speed => rest ? speed > 0 ? Math.max(1, upTo(edges, speed)) : 0 : Math.floor(speed / width);
+  const counts = kinds.map(() => new Float64Array(bins + 1)), add = (i, speed) => {
+    const k = bin(speed);
+    if (k <= bins) counts[speciesOf[i]][k]++;
+  };
+  if (state.sofar) {
+    if (sums?.time !== moment.time) sums = { time: moment.time, samples: eachSpeed(add), counts };
+    return sums;
   }
-  return { counts, energies: moment.kinetic };
+  for (let i = 0; i < disks; i++) add(i, Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]));
+  return { samples: 1, counts };
 }
 
-function drawHistogram(frame) {
+function drawHistogram() {
   if (!counted.length) return;
-  if (film.speeds.rest) {
-    drawSpeedsAndRest(film.speeds.counts[frame]);
+  const { edges, rest } = film.speeds, { counts, samples } = speedsNow(), plot = prepare($('histogram')), { pen } = plot;
+  if (rest) {
+    drawSpeedsAndRest(plot, counts);
     return;
   }
-  const top = film.speeds.edges.at(-1), width = film.speeds.edges[1];
-  const { counts, energies } = state.sofar ? speedsUpTo(frame) : speedsNow();
-  const samples = state.sofar ? frame + 1 : 1;
-  const peak = Math.max(...counted.map(s => Math.sqrt(kinds[s].mass / (energies[s] || Infinity)) * Math.exp(-0.5)));
-  const high = peak > 0 ? 1.6 * peak : 4 / top;
-  const plot = prepare($('histogram')), { pen } = plot;
-  const { x, y } = axes(plot, [0, top], [0, high], 'speed');
+  const top = edges.at(-1), width = edges[1], energy = s => film.settles ? film.curves?.mean?.[s] ?? moment.kinetic[s] : moment.kinetic[s];
+  const peak = Math.max(...counted.map(s => Math.sqrt(kinds[s].mass / (energy(s) || Infinity)) * Math.exp(-0.5)));
+  const { x, y } = axes(plot, [0, top], [0, peak > 0 ? 1.6 * peak : 4 / top], 'speed');
   pen.save();
   pen.beginPath();
   pen.rect(plot.left, plot.top, plot.right - plot.left, plot.bottom - plot.top);
@@ -146,15 +188,15 @@ function drawHistogram(frame) {
     pen.fillStyle = css(speciesColour(kinds[s]));
     pen.globalAlpha = 0.45;
     pen.beginPath();
-    Array.from(counts[s], (n, bin) => n && pen.rect(x(bin * width), y(n * one), x(width) - x(0) - 0.5, plot.bottom - y(n * one)));
+    counts[s].forEach((n, bin) => n && pen.rect(x(bin * width), y(n * one), x(width) - x(0) - 0.5, plot.bottom - y(n * one)));
     pen.fill();
   }
   pen.globalAlpha = 1;
-  pen.lineWidth = 2;
   for (const s of film.settles ? counted : []) {
-    const b = kinds[s].mass / energies[s];
+    const b = kinds[s].mass / energy(s);
     if (!isFinite(b)) continue;
-    pen.strokeStyle = css(speciesColour(kinds[s]));
+    Object.assign(pen, { lineWidth: 2, strokeStyle: css(speciesColour(kinds[s])) });
+    pen.setLineDash(DASHES[s % DASHES.length]);
     pen.beginPath();
     for (let k = 0; k <= 120; k++) {
       const v = k / 120 * top;
@@ -166,102 +208,92 @@ function drawHistogram(frame) {
 }
 
 // Where many disks are at rest there is no Maxwell curve, but speeds of many sizes: both axes grow by factors.
-function drawSpeedsAndRest(counts) {
+function drawSpeedsAndRest(plot, counts) {
   const edges = film.speeds.edges.map(Math.log10), most = Math.log10(1.5 * Math.max(10, ...kinds.map(kind => kind.count)));
-  const plot = prepare($('histogram')), { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
+  const { pen } = plot, power = value => short(+(10 ** value).toPrecision(1));
   const { x, y } = axes(plot, [edges[0], edges.at(-1)], [-0.3, most], 'speed', value => Number.isInteger(value) ? power(value) : '');
   pen.globalAlpha = 0.6;
   for (const s of counted) {
     pen.fillStyle = css(speciesColour(kinds[s]));
-    counts[s].slice(1).forEach((n, bin) => n && pen.fillRect(x(edges[bin]), y(Math.log10(n)), x(edges[bin + 1]) - x(edges[bin]) - 0.5, plot.bottom - y(Math.log10(n))));
+    counts[s].slice(1, edges.length).forEach((n, bin) => n && pen.fillRect(x(edges[bin]), y(Math.log10(n)), x(edges[bin + 1]) - x(edges[bin]) - 0.5, plot.bottom - y(Math.log10(n))));
   }
   pen.globalAlpha = 1;
   $('bars').textContent = `At rest: ${counted.map(s => `${counts[s][0]} of ${kinds[s].count} ${kinds[s].name}`).join(', ')}. `
     + 'Bars: the number of disks at each speed; both axes grow by factors of ten.';
 }
 
-// ---------- energies ----------
+// ---------- energies and pressure, from the observables ----------
 
-let cursorAt;  // from time to pixels
+const ENERGIES = { kinetic: [], potential: [5, 3], rotational: [1.5, 2.5] }, DASHES = [[], [7, 2], [2, 2], [7, 2, 2, 2]];
+let cursorAt;      // from time to pixels
+let overlaid = [];  // other runs in the same plots: { letter, curves, kinds }
 
 const share = s => state.total ? kinds[s].count : 1;
+const there = () => Object.keys(ENERGIES).filter(kind => source.curves()[kind]);
+const lastOf = (name, s) => {
+  const { time, [name]: all } = source.curves(), values = s === undefined ? all : all[s];
+  return values?.[Math.max(0, upTo(time, moment.time) - 1)] ?? null;
+};
 
-function layEnergyOut() {
-  const all = [film.kinetic, ...(film.potential ? [film.potential] : [])];
-  const values = all.flatMap(series => series.flatMap(row => row.map((e, s) => e * share(s))));
-  const low = values.reduce((a, b) => Math.min(a, b), 0), high = values.reduce((a, b) => Math.max(a, b), 0) || 1;
-  const plot = prepare($('energy')), { pen } = plot;
-  const { x, y } = axes(plot, [first(), last() > first() ? last() : first() + 1], [low, low + 1.06 * (high - low)], 'time');
-  pen.lineWidth = 1.6;
-  pen.lineJoin = 'round';
-  const between = energiesBetween(x);
-  all.forEach((series, dashed) => kinds.forEach((kind, s) => {
-    const place = ([time, ...energies]) => [x(time), y(energies[dashed][s] * share(s))];
-    const at = k => [film.time[k], film.kinetic[k], film.potential?.[k]];
-    pen.fillStyle = pen.strokeStyle = css(speciesColour(kind));
-    for (const known of [true, false]) {
-      pen.setLineDash(dashed ? [4, 3] : []);
-      pen.globalAlpha = known ? 1 : 0.35;
-      pen.beginPath();
-      for (let gap = 0; gap < frames - 1; gap++) {
-        if (known === !!film.guesses[gap]) continue;
-        if (!gap || known === !!film.guesses[gap - 1]) pen.moveTo(...place(at(gap)));  // else dashes go on
-        between[gap]?.forEach(row => pen.lineTo(...place(row)));
-        pen.lineTo(...place(at(gap + 1)));
-      }
-      pen.stroke();
-    }
-    pen.globalAlpha = 1;
-    if (sparse(x)) for (let k = 0; k < frames; k++) if (film.guesses[k] || film.guesses[k - 1]) {
-      pen.beginPath();
-      pen.arc(...place(at(k)), 2.2, 0, 2 * Math.PI);
-      pen.fill();
-    }
-  }));
-  pen.setLineDash([]);
-  $('guide').textContent = film.guesses.some(count => count) && sparse(x) ? 'Dots: frames. What happens along the pale lines between them is not in this page.' : '';
-  cursorAt = x;
-  const heads = ['', 'disks', 'kinetic', ...(film.potential ? ['potential (dashed)'] : [])];
+function drawEnergies() {
+  const lines = [], add = (curves, own, letter) => {
+    for (const [name, dash] of Object.entries(ENERGIES)) curves[name]?.forEach((values, s) => lines.push({
+      time: curves.time, values: state.total ? values.map(e => e * own[s].count) : values,
+      colour: css(speciesColour(kinds[s % kinds.length])), dash, letter,
+    }));
+  };
+  for (const { letter, curves, kinds: own } of overlaid) add(curves, own, letter);
+  add(source.curves(), kinds);
+  cursorAt = plotLines($('energy'), lines, overlaid.length ? Infinity : moment.time);
+}
+
+function drawPressure() {
+  const { time, pressure } = source.curves(), colour = ink.accent;
+  const lines = overlaid.filter(({ curves }) => curves.pressure).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
+  if (pressure) lines.push({ time, values: pressure, colour });
+  $('pressures').hidden = !lines.length;
+  if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);
+  const now = pressure && lastOf('pressure');
+  $('force').textContent = now === null || now === undefined ? '' : short(now);
+}
+
+function layTableOut() {
+  const heads = ['', 'disks', ...there().map(name => name + { kinetic: '', potential: ' (dashed)', rotational: ' (dotted)' }[name])];
   const rows = kinds.map(({ name, count }) => [`<span class="chip">${safe(name)}</span>`, count, ...heads.slice(2).map(() => '')]);
   const cells = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
   $('energies').innerHTML = cells(heads, 'th') + rows.map(row => cells(row, 'td')).join('');
   $('energies').querySelectorAll('.chip').forEach((chip, s) => chip.style.setProperty('--own', css(speciesColour(kinds[s]))));
 }
 
-// Whether frames lie so far apart on the axis of time that they can be told from one another.
-const sparse = x => (x(last()) - x(first())) / frames > 6;
-
-// Of each gap with known paths that is several pixels wide, energies pixel by pixel: time, kinetic, potential.
-function energiesBetween(x) {
-  const { time } = moment, rows = [];
-  for (let gap = 0; gap < frames - 1; gap++) {
-    const start = film.time[gap], h = film.time[gap + 1] - start, steps = Math.floor(2 * (x(start + h) - x(start)));
-    if (film.guesses[gap] || steps < 3) continue;
-    rows[gap] = Array.from({ length: steps - 1 }, (_, k) => {
-      move(start + (k + 1) / steps * h);
-      return [moment.time, moment.kinetic, moment.potential];
-    });
-  }
-  move(time);
-  return rows;
+function tellEnergies() {
+  kinds.forEach((_, s) => there().forEach((name, k) => {
+    const now = name === 'rotational' ? lastOf(name, s) : moment[name][s];
+    $('energies').rows[s + 1].cells[2 + k].textContent = now === null ? '' : short(now * share(s));
+  }));
 }
 
-// ---------- pressure ----------
+// ---------- numbers of a worker, with their errors, beside what theory says ----------
 
-// Up to the moment; the rest is still to come.
-function drawPressure() {
-  if (!film.pressure) return;
-  const { time, value } = film.pressure, plot = prepare($('pressure')), { pen } = plot;
-  const high = value.reduce((a, b) => Math.max(a, b), 0) || 1, now = time.findLastIndex(t => t <= moment.time);
-  const { x, y } = axes(plot, [first(), last() > first() ? last() : first() + 1], [0, 1.06 * high], 'time');
-  pen.lineWidth = 1.6;
-  pen.strokeStyle = ink.accent;
-  for (const [from, to, alpha] of [[0, now, 1], [now, time.length - 1, 0.3]]) {
-    pen.globalAlpha = alpha;
-    pen.beginPath();
-    for (let k = Math.max(0, from); k <= to; k++) pen.lineTo(x(time[k]), y(value[k]));
-    pen.stroke();
-  }
-  pen.globalAlpha = 1;
-  $('force').textContent = now < 0 ? '' : short(value[now]);
+const withError = ({ value, error }) => value === null ? '' : !error ? short(value)
+  : `${short(+value.toFixed(clamp(1 - Math.floor(Math.log10(error)), 0, 12)))} ± ${short(+error.toPrecision(2))}`;
+
+function tellNumbers() {
+  const { temperature, mean_speed: speed, mean_pressure: pressure } = source.numbers?.() ?? {};
+  $('numbers').hidden = !temperature;
+  if (!temperature) return;
+  const row = ([name, one]) => `<tr><td>${name}</td><td>${withError(one)}</td><td>${one.theory === null ? '' : short(one.theory)}</td></tr>`;
+  $('numbers').innerHTML = '<tr><th></th><th>measured</th><th>theory</th></tr>'
+    + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
+}
+
+// ---------- events to come, of few disks ----------
+
+const meeting = ([, i, j]) => `disk ${i + 1} and ${j < 0 ? film.surfaces[-1 - j] : `disk ${j + 1}`}`;
+
+function tellQueue() {
+  if (!film.events) return;
+  const { next, happened } = source.coming();
+  $('queue').innerHTML = next.map(one => `<li>${meeting(one)}<span>t = ${long(one[0])}</span></li>`).join('');
+  $('due').textContent = next.length ? `the first in ${short(next[0][0] - moment.time)}` : '';
+  $('happened').textContent = happened ? `Happened: ${meeting(happened)}.` : ' ';
 }

@@ -3,7 +3,7 @@
 const layers = ['ground', 'disks', 'marks'].map($);
 const [ground, disksBrush, marks] = layers.map((layer, k) => layer.getContext('2d', { willReadFrequently: k === 1 }));
 let ink;                       // colours of the theme
-let picture, pixels, palette;  // the layer of the disks; its pixels as integers; the colours of disks
+let picture, pixels, palette, paper;  // the layer of the disks; its pixels as integers; the colours of disks, of the ground
 let radii;                     // in pixels
 let groundShown, marked;       // what the ground shows; whether there are marks
 
@@ -11,38 +11,67 @@ const dark = () => document.documentElement.dataset.theme === 'dark';
 const cssColour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 const css = rgb => `rgb(${rgb})`;
 
-// Colours of species and of the scale, 0 to 255; on a dark ground the darkest are lightened, but not those of one's own.
-function speciesColour({ colour, own }) {
-  const parts = [1, 3, 5].map(k => parseInt((own ?? colour).slice(k, k + 2), 16));
-  return parts.map(part => Math.round(dark() && !own ? part + 0.22 * (255 - part) : part));
+// Colours of disks have at least 3:1 of contrast with the ground, in both themes; a scale grows in luminance from end to end,
+// and species differ in it, so both can be told in grey, too.
+const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
+const LIGHTS = { false: [0.02, 0.29, [0.11, 0.28, 0.04, 0.2, 0.07]], true: [0.14, 0.85, [0.27, 0.5, 0.14, 0.38, 0.2]] };
+const toLinear = part => part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4;
+const fromLinear = part => Math.round(255 * (part <= 0.0031308 ? 12.92 * part : 1.055 * part ** (1 / 2.4) - 0.055));
+const luminance = rgb => rgb.map(toLinear).reduce((sum, part, k) => sum + part * [0.2126, 0.7152, 0.0722][k], 0);
+
+function withLuminance(rgb, wanted) {
+  const own = luminance(rgb), white = own < wanted ? (wanted - own) / (1 - own) : 0, rest = own > wanted ? wanted / own : 1;
+  return rgb.map(part => fromLinear(rest * toLinear(part) * (1 - white) + white));
+}
+
+function speciesColour(kind) {
+  const [low, high, steps] = LIGHTS[dark()], hex = kind.own ?? kind.colour;
+  const parts = [1, 3, 5].map(k => parseInt(hex.slice(k, k + 2), 16));
+  return withLuminance(parts, kind.own ? clamp(luminance(parts), low, high) : steps[kinds.indexOf(kind) % steps.length]);
 }
 
 function scaleColour(place) {
-  const k = 3 * Math.round(dark() ? 36 + place * 219 / 255 : place);
-  return viridis.slice(k, k + 3);
+  const at = place / 255 * (VIRIDIS.length - 1), k = Math.min(Math.floor(at), VIRIDIS.length - 2), [low, high] = LIGHTS[dark()];
+  return withLuminance(VIRIDIS[k].map((part, c) => part + (at - k) * (VIRIDIS[k + 1][c] - part)), low + (high - low) * place / 255);
+}
+
+// The places of the disks on the scale of a quantity at the moment, 0 to 255; nothing for species.
+const quantities = {
+  speed: i => Math.sqrt(VX[i] * VX[i] + VY[i] * VY[i]) / film.scales.speed[1],
+  displacement: i => displacement(i) / film.scales.displacement[1],
+  collisions(i) {  // by factors
+    const scale = Math.log1p(film.scales.collisions[1]), before = past[moment.frame].hits[i] / 255;
+    return HITS[i] ? Math.log1p(Math.expm1(before * scale) + HITS[i]) / scale : before;
+  },
+};
+
+function codesNow(name) {
+  const own = quantities[name];
+  return own && Uint8ClampedArray.from({ length: disks }, (_, i) => 255 * own(i));
 }
 
 function layOutStage() {
-  ink = Object.fromEntries(['ink', 'soft', 'line', 'stage', 'wall', 'obstacle', 'card', 'accent'].map(n => [n, cssColour(n)]));
-  const dots = Math.min(devicePixelRatio || 1, 2), margin = page.margin = 3 * dots, [width, height] = film.edges;
+  ink = Object.fromEntries(['ink', 'soft', 'line', 'stage', 'wall', 'obstacle', 'card', 'accent', 'hot', 'cold'].map(n => [n, cssColour(n)]));
+  const dots = Math.min(devicePixelRatio || 1, 2), margin = page.margin = (film.sides.some(actsOn) ? 10 : 3) * dots, [width, height] = film.edges;
   const room = roomOfStage();
   page.dots = dots;
   page.unit = Math.min((room.width * dots - 2 * margin) / width, (room.height * dots - 2 * margin) / height);
   page.width = Math.round(width * page.unit + 2 * margin);
   page.height = Math.round(height * page.unit + 2 * margin);
   for (const layer of layers) Object.assign(layer, { width: page.width, height: page.height });
-  Object.assign($('stage').style, { width: page.width / dots + 'px', height: page.height / dots + 'px' });
+  Object.assign($('stage').style, { width: page.width / dots + 'px', height: page.height / dots + 'px', marginRight: boxSize ? (boxSize.width - page.width / dots) / 2 + 'px' : '' });
   picture = disksBrush.createImageData(page.width, page.height);
   pixels = new Int32Array(picture.data.buffer);
-  const colours = codes[state.colour] ? Array.from({ length: 256 }, (_, k) => scaleColour(k)) : kinds.map(speciesColour);
-  palette = Int32Array.from(colours, ([r, g, b]) => 0xff000000 + (b << 16) + (g << 8) + r);
+  const colours = quantities[state.colour] ? Array.from({ length: 256 }, (_, k) => scaleColour(k)) : kinds.map(speciesColour);
+  const paperParts = [1, 3, 5].map(k => parseInt(ink.stage.slice(k, k + 2), 16));
+  [paper, ...palette] = Int32Array.from([paperParts, ...colours], ([r, g, b]) => 0xff000000 + (b << 16) + (g << 8) + r);
   groundShown = '';
-  stamps = new Map();
 }
 
 // In CSS pixels: beside the controls on a flat screen, else above them. On a telephone the view has no card of its own,
 // and between disks and controls is the histogram.
 function roomOfStage() {
+  if (boxSize) return boxSize;
   const full = document.fullscreenElement === $('view'), bare = getComputedStyle($('view')).display === 'contents';
   const frame = bare ? $('main') : $('view'), style = getComputedStyle(frame);
   const inner = size => parseFloat(style[size]) || 0;
@@ -56,19 +85,30 @@ function roomOfStage() {
 
 function drawStage() {
   aim();
-  radii = film.radii.map(radius => Math.max(0.6, radius * view.unit));
-  if (stamps.size > 2 * kinds.length) stamps = new Map();  // the zoom has changed
-  const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown)].join();
+  radii = film.radii.map(radius => Math.max(1.1, radius * view.unit));
+  const seen = [view.unit, view.x, view.y, ...sidesAt(moment.shown), slides() && moment.shown].join();
   if (groundShown !== seen) drawGround();
   groundShown = seen;
   drawDisks();
   drawMarks();
 }
 
+// A surface that heats is drawn in a colour: hot, or cold beside a hotter one; dashes slide with it. Returns whether it does either.
+const actsOn = law => !!(law && (law.temperature || law.speed));
+const laws = () => [...film.sides, ...film.laws.obstacle, ...film.laws.wall];
+const slides = () => laws().some(law => law?.speed);
+function drawLike(law, along = 1) {
+  const warmest = Math.max(...laws().map(one => one?.temperature ?? 0)), dash = 7 * page.dots;
+  ground.strokeStyle = !law?.temperature ? ink.wall : law.temperature < warmest ? ink.cold : ink.hot;
+  ground.setLineDash(law?.speed ? [dash, dash] : []);
+  ground.lineDashOffset = law?.speed ? -along * law.speed * moment.shown * view.unit % (2 * dash) : 0;
+  return actsOn(law);
+}
+
 function drawGround() {
   ground.fillStyle = ink.stage;
   ground.fillRect(0, 0, page.width, page.height);
-  const [x0, x1, y0, y1] = sidesAt(moment.shown);
+  const [x0, x1, y0, y1] = sidesAt(moment.shown), line = 1.5 * page.dots;
   inBox(ground, () => {
     if (film.sides.some(side => side.motion)) {
       ground.fillStyle = ink.obstacle;
@@ -76,36 +116,40 @@ function drawGround() {
       ground.fillStyle = ink.stage;
       copies([x0, x1], [y0, y1], (dx, dy) => ground.fillRect(across(x0 + dx), up(y1 + dy), (x1 - x0) * view.unit, (y1 - y0) * view.unit));
     }
-    for (const [x, y, radius, inside] of film.obstacles) {
+    film.obstacles.forEach(([x, y, radius, inside], k) => {
       if (inside) {
         ground.fillStyle = ink.obstacle;
         ground.fillRect(0, 0, page.width, page.height);
       }
       ground.fillStyle = inside ? ink.stage : ink.obstacle;
-      ground.strokeStyle = ink.wall;
-      ground.lineWidth = page.dots;
+      ground.lineWidth = drawLike(film.laws.obstacle[k], -radius) ? 3 * line : page.dots;
       copies([x - radius, x + radius], [y - radius, y + radius], (dx, dy) => {
         ground.beginPath();
         ground.arc(across(x + dx), up(y + dy), radius * view.unit, 0, 2 * Math.PI);
         ground.fill();
         ground.stroke();
       });
-    }
-    ground.strokeStyle = ink.wall;
-    ground.lineWidth = 1.5 * page.dots;
-    for (const [[a, b], [c, d]] of film.walls) copies([Math.min(a, c), Math.max(a, c)], [Math.min(b, d), Math.max(b, d)], (dx, dy) => {
-      ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
     });
+    film.walls.forEach(([[a, b], [c, d]], k) => copies([Math.min(a, c), Math.max(a, c)], [Math.min(b, d), Math.max(b, d)], (dx, dy) => {
+      ground.lineWidth = drawLike(film.laws.wall[k]) ? 3 * line : line;
+      ground.stroke(new Path2D(`M${across(a + dx)},${up(b + dy)}L${across(c + dx)},${up(d + dy)}`));
+    }));
   });
-  // The sides, dashed where they are periodic.
-  ground.strokeStyle = ink.wall;
-  ground.lineWidth = 1.5 * page.dots;
+  // The sides, dashed where they are periodic; what heats or slides has a band outside.
   copies([x0, x1], [y0, y1], (dx, dy) => {
     const left = across(x0 + dx), right = across(x1 + dx), bottom = up(y0 + dy), top = up(y1 + dy);
-    for (const [axis, from, to] of [[0, [left, top], [left, bottom]], [0, [right, top], [right, bottom]], [1, [left, top], [right, top]], [1, [left, bottom], [right, bottom]]]) {
-      ground.setLineDash(film.periodic[axis] ? [6 * page.dots, 5 * page.dots] : []);
-      ground.stroke(new Path2D(`M${from}L${to}`));
-    }
+    [[left, bottom, left, top], [right, bottom, right, top], [left, bottom, right, bottom], [left, top, right, top]].forEach(([a, b, c, d], k) => {
+      const out = (k % 2 ? 1 : -1) * 5 * page.dots, [x, y] = k < 2 ? [out, 0] : [0, -out], periodic = film.periodic[k >> 1];
+      if (!periodic && drawLike(film.sides[k])) {
+        ground.lineWidth = 6 * page.dots;
+        ground.stroke(new Path2D(`M${a + x},${b + y}L${c + x},${d + y}`));
+      }
+      ground.strokeStyle = ink.wall;
+      ground.lineWidth = line;
+      ground.lineDashOffset = 0;
+      ground.setLineDash(periodic ? [6 * page.dots, 5 * page.dots] : []);
+      ground.stroke(new Path2D(`M${a},${b}L${c},${d}`));
+    });
   });
   ground.setLineDash([]);
 }
@@ -129,77 +173,35 @@ function inBox(brush, action) {
 
 // ---------- disks ----------
 
-// Pixel by pixel into an array: far faster than thousands of arcs. Small disks are stamped; what a stamp looks like
-// depends on where in a pixel the centre is.
-const PHASES = 8, LARGEST_STAMP = 16;
-let stamps = new Map();  // by radius
+// Pixel by pixel into an array: far faster than thousands of arcs. Species have patterns where there is room: plain, a hole,
+// a ring, both; the paper shows up to the first, and from the second to the third share of the square of the radius.
+const SMALLEST_PATTERN = 2.5, PATTERNS = [[0, 0, 0], [0.18, 0, 0], [0, 0.25, 0.6], [0.1, 0.35, 0.65]];
 
 function drawDisks() {
-  const code = codes[state.colour] && codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
-  const { unit, x: x0, y: y0 } = view, high = page.height, stampOf = radii.map(stampFor);
-  const [left, top, right, bottom] = seenBox();
-  const clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
+  const code = codesNow(state.colour), [width, height] = film.edges, wraps = film.periodic.some(Boolean);
+  const patterns = kinds.map((_, s) => radii.map(radius => PATTERNS[radius < SMALLEST_PATTERN * page.dots ? 0 : s % PATTERNS.length]));
+  const [left, top, right, bottom] = seenBox(), clip = [Math.ceil(left), Math.ceil(top), Math.floor(right) - 1, Math.floor(bottom) - 1];
   pixels.fill(0);
   for (let i = 0; i < disks; i++) {
-    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], colour = palette[code ? code[i] : kind], x = X[i], y = Y[i];
-    if (!wraps) {
-      drawDisk((x - x0) * unit, high - (y - y0) * unit, r, colour, stampOf[size], clip);
-      continue;
-    }
-    const reach = r / unit, a1 = lastCopy(0, x - reach), b0 = firstCopy(1, y + reach), b1 = lastCopy(1, y - reach);
+    const kind = speciesOf[i], size = sizeOf[i], r = radii[size], pattern = patterns[kind][size], colour = palette[code ? code[i] : kind];
+    const x = X[i], y = Y[i], reach = r / view.unit;
+    if (!wraps) { drawDisk(across(x), up(y), r, colour, pattern, clip); continue; }
+    const a1 = lastCopy(0, x - reach), b0 = firstCopy(1, y + reach), b1 = lastCopy(1, y - reach);
     for (let a = firstCopy(0, x + reach); a <= a1; a++)
-      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, stampOf[size], clip);
+      for (let b = b0; b <= b1; b++) drawDisk(across(x + a * width), up(y + b * height), r, colour, pattern, clip);
   }
   disksBrush.putImageData(picture, 0, 0);
 }
 
-function drawDisk(x, y, radius, colour, stamp, clip) {
-  const cx = x - 0.5, cy = y - 0.5, reach = radius + 1, out = pixels;
-  if (cx + reach < clip[0] || cx - reach > clip[2] || cy + reach < clip[1] || cy - reach > clip[3]) return;
-  if (!stamp || cx - reach < clip[0] || cx + reach > clip[2] || cy - reach < clip[1] || cy + reach > clip[3]) {
-    drawPart(cx, cy, radius, colour, clip);
-    return;
-  }
-  const i = Math.floor(cx), j = Math.floor(cy), base = j * page.width + i, { list, rims, ends } = stamp;
-  const phase = PHASES * Math.floor(PHASES * (cy - j)) + Math.floor(PHASES * (cx - i)), rim = rims[phase], end = ends[phase];
-  for (let k = phase ? ends[phase - 1] : 0; k < rim; k++) out[base + list[k]] = colour;
-  for (let k = rim; k < end; k++) {
-    const edge = list[k], at = base + (edge >> 8), old = out[at];
-    if (old === 0) out[at] = colour & 0xffffff | edge << 24; else out[at] = painted(old, colour, edge & 255);
-  }
-}
-
-// A function of its own: what it hands on would make the one above slow.
-function drawPart(cx, cy, radius, colour, clip) {
-  eachPixel(cx, cy, radius, clip, (at, covered) => { pixels[at] = painted(pixels[at], colour, covered); });
-}
-
-// Of each phase the pixels inside, from where the centre is, and those on the rim: 256 times that, and how much of 255 is covered.
-function stampFor(radius) {
-  if (stamps.has(radius) || radius > LARGEST_STAMP) return stamps.get(radius);
-  const all = [], rims = [], ends = [], size = Math.ceil(radius + 2);
-  for (let phase = 0; phase < PHASES * PHASES; phase++) {
-    const rim = [], x = (phase % PHASES + 0.5) / PHASES, y = (Math.floor(phase / PHASES) + 0.5) / PHASES;
-    eachPixel(x, y, radius, [-size, -size, size, size], (at, covered) => {
-      if (covered === 255) all.push(at); else if (covered) rim.push(256 * at + covered);
-    });
-    rims.push(all.length);
-    all.push(...rim);
-    ends.push(all.length);
-  }
-  stamps.set(radius, { list: Int32Array.from(all), rims: Int32Array.from(rims), ends: Int32Array.from(ends) });
-  return stamps.get(radius);
-}
-
-// Row by row, the pixels that a disk covers, and how much of 255.
-function eachPixel(cx, cy, radius, [left, top, right, bottom], action) {
-  const reach = radius + 0.5, inner = radius > 0.5 ? (radius - 0.5) ** 2 : -1;
-  for (let j = Math.max(top, Math.ceil(cy - reach)); j <= Math.min(bottom, Math.floor(cy + reach)); j++) {
-    const dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), row = j * page.width;
-    const end = Math.min(right, Math.floor(cx + half));
-    for (let i = Math.max(left, Math.ceil(cx - half)); i <= end; i++) {
-      const square = (i - cx) * (i - cx) + dd;
-      action(row + i, square <= inner ? 255 : Math.min(255, 255 * (reach - Math.sqrt(square)) | 0));
+function drawDisk(x, y, radius, colour, [hole, from, to], [left, top, right, bottom]) {
+  const cx = x - 0.5, cy = y - 0.5, reach = radius + 0.5, whole = radius * radius, inner = (radius - 0.5) ** 2;
+  const low = Math.max(top, Math.ceil(cy - reach)), high = Math.min(bottom, Math.floor(cy + reach));
+  for (let j = low; j <= high; j++) {
+    const dd = (j - cy) * (j - cy), half = Math.sqrt(Math.max(0, reach * reach - dd)), end = Math.min(right, Math.floor(cx + half));
+    for (let i = Math.max(left, Math.ceil(cx - half)), at = j * page.width + i; i <= end; i++, at++) {
+      const square = (i - cx) * (i - cx) + dd, share = square / whole;
+      if (square > inner) pixels[at] = painted(pixels[at], colour, 255 * (reach - Math.sqrt(square)) | 0);
+      else pixels[at] = share < hole || (share > from && share < to) ? paper : colour;
     }
   }
 }
@@ -207,7 +209,6 @@ function eachPixel(cx, cy, radius, [left, top, right, bottom], action) {
 // A pixel, so far `old`, on the rim of a disk: beside other disks the colours are mixed, what they cover adds up.
 function painted(old, colour, covered) {
   const there = old >>> 24;
-  if (covered === 255) return colour;
   if (there === 0) return colour & 0xffffff | covered << 24;
   const total = Math.min(255, covered + there), part = 256 * covered / total | 0, rest = 256 - part;
   const redBlue = (Math.imul(colour & 0xff00ff, part) + Math.imul(old & 0xff00ff, rest)) >>> 8 & 0xff00ff;
@@ -226,19 +227,18 @@ function drawMarks() {
     if (angles) drawRadii();
     state.traced.forEach(drawTrace);
     if (state.arrows) drawArrows();
-    if (film.events && moment.known) drawNextEvent();
+    if (film.events) drawNextEvent();
     if (film.exact) drawNumbers();
   });
 }
 
-// A radius of each disk that is large enough for one shows how it turns; between frames evenly, as only they know its spin.
+// A radius of each disk that is large enough for one shows how it turns.
 function drawRadii() {
-  const at = moment.gap * disks, next = Math.min(moment.gap + 1, frames - 1) * disks;
   marks.strokeStyle = ink.stage;
   marks.lineWidth = 1.2 * page.dots;
   marks.beginPath();
   for (let i = 0; i < disks; i++) {
-    const length = radii[sizeOf[i]], reach = length / view.unit, angle = angles[at + i] + moment.share * (angles[next + i] - angles[at + i]);
+    const length = radii[sizeOf[i]], reach = length / view.unit, angle = angles[i];
     if (length < 3 * page.dots) continue;
     copies([X[i] - reach, X[i] + reach], [Y[i] - reach, Y[i] + reach], (dx, dy) => {
       const x = across(X[i] + dx), y = up(Y[i] + dy);
@@ -249,18 +249,32 @@ function drawRadii() {
   marks.stroke();
 }
 
-// Where a disk was in the last frames, the older part pale.
+// Where a disk was lately, the older part pale, dotted where the path is not known.
 function drawTrace(i) {
-  const recent = film.time[Math.max(0, moment.frame - 30)];
-  for (const straight of [0, 1]) {  // dotted where the path is not known
-    const part = (from, to) => flights(i, from, to).filter(flight => flight.straight === straight);
-    marks.setLineDash(straight ? [page.dots, 4 * page.dots] : []);
-    drawPath(part(film.time[Math.max(0, moment.frame - 300)], recent), ink.soft, 0.9);
-    drawPath(part(recent, moment.shown), ink.ink, 1.6);
+  const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
+  for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
+    const all = flights(i, from, to);
+    for (const guessed of [false, true]) {
+      marks.setLineDash(guessed ? [page.dots, 4 * page.dots] : []);
+      drawPath(all.filter(flight => flight.guessed === guessed), colour, width);
+    }
   }
   marks.setLineDash([]);
   marks.lineWidth = 2 * page.dots;
   ring(X[i], Y[i], Math.max(radii[sizeOf[i]], 3 * page.dots) + 2 * page.dots);
+}
+
+// The free flights of the disks to their next contact, and where they will be then.
+function drawNextEvent() {
+  const [when, ...both] = source.coming().next[0] ?? [], after = when - moment.time, g = film.gravity;
+  marks.strokeStyle = ink.accent;
+  for (const i of both.filter(k => k >= 0)) {
+    const from = [X[i], Y[i]], to = [VX[i], VY[i]].map((v, k) => from[k] + (v + 0.5 * g[k] * after) * after);
+    drawPath([{ from, to, bend: g.map(one => one * after * after / 4) }], ink.accent, 2);
+    marks.setLineDash([5 * page.dots, 4 * page.dots]);
+    ring(...to, radii[sizeOf[i]]);
+    marks.setLineDash([]);
+  }
 }
 
 function ring(x, y, radius) {
@@ -319,12 +333,12 @@ function drawArrows() {
 
 // In disks that have the room, else beside them.
 function drawNumbers() {
-  const code = codes[state.colour] && codesNow(state.colour), least = 7 * page.dots;
+  const code = codesNow(state.colour), least = 7 * page.dots;
   marks.textAlign = 'center';
   marks.textBaseline = 'middle';
   for (let i = 0; i < disks; i++) {
     const r = radii[sizeOf[i]], inside = r > least, colour = palette[code ? code[i] : speciesOf[i]];
-    const light = (colour & 255) * 0.3 + (colour >> 8 & 255) * 0.59 + (colour >> 16 & 255) * 0.11 > 140;
+    const light = luminance([0, 8, 16].map(shift => colour >> shift & 255)) > 0.2;
     const reach = (r + 2 * least) / view.unit, away = inside ? 0 : r + least;
     marks.font = `600 ${Math.min(20 * page.dots, Math.max(12 * page.dots, r))}px system-ui, sans-serif`;
     marks.fillStyle = !inside ? ink.ink : light ? '#101418' : '#ffffff';

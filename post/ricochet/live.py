@@ -1,21 +1,20 @@
-"""Show a run in the browsers of this computer while it goes on.
+"""Pages for the browsers of this computer: a server, and the newest film of a run that goes on.
 
-The file is opened anew for each look, without locks, and only what is committed is read: the run
-does not notice.  Requests that do not come from a page of this very address are refused, lest pages
-of other hosts read along under a name that points here (DNS rebinding).
+Requests that do not come from a page of this very address are refused before they cost anything,
+lest pages of other hosts read along under a name that points here (DNS rebinding).
 """
 
+import asyncio
 import json
+import logging
 import os
 import signal
-import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Callable, Mapping
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from urllib.parse import unquote
+
+from aiohttp import web
 
 from .files import RunError
 from .reader import Run, read_run
@@ -24,10 +23,98 @@ ADDRESS = "127.0.0.1"
 LOOK = 0.5  # seconds between looks whether the run has ended
 DIED = "was killed or has crashed"
 PATIENCE = 10.0  # seconds since a page last asked, after which none is left to be told the end
+LONGEST = 1_000_000  # bytes of a request
+HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+SERVER = web.AppKey("server", dict)
+
+
+# --- a server ---
+
+
+@web.middleware
+async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse:
+    """Answer a page of this server, or a person who types the address; nobody else."""
+    port = request.app[SERVER]["port"]
+    hosts = {f"{name}:{port}" for name in (ADDRESS, "localhost")}
+    if port == 80:
+        hosts |= {ADDRESS, "localhost"}
+    host = request.headers.getall("Host", [])
+    origin = request.headers.getall("Origin", [])
+    own = len(host) == 1 and host[0] in hosts
+    own &= not origin or origin == [f"http://{host[0]}"]
+    own &= request.headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")
+    if "Upgrade" in request.headers:  # browsers always say where a socket is opened
+        own &= bool(origin)
+    if not own:
+        return web.Response(status=403, text="only for pages of this server\n")
+    try:
+        return await handler(request)
+    except RunError as problem:
+        return web.Response(status=409, text=f"{problem}\n")
+
+
+def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
+    """A server with a function for each path; `frames`: whose pages may show its own as a part."""
+    app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
+    app[SERVER] = {}
+    app.add_routes([web.get(path, handler) for path, handler in paths.items()])
+
+    async def sign(_: web.Request, response: web.StreamResponse) -> None:
+        response.headers.update(HEADERS)
+        response.headers["Content-Security-Policy"] = f"frame-ancestors {frames}"
+
+    app.on_response_prepare.append(sign)
+    return app
+
+
+@asynccontextmanager
+async def serving(app: web.Application, port: int = 0):
+    """Answer requests; gives the address, and an event that Ctrl-C, TERM and HUP set.
+
+    Raises RunError if the port is taken.
+    """
+    logging.getLogger("aiohttp").setLevel(logging.CRITICAL)  # requests are of no interest
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, stop.set)
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
+    await runner.setup()
+    try:
+        site = web.TCPSite(runner, ADDRESS, port, backlog=512)
+        try:
+            await site.start()
+        except OSError as problem:
+            raise RunError(f"port {port}: {os.strerror(problem.errno)}") from None
+        app[SERVER]["port"] = runner.addresses[0][1]
+        address = f"http://{ADDRESS}:{app[SERVER]['port']}/"
+        print(f"{address}  (Ctrl-C ends)", flush=True)
+        yield address, stop
+    finally:
+        await runner.cleanup()
+
+
+def page_of(text: str) -> Callable:
+    """What answers with a page."""
+
+    async def answer(_: web.Request) -> web.Response:
+        return web.Response(text=text, content_type="text/html")
+
+    return answer
+
+
+# --- a run that goes on ---
 
 
 class Live:
-    """The newest film of a run that may still be going on."""
+    """The newest film of a run that may still be going on.
+
+    The file is opened anew for each look, without locks, and only what is committed is read: the
+    run does not notice.
+    """
 
     def __init__(self, run: Run, filmed: Callable[[Run], dict]) -> None:
         """Take the run, and what makes a film of a run."""
@@ -51,7 +138,6 @@ class Live:
     def answer(self, known: str) -> tuple[bytes, bool]:
         """What a page does not know yet, nothing if there is nothing new; whether it is the end."""
         with self.lock:
-            self.asked = time.monotonic()
             end = self.end
             # Caught at an unlucky moment, as when the file is renamed: the next look will do.
             with suppress(RunError, FileNotFoundError):
@@ -63,6 +149,16 @@ class Live:
                     self.stamp = stamp
             ends = bool(end) and self.stamp.endswith(end)
             return b"" if known == self.stamp else self.news, ends
+
+    async def film(self, request: web.Request) -> web.StreamResponse:
+        """Answer a page that asks."""
+        self.asked = asyncio.get_running_loop().time()
+        news, ends = await asyncio.to_thread(self.answer, request.query.get("known", ""))
+        response = web.Response(body=news, content_type="application/json")
+        await response.prepare(request)
+        await response.write_eof()
+        self.delivered = self.delivered or ends  # only now: then the server leaves
+        return response
 
 
 def abandoned(lock: Path) -> bool:
@@ -86,114 +182,6 @@ def abandoned(lock: Path) -> bool:
         os.close(descriptor)
 
 
-class Server(ThreadingHTTPServer):
-    """A thread for each connection."""
-
-    daemon_threads = True
-
-    def handle_error(self, *_) -> None:
-        """A connection that breaks is of no interest; anything else is one line."""
-        problem = sys.exception()
-        if not isinstance(problem, ConnectionError):
-            print(f"a request was not answered: {problem!r}", file=sys.stderr)
-
-
-class Handler(BaseHTTPRequestHandler):
-    """Answers pages of this computer, and nobody else."""
-
-    server_version, sys_version = "ricochet", ""
-    timeout = 60  # seconds that a request may take to arrive
-    frames = "'none'"  # whose pages may show this one as a part
-
-    def found(self, path: str, query: str) -> tuple[int, str, bytes]:
-        """Status, kind and body of what is at a path."""
-        raise NotImplementedError
-
-    def do_GET(self) -> None:
-        path, _, query = self.path.partition("?")
-        if self.headers.get_all("Host") not in ([host] for host in self.hosts):
-            self.reply(403, "text/plain", b"only for pages of this computer\n")
-        else:
-            self.reply(*self.found(path, query))
-
-    @property
-    def hosts(self) -> list[str]:
-        """The names of this server."""
-        port = self.server.server_address[1]
-        return [f"{ADDRESS}:{port}", f"localhost:{port}"]
-
-    def send_error(self, code: int, *_) -> None:
-        """Whatever it is that http.server does not understand, it is the request."""
-        self.close_connection = True
-        self.reply(code if code < 500 else 400, "text/plain", b"not understood\n")
-
-    def reply(self, code: int, kind: str, body: bytes) -> None:
-        self.request_version = "HTTP/1.0"  # else some answers would have no status
-        self.send_response(code)
-        for name, value in (
-            ("Content-Type", kind),
-            ("Content-Length", str(len(body))),
-            ("Cache-Control", "no-store"),
-            ("X-Content-Type-Options", "nosniff"),
-            ("Cross-Origin-Resource-Policy", "same-origin"),
-            ("Content-Security-Policy", f"frame-ancestors {self.frames}"),
-        ):
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, *_) -> None:
-        """Nothing: requests are of no interest."""
-
-
-NOT_FOUND = 404, "text/plain", b"no such page\n"
-HTML, JSON = "text/html; charset=utf-8", "application/json"
-
-
-def handler(live: Live, page: bytes) -> type[Handler]:
-    """What answers the requests: the page at /, what is new at /film."""
-
-    class Show(Handler):
-        ends = False  # whether the answer tells that the run has ended
-
-        def do_GET(self) -> None:
-            super().do_GET()
-            live.delivered = live.delivered or self.ends  # only now: then the server leaves
-
-        def found(self, path: str, query: str) -> tuple[int, str, bytes]:
-            match path:
-                case "/":
-                    return 200, HTML, page
-                case "/film":
-                    news, self.ends = live.answer(unquote(query.removeprefix("known=")))
-                    return 200, JSON, news
-            return NOT_FOUND
-
-    return Show
-
-
-@contextmanager
-def serving(answers: type[Handler], port: int = 0) -> Iterator[str]:
-    """Answer requests, and print the address; Ctrl-C, TERM, HUP are KeyboardInterrupt meanwhile.
-
-    Raises RunError if the port is taken.
-    """
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
-    try:
-        server = Server((ADDRESS, port), answers)
-    except OSError as problem:
-        raise RunError(f"port {port}: {problem.strerror}") from None
-    with server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://{ADDRESS}:{server.server_address[1]}/"
-        try:
-            print(f"{address}  (Ctrl-C ends)", flush=True)
-            yield address
-        finally:
-            server.shutdown()
-
-
 def serve(
     run: Run, page: str, filmed: Callable[[Run], dict], visit: Callable[[str], object] | None = None
 ) -> str:
@@ -207,14 +195,23 @@ def serve(
     live = Live(run, filmed)
     if live.end:
         raise RunError(f"{run.path}: the run {live.end}; leave out --live")
-    with suppress(KeyboardInterrupt), serving(handler(live, page.encode())) as address:
-        if visit:
-            visit(address)
-        while not live.end:
-            time.sleep(LOOK)
-        while not live.delivered and time.monotonic() < live.asked + PATIENCE:
-            time.sleep(LOOK)
+    asyncio.run(shown(live, page, visit))
     end, left = live.end, live.part if live.part.exists() else live.final
     if end == DIED:
         raise RunError(f"{left}: the run {end}")
     return f"the run {end}: {left}" if end else "stopped; the run goes on"
+
+
+async def shown(live: Live, page: str, visit: Callable[[str], object] | None) -> None:
+    """Serve the page until the end of the run has been told, or until a signal."""
+    app = application({"/": page_of(page), "/film": live.film})
+    async with serving(app) as (address, stop):
+        if visit:
+            threading.Thread(target=visit, args=[address], daemon=True).start()
+        clock = asyncio.get_running_loop().time
+        while not stop.is_set():
+            told = live.delivered or clock() > live.asked + PATIENCE
+            if live.end and told:
+                break
+            with suppress(TimeoutError):
+                await asyncio.wait_for(stop.wait(), LOOK)

@@ -7,7 +7,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-needed = ("numpy", "h5py", "matplotlib", "scipy", "tqdm")
+needed = ("numpy", "h5py", "matplotlib", "scipy", "tqdm", "aiohttp")
 missing = [name for name in needed if not find_spec(name)]
 if missing:
     script, root = Path(sys.argv[0]).resolve(), Path(__file__).resolve().parents[2]

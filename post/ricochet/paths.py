@@ -41,7 +41,7 @@ class Turns:
     disk: np.ndarray  # (M,) indices
     time: np.ndarray  # (M,)
     place: np.ndarray  # (M, 2) without jumps at periodic sides since the first frame
-    gain: np.ndarray  # (M,) change of the kinetic energy of the disk
+    velocity: np.ndarray  # (M, 2) afterwards
     guessed: np.ndarray  # (N,) bool: disks whose paths are not known
 
 
@@ -101,13 +101,12 @@ class Paths:
         after = a.velocity[disk] + running(kick, first)  # without what gravity adds
         before, t = after - kick, t[:, None]
         place = a.position[disk] + running(before * flight[:, None], first) + 0.5 * t**2 * g
-        gain = self.run.mass[disk] * np.sum(kick * (before + t * g + 0.5 * kick), axis=1)
         goal = place[last] + (h - t[last]) * (after[last] + 0.5 * (h + t[last]) * g)
         guessed[disk[last]] = ~self.arrives(disk[last], goal, end[disk[last]])
         guessed |= bool(self.run.nature & KICKED)
         known = ~guessed[disk]
         self.most -= known.sum()
-        return Turns(disk[known], time[known], place[known], gain[known], guessed)
+        return Turns(disk[known], time[known], place[known], (after + t * g)[known], guessed)
 
     def arrives(self, disk: np.ndarray | slice, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(M,) whether places of these disks agree, by their sizes."""

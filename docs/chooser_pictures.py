@@ -1,0 +1,99 @@
+"""Draw the pictures of the laboratory's chooser, input/pictures/NAME.png, of a few kB each.
+
+    python docs/chooser_pictures.py [NAME...]
+
+Each shows its input at the time that input/chooser.json says; few disks with their paths.  A
+picture holds the digest of the input that it shows, by which a test sees whether it is of now.
+"""
+
+import hashlib
+import io
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from PIL import Image, PngImagePlugin
+
+INPUTS = Path(__file__).resolve().parents[1] / "input"
+PIXELS, FEW = 144, 20
+SPECIES = ("#0072b2", "#d55e00", "#009e73")
+#: The only colours of a picture: greys, and the disks' with what is between them and white.
+PALETTE = [g for grey in (77, 130, 204, 255) for g in (grey,) * 3] + [
+    round(255 + share * (int(colour[k : k + 2], 16) - 255))
+    for colour in SPECIES
+    for share in (1, 0.66, 0.33)
+    for k in (1, 3, 5)
+]
+
+
+def digest(path: Path, at: float) -> str:
+    """Of what the program reads of an input, without comments, and of the time."""
+    lines = [line.split("!")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    return hashlib.sha256("\n".join([*filter(None, lines), repr(float(at))]).encode()).hexdigest()
+
+
+def picture(path: Path, at: float) -> bytes:
+    """The disks at a time, as PNG."""
+    from ricochet import Simulation
+    from ricochet.reader import obstacles_of, walls_of
+
+    figure = Figure(figsize=(1.6, 1.6), dpi=2 * PIXELS / 1.6, layout="none")
+    axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
+    with Simulation(path) as run:
+        box, groups = run.parameters["box"], run.parameters
+        way = [run.position.copy()]
+        for time in np.linspace(0, at, 401 if run.count <= FEW else 2)[1:]:
+            way.append(run.advance(time=time).position)
+        lower, upper = (np.asarray(box[end], float) for end in ("lower", "upper"))
+        axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.3", lw=0.8))
+        for one in obstacles_of({k: np.asarray(v) for k, v in groups.get("obstacle", {}).items()}):
+            colour = "none" if one.inside else "0.8"
+            axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
+        walls = walls_of({k: np.asarray(v) for k, v in groups.get("wall", {}).items()})
+        axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
+        least = min(0.006, 0.2 / np.sqrt(run.count)) * np.max(upper - lower)
+        size = 2 * np.maximum(run.radius, least)
+        colours = [SPECIES[(k - 1) % len(SPECIES)] for k in run.species]
+        if run.count <= FEW:
+            way = np.array(way)
+            jumps = (
+                np.abs(np.diff(way, axis=0)).max(axis=2, keepdims=True) > (upper - lower).min() / 2
+            )
+            way[1:][np.broadcast_to(jumps, way[1:].shape)] = np.nan
+            for k in range(run.count):
+                axes.plot(*way[:, k].T, color=colours[k], lw=0.6)
+        circles = EllipseCollection(
+            size, size, 0 * size, units="xy", offsets=run.position, offset_transform=axes.transData
+        )
+        circles.set(facecolor=colours, edgecolor="none")
+        axes.add_collection(circles)
+    axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal")
+    axes.set_axis_off()
+    large, file = io.BytesIO(), io.BytesIO()
+    figure.savefig(large, format="png")
+    small = Image.open(large).convert("RGB").resize((PIXELS, PIXELS), Image.Resampling.LANCZOS)
+    notes = PngImagePlugin.PngInfo()
+    notes.add_text("input", digest(path, at))
+    colours = Image.new("P", (1, 1))
+    colours.putpalette(PALETTE)
+    small.quantize(palette=colours, dither=Image.Dither.NONE).save(
+        file, format="png", optimize=True, pnginfo=notes
+    )
+    return file.getvalue()
+
+
+def main() -> None:
+    known = json.loads((INPUTS / "chooser.json").read_text(encoding="utf-8"))
+    (INPUTS / "pictures").mkdir(exist_ok=True)
+    for name in sys.argv[1:] or known:
+        data = picture(INPUTS / f"{name}.nml", known[name]["at"])
+        (INPUTS / f"pictures/{name}.png").write_bytes(data)
+        print(f"input/pictures/{name}.png: {len(data)} bytes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,465 @@
+"""The process behind a page of the laboratory: one simulation, and frames of it as they are made.
+
+It is told what to do by lines of JSON on its input, and answers on its output: a letter, the length
+as four bytes, and a text in JSON (t) or a frame (b).  A frame has, in this order and in the byte
+order of the machine: time, collisions per disk and the places of the left, right, bottom and top
+side as 8-byte floats; then as 4-byte floats x and y of all disks, their velocities, and their
+angles if they turn.
+
+Whatever is changed on the way is changed at a time that has been reached with all its events, so
+that `script` can do the same again, to the last bit.
+"""
+
+import base64
+import ctypes
+import json
+import os
+import re
+import resource
+import select
+import signal
+import struct
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from . import hard_disks
+from .program import ProgramError
+from .reader import Run, obstacles_of, walls_of
+from .simulation import NEVER, Simulation
+from .statistics import equilibration, series_mean
+
+DISKS = 20000  # of a run
+MEMORY = 2 << 30  # bytes of a process
+INTERVAL = 1 / 60  # s between two frames
+SLICE = 0.012  # s that the engine may take before it looks up
+AHEAD = 2  # frames that the page has not drawn yet
+SPEAK = 0.1  # s between two messages with numbers
+FEW = 20  # disks whose events to come are told
+COMING = 6  # of them
+FEWEST = 40  # samples of a mean with an error
+MOST = 4000  # samples that are kept
+LOOK = 1.0  # s that a value of a scan takes
+TURNS = "angular_velocity"
+UNREAD = bytearray()  # of a line that has not come to its end
+DEATH = 1  # prctl's PR_SET_PDEATHSIG
+
+
+class Bench:
+    """A simulation, and how fast it is shown."""
+
+    def __init__(self, pictured: Callable[[Run], tuple[dict, dict]]) -> None:
+        """`pictured` makes of a run what stays as it is in a picture: facts, blocks of bytes."""
+        self.pictured = pictured
+        self.simulation: Simulation | None = None
+        self.playing, self.ended, self.reason = False, False, ""
+        self.pace = 0.0  # of time, per second
+        self.due = self.spoken = time.perf_counter()
+        self.unseen = 0  # frames on the way to the page
+        self.actions: list[tuple[float, str, object]] = []  # since the start: time, what, value
+        self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
+        self.happened: tuple | None = None
+
+    # --- what it is told ---
+
+    def start(self, wish: dict) -> None:
+        """Another simulation in the place of this one, if it can be."""
+        tell({"is": "starting"})
+        other = Simulation.__new__(Simulation)
+        try:
+            other._begin(wish["text"], told(wish["settings"]))
+            if other.count > DISKS:
+                raise ProgramError(f"{other.count} disks; here a run may have {DISKS}", 2)
+        except (ProgramError, ValueError) as problem:
+            tell({"is": "problems", "change": False, "problems": problems(str(problem))})
+            return
+        if self.simulation:
+            self.simulation.close()
+        self.simulation, self.wish, self.initial = other, wish, other.input
+        self.actions, self.ended, self.reason = [], False, ""
+        self.playing, self.pace = bool(wish["playing"]), wish["pace"] or 0.0
+        self.unseen = 0
+        self.renew(changed=False)
+
+    def renew(self, changed: bool) -> None:
+        """Show what is there now, of which something but the state is new."""
+        run = self.run = pictured_run(self.simulation)
+        self.settles = run.nature.in_equilibrium
+        self.samples.clear()
+        self.names = set(self.simulation.observables)
+        facts, blocks = self.pictured(run)
+        letters = {name: base64.b64encode(block).decode() for name, block in blocks.items()}
+        speed = run.speed(0)
+        facts |= {
+            "top": float(1.5 * np.sqrt(2 * np.mean(speed**2)) or 1.0),
+            "rest": float(np.mean(speed == 0)),
+            "turning": TURNS in run.elements,
+            "stepped": bool(run.time_step),
+        }
+        scene = {"is": "scene", "changed": changed, "run": self.wish["run"]}
+        tell(scene | {"facts": facts, "blocks": letters, "command": self.wish["command"]})
+        self.show()
+        self.speak()
+        self.tell_state()
+
+    def change(self, wish: dict) -> None:
+        """Let something else act on the disks from now on."""
+        self.act(
+            ("change", wish["settings"]),
+            lambda: self.simulation._change(told(wish["settings"])),
+        )
+
+    def heat(self, wish: dict) -> None:
+        """Multiply all velocities."""
+        factor = float(wish["factor"])
+        self.act(("heat", factor), lambda: speed_up(self.simulation, factor))
+
+    def act(self, action: tuple[str, object], change: Callable[[], object]) -> None:
+        """Do something at a time that can be reached again."""
+        now = self.simulation.time
+        try:
+            self.simulation.advance(time=now)
+            change()
+        except (ProgramError, ValueError) as problem:
+            tell({"is": "problems", "change": True, "problems": problems(str(problem))})
+            return
+        self.actions.append((now, *action))
+        self.renew(changed=True)
+
+    def play(self, _: dict) -> None:
+        """Go on."""
+        self.playing, self.due = True, time.perf_counter()
+        self.tell_state()
+
+    def pause(self, _: dict) -> None:
+        """Stand still."""
+        self.playing = False
+        self.speak()
+        self.tell_state()
+
+    def set_pace(self, wish: dict) -> None:
+        """So much time passes in a second."""
+        self.pace = max(0.0, float(wish["pace"]))
+
+    def got(self, _: dict) -> None:
+        """The page has drawn a frame."""
+        self.unseen = max(0, self.unseen - 1)
+
+    def step(self, wish: dict) -> None:
+        """Go on by some time, and stand still."""
+        self.playing = False
+        self.advance(self.simulation.time + float(wish["time"]), NEVER, wait=True)
+
+    def event(self, _: dict) -> None:
+        """Go on by one event, and stand still."""
+        self.playing = False
+        if not self.run.time_step and (coming := self.simulation.next_events(1)):
+            self.happened = coming[0]
+        self.advance(np.inf, self.simulation.events + 1, wait=True)
+
+    def keep(self, wish: dict) -> None:
+        """What the run was, as a file: `input`, `script` or `output`."""
+        kind, body = wish["part"], None
+        name = self.wish["input"]
+        if kind == "input":
+            body = (self.simulation.input if self.actions else self.initial).encode()
+        elif kind == "script":
+            body = script(name, self.initial, self.actions, self.simulation.time).encode()
+        elif kind == "output":
+            with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
+                body = self.simulation.save(Path(folder) / f"{name}.h5").read_bytes()
+        tell({"is": "file", "bytes": len(body)})
+        send(b"f", body)
+
+    # --- what it does ---
+
+    def moves(self) -> bool:
+        """Whether it is to go on now."""
+        ready = self.simulation and self.playing and not self.ended and self.pace > 0
+        return bool(ready and self.unseen < AHEAD)
+
+    def go_on(self) -> None:
+        """To the time of the next frame, or as far as the engine comes in a while."""
+        now = time.perf_counter()
+        passed, self.due = min(now - self.due, 0.1), now
+        self.advance(self.simulation.time + self.pace * passed, NEVER)
+
+    def advance(self, until: float, events: int, wait: bool = False) -> None:
+        """Advance, and show where that has led."""
+        try:
+            while self.simulation._go_on((until, NEVER, events), SLICE) and wait:
+                pass
+        except ProgramError as problem:
+            self.ended, self.reason = True, str(problem)
+        self.show()
+        if self.ended or not self.playing or time.perf_counter() > self.spoken + SPEAK:
+            self.speak()
+        if self.ended or wait:
+            self.tell_state()
+
+    def show(self) -> None:
+        """Send a frame."""
+        run, simulation = self.run, self.simulation
+        now = simulation.time
+        lower, upper = run.sides_at(now)
+        head = [now, 2 * simulation.collisions / run.count, lower[0], upper[0], lower[1], upper[1]]
+        parts = [simulation.position, simulation.velocity]
+        if TURNS in run.elements:
+            parts.append(simulation.orientation)
+        body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
+        send(b"b", struct.pack("6d", *head) + body)
+        self.unseen += 1
+        if run.count <= FEW and not run.time_step and not self.ended:
+            coming = simulation.next_events(COMING)
+            tell({"is": "events", "next": coming, "happened": self.happened})
+            self.happened = None
+
+    def tell_state(self) -> None:
+        """What it does, and what was changed on the way."""
+        changes = [
+            (when, name, value)
+            for when, what, values in self.actions
+            for name, value in (
+                values.items() if what == "change" else [("all velocities", f"times {values:g}")]
+            )
+        ]
+        state = {"playing": self.playing, "ended": self.ended, "reason": self.reason}
+        tell({"is": "state", "changes": changes} | state)
+
+    def speak(self) -> None:
+        """The energies of now, and means with errors since something was changed."""
+        self.spoken = time.perf_counter()
+        now, seen = self.simulation.time, self.simulation._observed()
+        run, value = self.run, {name: part[0].item() for name, part in seen.items()}
+        energies = {
+            kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
+            for kind in ("kinetic", "potential", "rotational")
+        }
+        if not run.gravity.any():
+            energies["potential"] = None
+        if TURNS not in run.elements:
+            energies["rotational"] = None
+        sample = (now, value["all/temperature"], value["all/mean_speed"], value["virial"])
+        if not self.samples or now > self.samples[-1][0]:
+            self.samples.append(sample)
+        hit = value["collisions"] > 0
+        pressure = value["pressure"] if hit else None
+        tell(
+            {"is": "numbers", "time": now, "pressure": pressure, "settles": self.settles}
+            | energies
+            | means(run, np.array(self.samples).T, value, self.settles)
+        )
+
+
+# --- numbers ---
+
+
+def pictured_run(simulation: Simulation) -> Run:
+    """The present moment as a run with one frame."""
+    parameters = simulation.parameters
+    box, kinds = parameters["box"], parameters["species"]
+    lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
+    elements = {}
+    if "all/rotational_energy" in simulation.observables:
+        elements[TURNS] = simulation.angular_velocity[None]
+    run = Run(
+        path=Path(simulation.parameters.get("run", {}).get("title") or "simulation"),
+        time=np.array([simulation.time]),
+        position=simulation.position[None],
+        velocity=simulation.velocity[None],
+        image=None,
+        collisions=None,
+        elements=elements,
+        mass=simulation.mass,
+        radius=simulation.radius,
+        species=simulation.species,
+        names=tuple(kinds),
+        lower=lower,
+        edges=upper - lower,
+        periodic=np.array([kind == "periodic" for kind in box["boundary"]]),
+        obstacles=obstacles_of(parameters.get("obstacle", {})),
+        walls=walls_of(parameters.get("wall", {})),
+        parameters=parameters,
+        provenance={},
+    )
+    run.__dict__["nature"] = simulation.nature
+    return run
+
+
+def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
+    """Temperature, mean speed and pressure: value, error, and what theory has for them.
+
+    Of what settles they are means over the time since it has settled, with the error of its
+    series; else the values of now.  The pressure is between first and last of these samples.
+    """
+    time, kt, speed, virial = samples
+    found = {
+        "temperature": (value["all/temperature"], None),
+        "mean_speed": (value["all/mean_speed"], None),
+        "mean_pressure": (None, None),
+    }
+    if settles and len(time) >= FEWEST:
+        first = max(equilibration(kt), equilibration(speed))
+        apart = np.diff(time[first:])
+        if len(apart) >= FEWEST // 2:
+            area = run.count * kt[-1] + virial[-1] / (2 * time[-1])
+            area /= value["pressure"] or 1.0  # the observable is their ratio
+            force = (run.count * kt[first + 1 :] * apart + np.diff(virial[first:]) / 2) / area
+            for name, one in (
+                ("temperature", series_mean(kt[first:])),
+                ("mean_speed", series_mean(speed[first:])),
+                ("mean_pressure", series_mean(force, apart)),
+            ):
+                known = one.mean, one.error
+                found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
+    theory = dict.fromkeys(found)
+    if settles and len(run.by_species) == 1 and run.by_species[0].alike:
+        now, mass = found["temperature"][0], run.mass[0]
+        theory["mean_speed"] = float(np.sqrt(np.pi * now / (2 * mass)))
+        if run.periodic.all() and not run.nature & {"obstructed", "stepped"} and run.count > FEW:
+            area = float(np.prod(run.edges))
+            eta = float(np.pi * np.sum(run.radius**2)) / area
+            theory["mean_pressure"] = float(hard_disks.henderson(eta)) * run.count * now / area
+    return {
+        name: {"value": mean, "error": error, "theory": theory[name]}
+        for name, (mean, error) in found.items()
+    }
+
+
+# --- what it hears and says ---
+
+
+def told(settings: dict[str, str]) -> list[str]:
+    """GROUP.VARIABLE=VALUE of each, as --set has it."""
+    lines = [f"{name}={value}" for name, value in settings.items()]
+    if any("\n" in line or "\r" in line for line in lines):
+        raise ValueError("a value has no line ends")
+    return lines
+
+
+def problems(message: str) -> list[dict]:
+    """The program's lines, each with the variable that it is about, as --set names it."""
+    found = []
+    for line in message.splitlines():
+        place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
+        found.append({"place": place, "text": line.split(": ", 2)[-1], "limit": None})
+    return found
+
+
+def value_of(text: str) -> object:
+    """What Python has for a value as --set has it."""
+    found = []
+    for word in re.split(r"\s*,\s*", text.strip()):
+        try:
+            found.append(float(re.sub("[dD]", "e", word)))
+        except ValueError:
+            truth = {".true.": True, ".false.": False}
+            found.append(truth.get(word.lower(), word.strip("'\"")))
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def speed_up(simulation: Simulation, factor: float) -> None:
+    """Multiply all velocities."""
+    simulation.velocity = factor * simulation.velocity
+
+
+def script(name: str, text: str, actions: list[tuple], end: float) -> str:
+    """A script that does the same again, up to a time."""
+    lines = [f'"""What was done with {name} in the laboratory, to the last bit."""', ""]
+    quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
+    lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
+    lines += ["with Simulation(INPUT) as simulation:"]
+    for when, what, value in actions:
+        lines.append(f"    simulation.advance(time={when!r})")
+        if what == "heat":
+            lines.append(f"    simulation.velocity = {value!r} * simulation.velocity")
+        else:
+            values = {name: value_of(text) for name, text in value.items()}
+            lines.append(f"    simulation.change({values!r})")
+    lines.append(f"    simulation.advance(time={end!r})")
+    lines.append("    print(simulation.time, simulation.position, sep=chr(10))")
+    return "\n".join(lines) + "\n"
+
+
+def send(kind: bytes, body: bytes) -> None:
+    """One answer."""
+    sys.stdout.buffer.write(kind + struct.pack(">I", len(body)) + body)
+    sys.stdout.buffer.flush()
+
+
+def tell(message: dict) -> None:
+    """One answer in words."""
+    send(b"t", json.dumps(message, allow_nan=False).encode())
+
+
+def wishes(wait: float | None) -> list[dict]:
+    """What has been asked for meanwhile; waits so long if that is nothing, None for ever."""
+    if select.select([0], [], [], wait)[0]:
+        news = os.read(0, 1 << 20)
+        if not news:
+            sys.exit()  # the laboratory has ended
+        UNREAD.extend(news)
+    *lines, rest = UNREAD.split(b"\n")
+    UNREAD[:] = rest
+    return list(map(json.loads, lines))
+
+
+def scan(wish: dict) -> None:
+    """Runs with one variable at some values, and what was measured in each."""
+    for index, value in enumerate(wish["values"]):
+        lines = told(wish["settings"] | {wish["variable"]: value})
+        try:
+            found = measured(wish["text"], lines, wish["of"])
+        except (ProgramError, ValueError) as problem:
+            tell({"is": "scan", "index": index, "text": str(problem).splitlines()[0]})
+            return
+        tell({"is": "scan", "index": index, "mean": found[0], "error": found[1]})
+
+
+def measured(text: str, lines: list[str], name: str) -> tuple[float, float]:
+    """Mean of an observable in the second half of a few seconds, and its error."""
+    simulation, values, began = Simulation.__new__(Simulation), [], time.perf_counter()
+    simulation._begin(text, lines)
+    with simulation:
+        step = max(1, simulation.count // 2)
+        while time.perf_counter() < began + LOOK or len(values) < 2 * FEWEST:
+            values.append(float(np.sum(simulation.observable(name))))
+            collisions = simulation.collisions
+            simulation._go_on((np.inf, collisions + step, NEVER), LOOK / FEWEST)
+            if time.perf_counter() > began + 4 * LOOK:
+                break
+    one = series_mean(np.array(values[len(values) // 2 :]))
+    return float(one.mean), float(one.error) if np.isfinite(one.error) else 0.0
+
+
+def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
+    """Do what is asked for until the laboratory ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the laboratory that ends
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+    bench = Bench(pictured)
+    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace}
+    runs = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
+    tell({"is": "ready"})
+    while True:
+        wait = None
+        if bench.moves():
+            wait = max(0.0, bench.due + INTERVAL - time.perf_counter())
+        for wish in wishes(wait):
+            action = wish.get("do")
+            try:
+                if action in does:
+                    does[action](wish)
+                elif action in runs and bench.simulation:
+                    getattr(bench, action)(wish)
+            except (AttributeError, LookupError, TypeError, ValueError) as problem:
+                tell({"is": "state", "reason": f"not understood: {problem}"})
+        if bench.moves() and time.perf_counter() >= bench.due + INTERVAL:
+            bench.go_on()

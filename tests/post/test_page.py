@@ -1,0 +1,223 @@
+"""The laboratory's page: what it offers of each input, and that everybody can see and use it."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from itertools import pairwise
+
+import pytest
+from PIL import Image
+
+import player
+from ricochet import Simulation
+from ricochet.lab import form
+from synthetic_run import ROOT
+from whole_runs import PATIENCE, wait_for
+
+INPUTS = sorted((ROOT / "input").glob("*.nml"))
+CHOOSER = json.loads((ROOT / "input/chooser.json").read_text())
+
+
+def test_every_input_has_its_place_in_the_chooser_and_a_picture_of_now():
+    source = ROOT / "docs/chooser_pictures.py"
+    spec = importlib.util.spec_from_file_location("chooser_pictures", source)
+    pictures = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pictures)
+    assert {path.stem for path in INPUTS} == CHOOSER.keys()
+    assert [one["name"] for one in player.chooser(INPUTS)] == list(CHOOSER)
+    for path in INPUTS:
+        own, drawn = CHOOSER[path.stem], ROOT / f"input/pictures/{path.stem}.png"
+        assert own["title"] and own["subject"] and own["sentence"].endswith((".", "?"))
+        assert drawn.stat().st_size < 10_000
+        shown = Image.open(drawn).text["input"]
+        message = f"make it anew: python docs/chooser_pictures.py {path.stem}"
+        assert shown == pictures.digest(path, own["at"]), message
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
+def test_both_ends_of_each_slider_run(path, monkeypatch, program):
+    monkeypatch.setenv("RICOCHET", str(program))
+    given = {group["place"]: group["given"] for group in form(path)["groups"]}
+    assert len(CHOOSER[path.stem]["sliders"]) == 5
+    for name, words, *ends in CHOOSER[path.stem]["sliders"]:
+        assert not set("&_'") & set(words), "in words, not in names of variables"
+        variable, _, component = name.removesuffix("]").partition("[")
+        place, _, own = variable.rpartition(".")
+        for end in ends[:2]:
+            value = end
+            if component:
+                value = [*map(float, given.get(place, {}).get(own, "0,0").split(","))]
+                value[int(component)] = end
+            with Simulation(path, {variable: value}) as run:
+                run.advance(time=1e-3)
+
+
+def test_disks_can_be_told_from_both_grounds_and_species_in_grey(simulated, browser, tmp_path):
+    """By 3 to 1, as WCAG 2.2 has it for pictures (1.4.11)."""
+    species = "".join(f"&species count = 3 radius = 0.0{k} speed = 1 /\n" for k in (1, 2, 3, 4))
+    run = simulated(species + "&stop time = 1 /\n")
+    (tmp_path / "film.html").write_text(player.whole(run))
+    browser.open(tmp_path / "film.html")
+    for dark in (False, True):
+        ground, disks, scale = browser.run(
+            """theme(arguments[0]); refresh();
+            const paper = [1, 3, 5].map(k => parseInt(ink.stage.slice(k, k + 2), 16));
+            const scale = Array.from({ length: 256 }, (_, k) => scaleColour(k));
+            return [[paper], kinds.map(speciesColour), scale].map(all => all.map(luminance));""",
+            dark,
+        )
+        for one in disks + scale:
+            low, high = sorted((one, ground[0]))
+            assert (high + 0.05) / (low + 0.05) >= 3
+        assert scale[::8] == sorted(scale[::8])
+        greys = sorted(disks)
+        assert all(b + 0.05 > 1.25 * (a + 0.05) for a, b in pairwise(greys))
+
+
+# --- the page at work ---
+
+
+@pytest.fixture
+def opened(browser, program, tmp_path, monkeypatch):
+    """The laboratory, with its first run moving."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    command = [sys.executable, ROOT / "post/lab.py", "--no-open"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    try:
+        browser.open(process.stdout.readline().split()[0])
+        yield moving(browser)
+        assert browser.complaints() == []
+    finally:
+        browser.open("about:blank")
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+
+
+def inside(browser, what):
+    """Something of the newest film."""
+    return browser.run(f"return filmOf(current()).inside().{what}")
+
+
+def moving(browser, than=0):
+    """Wait until there is a newer run than this one, and its disks move."""
+    seen = "const box = current(); return box?.run > arguments[0] && !busy && !again"
+    wait_for(lambda: browser.run(seen + " && filmOf(box).inside().moment.time > 0", than))
+    return browser
+
+
+def slide(browser, number, place):
+    """Drag a slider of the form."""
+    act = """const range = document.querySelectorAll('.slider [type=range]')[arguments[0]];
+    range.value = arguments[1]; range.dispatchEvent(new Event('input'));"""
+    browser.run(act, number, place)
+
+
+def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
+    before, time = opened.run("return current().run"), inside(opened, "moment.time")
+    slide(opened, 3, 500)  # restitution
+    wait_for(lambda: opened.run("return current().changes.length"))
+    assert opened.run("return current().run") == before and inside(opened, "moment.time") >= time
+    when, name, value = opened.run("return current().changes.at(-1)")
+    assert when >= time and name == "contact.restitution" and float(value) == 0.65
+    assert "contact.restitution = 0.65" in opened.run("return $('changes').textContent")
+    assert inside(opened, "film.settles") is False, "no Maxwell curve any more"
+    opened.run("$('heat').querySelector('button:last-of-type').click()")
+    wait_for(lambda: opened.run("return current().changes.length") == 2)
+    slide(opened, 1, 500)  # number of disks
+    moving(opened, before)
+    assert inside(opened, "kinds[0].count") == int(opened.run("return textOf('species.gas.count')"))
+    assert "number of disks = " in opened.run("return current().words")
+    assert opened.run("return current().changes.length") == 0
+
+
+def test_a_value_that_cannot_be_waits_alone(opened):
+    before = opened.run("return current().run")
+    opened.run("set('species.gas.radius', '0.03')")
+    wait_for(lambda: opened.run("return document.querySelectorAll('.wrong').length") == 1)
+    moving(opened)
+    rows = opened.run("return [...document.querySelectorAll('.wrong')].map(one => one.innerText)")
+    assert rows[0].startswith("radius of a disk") and "too full: at most 0.0126" in rows[0]
+    opened.run("set('species.gas.speed', '2')")
+    wait_for(lambda: opened.run("return current().words") == "speed of each disk at the start = 2")
+    moving(opened, before)
+    opened.run("set('species.gas.radius', '0.005')")
+    wait_for(lambda: "radius" in opened.run("return current().words"))
+    assert opened.run("return document.querySelector('.wrong')") is None
+
+
+def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
+    opened.press("k")
+    moving(opened, 1)
+    slide(opened, 0, 700)
+    wait_for(lambda: "speed" in opened.run("return current().words"))
+    sizes = """return state.boxes.map(box => filmOf(box).document.getElementById('stage'))
+    .map(stage => [stage.offsetWidth, stage.offsetHeight].join());"""
+    wait_for(lambda: len(set(opened.run(sizes))) == 1)
+    seen = "['energy', 'pressure'].map(id => filmOf(current()).document.getElementById(id))"
+    below = opened.run(f"return Math.max(...{seen}.map(one => one.getBoundingClientRect().bottom))")
+    assert below < opened.run("return $('runs').clientHeight")
+    assert opened.run("return state.boxes.map(box => box.letter)") == ["A", "B"]
+    wait_for(lambda: len(inside(opened, "overlaid")) == 1)
+    opened.press("p")
+    wait_for(lambda: opened.run("return films().every(one => !one.inside().state.playing)"))
+    opened.run("remove(state.boxes[0])")
+    assert opened.run("return state.boxes.map(box => box.letter)") == ["B"]
+
+
+def test_a_paused_run_goes_back_step_by_step_and_on(opened):
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    last = inside(opened, "moment.time")
+    opened.press("\ue012")  # arrow left
+    assert inside(opened, "moment.time") < last
+    opened.press("\ue010")  # End
+    newest = inside(opened, "moment.time")
+    opened.press("\ue014")  # arrow right
+    wait_for(lambda: inside(opened, "moment.time") > newest)
+    before = inside(opened, "moment.time")
+    opened.press("n")
+    wait_for(lambda: inside(opened, "moment.time") > before)
+    opened.press("p")
+    wait_for(lambda: inside(opened, "moment.time") > before + 0.01)
+
+
+SIZES = [(1280, 800, False), (1920, 1080, False), (820, 1180, False), (390, 844, True)]
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_everything_has_a_name_and_nothing_is_covered_or_too_wide(opened, size):
+    opened.resize(*size)
+    for kept in (False, True):
+        if kept:
+            opened.run("keep()")
+            moving(opened, 1)
+        wide = opened.run(
+            """const isWide = (part, one) => part.offsetParent
+              && part.getBoundingClientRect().right > one.innerWidth + 1;
+            const all = [window, ...films()].flatMap(one =>
+              [...one.document.querySelectorAll('body *')].filter(part => isWide(part, one)));
+            return all.map(one => one.outerHTML.slice(0, 90));"""
+        )
+        assert wide == []
+    stage, form = opened.run(
+        """const film = filmOf(current()).document, box = film.getElementById('stage');
+        const [stage, frame, form] = [box, current().frame, $('form')].map(
+          one => one.getBoundingClientRect());
+        return [[frame.x + stage.left, frame.y + stage.bottom], [form.right, form.top]];"""
+    )
+    assert stage[0] >= form[0] - 1 or stage[1] <= form[1] + 1, "the form covers the film"
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
+    names = opened.run(
+        """const documents = [document, filmOf(current()).document];
+        const parts = 'aside canvas, #stage, input, select, button';
+        return documents.flatMap(one => [...one.querySelectorAll(parts)])
+          .filter(one => one.offsetParent && !(one.getAttribute('aria-label') || one.labels?.length
+            || one.textContent.trim() || one.title)).map(one => one.outerHTML);"""
+    )
+    assert names == []
+    values = "return [...document.querySelectorAll('[type=range]')].map(one => one.ariaValueText)"
+    assert all(" from " in text for text in opened.run(values))
+    told = opened.run("return filmOf(current()).document.getElementById('stage').ariaLabel")
+    assert "1000 gas" in told and "coloured by speed" in told
