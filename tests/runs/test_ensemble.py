@@ -264,11 +264,13 @@ def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
     assert "failed: b: reason of the failure" in again.stderr
     assert "failed: c: killed by signal 9 (out of memory?), " in again.stderr
     assert [len(starts(lab)[name]) for name in "abc"] == [1, 1, 2]
+    assert slurm(*members).returncode == 75 and slurm(*members).returncode == 1
+    assert len(starts(lab)["c"]) == 3, "a third kill is not the machine's"
     manifest.write_text("a\nb\t--set outcome.exit=4\n")
     for options, code, times in (((), 1, 1), (("--retry",), 75, 3), ((), 1, 3)):
         assert slurm(*members, *options).returncode == code
         assert len(starts(lab)["b"]) == times
-    assert len(lines_of(lab / "jobs")) == 3
+    assert len(lines_of(lab / "jobs")) == 4
     host = os.uname().nodename
     line = re.compile(rf"\d{{4}}-\d\d-\d\dT[\d:]{{8}}[+-]\d{{4}} 7_[12] {host} [abc]: \S.*")
     said = lines_of(lab / "out" / "slurm.log")
