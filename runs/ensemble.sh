@@ -244,7 +244,7 @@ add_overrides() {
 
 # Run member k; what became of it goes through the pipe to the parent.
 run_member() {
-  local base=$folder/${names[$1]} status resume= said
+  local base=$folder/${names[$1]} status resume='' said
   said=$(last_words "${names[$1]}")
   local arguments=("$input" -o "$base.h5" --quiet)
   add_overrides "$1"
