@@ -77,6 +77,7 @@ def draw(found: Divergence) -> plt.Figure:
 
 def main() -> None:
     parser = command_line(__doc__, "lyapunov.png")
+    parser.set_defaults(paired=True)
     parser.add_argument("--largest", type=float, default=0.01, help="distance at the end [0.01]")
     parser.add_argument(
         "--fit-from", type=float, default=0.2, metavar="SHARE", help="of the time [0.2]"

@@ -244,10 +244,11 @@ add_overrides() {
 
 # Run member k; what became of it goes through the pipe to the parent.
 run_member() {
-  local base=$folder/${names[$1]} status resume=
+  local base=$folder/${names[$1]} status resume='' said
+  said=$(last_words "${names[$1]}")
   local arguments=("$input" -o "$base.h5" --quiet)
   add_overrides "$1"
-  [[ -z $(last_words "${names[$1]}") ]] || echo >&"$lock" # of an attempt before
+  [[ -z $said ]] || echo >&"$lock" # of an attempt before
   [[ ! -e $base.h5.part ]] || resume=--resume
   while :; do
     "$program" "${arguments[@]}" $resume >"/dev/fd/$lock" 2>&1 </dev/null {events}>&- &
@@ -264,9 +265,17 @@ run_member() {
   done
   # Stopped while it started, or while bash waited for it a second time (-1: it has lost the status).
   if [[ -n $stopping ]] && ((status >= 127 || status < 0)); then status=75; fi
-  ((status <= 128)) || printf 'killed by signal %d%s, %(%FT%T%z)T on %s\n' "$((status - 128))" \
-    "$([[ $status != 137 ]] || echo ' (out of memory?)')" -1 "$host" >&"$lock"
+  ((status <= 128)) || tell_kill "$status" "$said" >&"$lock"
   printf '%s %s\n' "$1" "$status" >&"$events"
+}
+
+# STATUS and what was said before: a third kill asks for more memory or time, not for a fourth attempt.
+tell_kill() {
+  local how='' given_up=''
+  [[ $1 != 137 ]] || how=' (out of memory?)'
+  [[ $2 != 'killed by signal'*twice* ]] || given_up='given up after three attempts: '
+  [[ $2 != 'killed by signal'* ]] || how+=', twice'
+  printf '%skilled by signal %d%s, %(%FT%T%z)T on %s\n' "$given_up" "$(($1 - 128))" "$how" -1 "$host"
 }
 
 # Opens a member's log as `lock`: a file that is ordinary, has one name, and is what was opened.

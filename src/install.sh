@@ -99,14 +99,14 @@ install)
 #%Module1.0
 module-whatis "Ricochet $version: event-driven simulation of hard disks"
 conflict ricochet
-prepend-path PATH $PREFIX/bin
-prepend-path MANPATH $PREFIX/share/man
-prepend-path PYTHONPATH $PREFIX/$shared/post
+prepend-path PATH {$PREFIX/bin}
+prepend-path MANPATH {$PREFIX/share/man}
+prepend-path PYTHONPATH {$PREFIX/$shared/post}
 MODULE
   comm -23 <(echo "$before") <(echo "$now") | remove # files of an earlier version
   echo "$now" >"$root/$list"
   echo "installed: $root/bin/ricochet; ricochet-player and the other scripts; inputs in $root/$shared; pages in $root/$documents; man ricochet"
-  if [[ $PREFIX != "$HOME"/* ]] && grep -q -e '-march=native' "$build/flags" 2>/dev/null; then
+  if [[ $PREFIX != "${HOME:-/root}"/* ]] && grep -q -e '-march=native' "$build/flags" 2>/dev/null; then
     echo "install: $build/ricochet is for processors like the one of this machine; for all: make ARCH=x86-64-v3 all library install" >&2
   fi
   ;;

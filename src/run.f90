@@ -77,9 +77,9 @@ contains
     end if
     run%stop_rule = stop_rule_t(run%input%settings%stop, run%sim)
     call follow(run, error)
-    if (.not. allocated(error)) call run%output%finish(run%sim, [seconds() - run%started, run%rate], note(run), error)
+    if (.not. allocated(error)) call run%output%finish(run%sim, cost_of(run), note(run), error)
     if (allocated(error)) then
-      if (error%code == exit_broken) call run%output%break_off(run%sim, [seconds() - run%started, run%rate], error%message)
+      if (error%code == exit_broken) call run%output%break_off(run%sim, cost_of(run), error%message)
       if (error%code == exit_files) error%message = error%message//"; --resume goes on from the last checkpoint"
     else
       call end_at_signals("stopped; the run is finished, only its summary is missing", exit_finished)
@@ -173,6 +173,14 @@ contains
     run%alone = run%evolution%alone
     deallocate (run%evolution)                             ! the end of the output needs room
   end subroutine follow
+
+  !> What the output says of this part of the run: see `write_end`.
+  function cost_of(run) result(cost)
+    type(run_t), intent(in) :: run
+    real(real64) :: cost(3)
+
+    cost = [seconds() - run%started, run%rate, real(run%alone, real64)]
+  end function cost_of
 
   !> Advances the simulation from one thing that is due to the next, until its end.
   subroutine main_loop(run, error)

@@ -13,11 +13,13 @@ import itertools
 import os
 import re
 import signal
+import stat
 import subprocess
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -109,6 +111,16 @@ def read_manifest(folder: Path) -> dict[str, str]:
 
 def remember(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
     """Write input.nml and manifest.txt; members with data must mean the same as before."""
+    door = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(door, fcntl.LOCK_EX)  # one command at a time, as runs/ensemble.sh
+        remember_alone(folder, text, overrides)
+    finally:
+        os.close(door)
+
+
+def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> None:
+    """The same, while nobody else does."""
     before = read_manifest(folder)
     path = folder / "input.nml"
     old = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else text
@@ -140,9 +152,21 @@ def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     return tuple(path if path.is_file() else None for path in paths)
 
 
+def log_of(path: Path) -> TextIO:
+    """A member's log, open to append; nothing goes through a link, or into what has two names."""
+    log = os.fdopen(
+        os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666), "a"
+    )
+    status = os.fstat(log.fileno())
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink != 1:
+        log.close()
+        raise RunError(f"{path}: is not an ordinary file: remove it, or choose another folder")
+    return log
+
+
 def run_member(folder: Path, name: str, overrides: str) -> int:
     """Run a member to its end, unless it is there or another process is at it; its exit code."""
-    with (folder / f"{name}.log").open("a") as log:
+    with log_of(folder / f"{name}.log") as log:
         try:
             fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -150,7 +174,7 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         finished, unfinished = files_of(folder, name)
         if finished:
             return 0
-        if last_words(folder, name):
+        if before := last_words(folder, name):
             print(file=log, flush=True)  # that was of an attempt before
         words = [word for pair in pairs_of(overrides) for word in ("--set", "=".join(pair))]
         output = ["-o", folder / f"{name}.h5", "--quiet", *words]
@@ -163,7 +187,10 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         if code < 0:
             memory = " (out of memory?)" * (-code == signal.SIGKILL)
             moment = time.strftime("%FT%T%z")
-            print(f"killed by signal {-code}{memory}, {moment} on {os.uname().nodename}", file=log)
+            again = ", twice" * before.startswith("killed by signal")
+            given_up = "given up after three attempts: " * (bool(again) and "twice" in before)
+            kill = f"{given_up}killed by signal {-code}{memory}{again}, {moment}"
+            print(f"{kill} on {os.uname().nodename}", file=log)
         return code
 
 

@@ -68,13 +68,14 @@ def run(
     words = [word for pair in settings_of(overrides) for word in ("--set", pair)]
     command = [program, "-o", output, *words]
     command += ["--force"] * force + ["--resume"] * resume + ["--", system]
+    began = time.time()
     code, lines = watched(list(map(str, command)), progress)
     message = "\n".join(lines).replace(f"{work}{os.sep}", "")
     if code != 0:
         part = output.with_name(f"{output.name}.part")
-        left = next((path for path in (part, output) if path.exists()), None)
+        written = part.is_file() and part.stat().st_mtime > began - 1  # else it is another run's
         message = named(message, text) or f"{program} ended with exit code {code}"
-        raise ProgramError(message, code, left)
+        raise ProgramError(message, code, part if written else None)
     if message:
         print(message, file=sys.stderr)
     return read_run(output)

@@ -324,6 +324,28 @@ class Run:
             columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
+    def to_xarray(self):
+        """The frames as an xarray Dataset (needs that package): time, disk, component ("x", "y").
+
+        What disks have in each frame, and mass, radius, species; path and seed are in its `attrs`.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError("to_xarray needs a package: pip install xarray") from None
+
+        dimensions = ("time", "disk", "component")
+        frames = {"position": self.position, "velocity": self.velocity, **self.elements}
+        frames |= {"image": self.image, "collisions": self.collisions}
+        data = {
+            name: (dimensions[: values.ndim], values[:])
+            for name, values in frames.items()
+            if values is not None
+        }
+        data |= {name: ("disk", getattr(self, name)) for name in ("mass", "radius", "species")}
+        axes = {"time": self.time, "disk": np.arange(self.count) + 1, "component": ["x", "y"]}
+        return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
+
     @cached_property
     def events(self) -> Events:
         """All collisions; needs `output.event_log = .true.` in the input file."""

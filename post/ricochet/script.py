@@ -18,6 +18,7 @@ import matplotlib
 import numpy as np
 
 from .drawing import LABELS, STYLE, plt, save, warn
+from .ensembles import in_order, read_manifest
 from .files import did_you_mean, destination
 from .nature import Refused
 from .reader import Restitution, Run, RunError, read_run
@@ -94,12 +95,35 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             word = unknown[0].split("=")[0]
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
-        if len(getattr(known, "runs", ())) > 1 and not known.repeated:
-            known.runs = distinct(known.runs)
+        if hasattr(known, "runs"):
+            paths = known.runs if known.paired else finished(known.runs)
+            known.runs = [read_run(path) for path in paths]
+            if len(known.runs) > 1 and not known.repeated:
+                known.runs = distinct(known.runs)
         results = [getattr(known, name, None) for name in ("output", "csv")]
         if None not in results and results[0].resolve() == results[1].resolve():
             self.error(f"{known.csv} is the name of the figure, too: choose another for --csv")
         return known
+
+
+def finished(paths: list[Path]) -> list[Path]:
+    """The runs that have finished, if any has; the others are counted and named.
+
+    If those of a whole ensemble are given, so are its members without a file.
+    """
+    whole = [path for path in paths if path.suffix != ".part"]
+    if not whole:
+        return paths
+    missing = {path.with_suffix("").stem for path in paths if path.suffix == ".part"}
+    for folder in {path.parent for path in whole}:
+        there = {path.stem for path in folder.glob("*.h5")}
+        if there <= {path.stem for path in whole if path.parent == folder}:
+            missing |= read_manifest(folder).keys() - there
+    if missing:
+        names = ", ".join([*sorted(missing, key=in_order)[:10], *["..."] * (len(missing) > 10)])
+        told = f"{len(whole)} of {len(whole) + len(missing)} runs; {len(missing)} unfinished"
+        print(f"warning: {told}: {names}", file=sys.stderr)
+    return whole
 
 
 def distinct(runs: list[Run]) -> list[Run]:
@@ -130,15 +154,16 @@ def command_line(
 ) -> Parser:
     """A parser whose help is the script's docstring and whose output has this default.
 
-    It opens `one` run or any number, as `runs`, each once unless they may be `repeated`, and takes
-    --csv if there are numbers to write, and those of the shared `OPTIONS` that are named, with
-    their defaults (None: no default).
+    It opens `one` run or any number, as `runs`, each once unless they may be `repeated`, of several
+    those that have finished unless one belongs to the next (`paired`).  It takes --csv if there are
+    numbers to write, and those of the shared `OPTIONS` that are named, with their defaults (None:
+    no default).
     """
     raw = argparse.RawDescriptionHelpFormatter
     parser = Parser(description=doc, formatter_class=raw, allow_abbrev=False)
-    parser.set_defaults(title=doc.splitlines()[0], repeated=repeated, notes=[])
+    parser.set_defaults(title=doc.splitlines()[0], repeated=repeated, paired=False, notes=[])
     some = {"nargs": 1 if one else "+", "help": f"file{'s' * (not one)} written by ricochet"}
-    parser.add_argument("runs", type=read_run, metavar="RUN.h5", **some)
+    parser.add_argument("runs", type=Path, metavar="RUN.h5", **some)
     place = {"default": None if output.startswith("RUN") else Path(output), "metavar": "FILE"}
     parser.add_argument("-o", "--output", type=Path, help=f"where to write [{output}]", **place)
     if csv:
@@ -238,6 +263,7 @@ def report(
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
     notes = [*(run.shortcoming for run in args.runs if run.shortcoming), *args.notes, *notes]
+    notes = once(notes, {run.path.name for run in args.runs})
     for note in [*notes, *without_error(tables)]:
         print(f"warning: {note}", file=sys.stderr)
     if figure is not None:
@@ -246,6 +272,17 @@ def report(
         print(f"figure: {args.output}")
     if "csv" in args and args.csv:
         write_csv(args.csv, tables[0] if data is None else data)
+
+
+def once(notes: Iterable[str], names: set[str]) -> list[str]:
+    """What is said of several runs, but for their names and numbers, once with their number."""
+    kinds: dict[str, list[str]] = {}
+    for note in notes:
+        name = re.match(r".*?\.h5(\.part)?(?=[: ])", note)
+        known = name and Path(name[0]).name in names
+        kind = re.sub(r"-?\d[\d.]*(e[-+]\d+)?", "", note[name.end() :]) if known else note
+        kinds.setdefault(kind, []).append(note)
+    return [one + f" ({len(more) + 1} such)" * bool(more) for one, *more in kinds.values()]
 
 
 def measured(

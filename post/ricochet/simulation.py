@@ -15,6 +15,7 @@ import math
 import os
 import sys
 import threading
+import weakref
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
@@ -31,6 +32,7 @@ PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
 FASTEST = 1e100  # that an input can name
+ALIVE: weakref.WeakSet = weakref.WeakSet()
 #: The arrays of a simulation, and their numbers.
 COLUMNS = {
     "position": float,
@@ -85,6 +87,7 @@ class Simulation:
 
     def _take(self, handle: int, endless: bool = False) -> None:
         self._handle, self._lock, self._endless = handle, threading.RLock(), endless
+        ALIVE.add(self)
         self._start_energy = self.observable("all/kinetic_energy") * self.count
 
     @classmethod
@@ -331,6 +334,17 @@ class Simulation:
         if n < 0:
             raise RunError("next_events: time steps do not know what comes")
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
+
+
+def after_fork() -> None:
+    """Close, in the child, what a thread was stepping that the child does not have."""
+    for simulation in ALIVE:
+        if not simulation._lock.acquire(blocking=False):
+            simulation._handle = None
+        simulation._lock = threading.RLock()
+
+
+os.register_at_fork(after_in_child=after_fork)
 
 
 class Held:

@@ -361,7 +361,7 @@ contains
   subroutine finish(self, sim, cost, note, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(2)           !! see `write_end`
+    real(real64), intent(in) :: cost(3)           !! see `write_end`
     character(len=*), intent(in) :: note          !! why it ended if no stop rule was met
     type(error_t), allocatable, intent(out) :: error
     type(hdf5_file_t) :: file
@@ -386,8 +386,8 @@ contains
   subroutine write_end(self, sim, cost, note, broken)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(2)           !! since the start or the last resume: wall time [s], collisions per
-    !! processor time [1/s]
+    real(real64), intent(in) :: cost(3)           !! since the start or the last resume: wall time [s], collisions per
+    !! processor time [1/s], events on one core where there were more
     character(len=*), intent(in) :: note          !! why the run ended if no stop rule was met
     logical, intent(in) :: broken
     type(progress_t) :: before
@@ -400,7 +400,7 @@ contains
     call self%write_buffers()
     if (broken .or. any(self%track%appended() /= self%track%capacity)) &
       call self%rebuild(self%track%appended(), sim, merge(dropped, kept, broken))
-    call describe_end(self%file, self%input%settings%run%threads, self%spent + cost(1), cost(2), note)
+    call describe_end(self%file, self%input%settings%run%threads, self%spent + cost(1), cost(2:), note)
     if (.not. broken) call put_last_checkpoint(self%file, sim, before)
   end subroutine write_end
 
@@ -408,7 +408,7 @@ contains
   subroutine break_off(self, sim, cost, note)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
-    real(real64), intent(in) :: cost(2)           !! see `write_end`
+    real(real64), intent(in) :: cost(3)           !! see `write_end`
     character(len=*), intent(in) :: note          !! why
     type(error_t), allocatable :: uncountable
 

@@ -45,7 +45,7 @@ contains
       call describe_table(file, input%groups(range(1):range(2)))
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
-    call describe_end(file, input%settings%run%threads, 0.0_real64, 0.0_real64, "")
+    call describe_end(file, input%settings%run%threads, 0.0_real64, [0.0_real64, 0.0_real64], "")
   contains
 
     !> Format, author and creator, as H5MD requires.
@@ -255,14 +255,15 @@ contains
     type(hdf5_file_t), intent(inout) :: file
     integer, intent(in) :: threads                    !! that the last part of the run had
     real(real64), intent(in) :: wall_seconds          !! of the whole run, all its parts together [s]
-    real(real64), intent(in) :: rate                  !! collisions per processor time of its last part [1/s]
+    real(real64), intent(in) :: rate(2)               !! of its last part: collisions per processor time [1/s], events on one core
     character(len=*), intent(in) :: note              !! why it ended if no stop rule was met
     character(len=longest_note) :: padded
 
     padded = note
     call file%put(provenance//"@threads", scalar, [int(threads, int64)])
     call file%put(wall_time, scalar, [wall_seconds])
-    call file%put(provenance//"@collisions_per_second", scalar, [rate])
+    call file%put(provenance//"@collisions_per_second", scalar, rate(:1))
+    call file%put(provenance//"@events_on_one_core", scalar, [int(rate(2), int64)])
     call file%put(provenance//"@note", padded)
   end subroutine describe_end
 

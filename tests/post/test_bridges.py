@@ -1,5 +1,6 @@
 """Runs opened by the programs that they are exported for: OVITO, MDAnalysis, readers of CSV."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,21 @@ def test_pandas_gets_all_observables(run):
     names = {f"{kind}/{what}" for kind in ("all", *run.names) for what in ("mean_speed",)}
     widths = [np.size(run.observable(name).value[0]) for name in run.observables]
     assert names < set(table) and len(table.columns) == sum(widths)
+
+
+def test_xarray_gets_all_frames_and_is_asked_for_where_it_is_missing(run, monkeypatch):
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "xarray", None)
+        with pytest.raises(ImportError, match="to_xarray needs a package: pip install xarray"):
+            run.to_xarray()
+    reader("xarray")
+    table = run.to_xarray()
+    assert dict(table.sizes) == {"time": run.frames, "disk": run.count, "component": 2}
+    for name in ("position", "velocity", "image", "collisions"):
+        np.testing.assert_array_equal(table[name], getattr(run, name)[:])
+    first = table.sel(disk=1, component="y", time=run.time[-1])
+    assert first.position == run.position[-1][0, 1] and first.mass == run.mass[0]
+    assert table.attrs["seed"] == run.seed
 
 
 def test_csv_is_read_by_numpy(run):

@@ -250,8 +250,8 @@ def test_running_simulations_are_drawn(started, tmp_path, system, capsys):
         code = run_script(script, *parts, "-o", figure, *options, *few, *numbers)
         printed, said = capsys.readouterr()
         assert code == 0, said
-        for part in parts:
-            assert f"warning: {part.name} is unfinished" in said
+        assert f"warning: {parts[0].name} is unfinished" in said
+        assert ("(2 such)" in said) == (len(parts) == 2), "once, with their number"
         assert figure.stat().st_size > 0
         if numbers:
             data, lines = figure.read_bytes(), printed.splitlines()
@@ -291,6 +291,25 @@ def test_a_run_that_met_no_stop_rule_says_so(tmp_path, monkeypatch, capsys, name
     assert run_script("snapshot", run) == 0
     warned = capsys.readouterr().err
     assert said in warned and said in texts[0] and bool(said) == bool(warned) == bool(texts[0])
+
+
+def test_of_an_ensemble_the_finished_members_are_taken_and_the_others_counted(tmp_path, capsys):
+    """Where all its files are given, also those without one; a warning comes once."""
+    note = {"git_commit": "abc", "note": "cooled to nothing"}
+    runs = [tiny(tmp_path / f"{k}.h5", 4 + k, 3, provenance=note) for k in range(3)]
+    (tmp_path / "9.h5.part").touch()
+    members = "".join(f"{k}\t--set run.seed={k}\n" for k in (0, 1, 2, 9, 10))
+    (tmp_path / "manifest.txt").write_text(members)
+    for given, told in (
+        (runs, "3 of 5 runs; 2 unfinished: 9, 10"),
+        ([*runs[:2], tmp_path / "9.h5.part"], "2 of 3 runs; 1 unfinished: 9"),
+        (runs[:2], ""),
+    ):
+        assert run_script("trajectory", *given, "-o", tmp_path / "a.png") == 0
+        said = capsys.readouterr().err
+        assert told in said and ("unfinished" in said) == bool(told)
+        assert f"warning: 0.h5 ended early: cooled to nothing ({len(given)} such)" in said or told
+        assert said.count("cooled to nothing") == 1
 
 
 # --- where results go ---

@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "runs" / "ensemble.sh"
 
 # Notes each start in OUT.starts; waits until the file HOLD is gone; TERM makes a checkpoint.
-# `outcome.exit=N` fails with N, 2 with --check, too; after 4 it has broken off, and does not resume.
-# 9 is a kill.
+# `outcome.exit=N` fails with N, 2 with --check, too; 9 is a kill; after 4 it has broken off, and
+# does not resume.
 PROGRAM = """while (($#)); do
   case $1 in
   -o) out=${2%.h5} && shift ;;
@@ -260,15 +260,17 @@ def test_slurm_gives_up_what_failed_and_says_who_when_and_where(lab, slurm):
     members = ("--manifest", str(manifest))
     assert slurm(*members).returncode == 75 and lines_of(lab / "codes") == ["1", "1"]
     again = slurm(*members)
-    assert again.returncode == 75 and "1 of 3 members finished, 1 of them before, 2 failed" in again.stderr
+    assert again.returncode == 75 and "1 of them before, 2 failed" in again.stderr
     assert "failed: b: reason of the failure" in again.stderr
     assert "failed: c: killed by signal 9 (out of memory?), " in again.stderr
     assert [len(starts(lab)[name]) for name in "abc"] == [1, 1, 2]
+    assert slurm(*members).returncode == 75 and slurm(*members).returncode == 1
+    assert len(starts(lab)["c"]) == 3, "a third kill is not the machine's"
     manifest.write_text("a\nb\t--set outcome.exit=4\n")
     for options, code, times in (((), 1, 1), (("--retry",), 75, 3), ((), 1, 3)):
         assert slurm(*members, *options).returncode == code
         assert len(starts(lab)["b"]) == times
-    assert len(lines_of(lab / "jobs")) == 3
+    assert len(lines_of(lab / "jobs")) == 4
     host = os.uname().nodename
     line = re.compile(rf"\d{{4}}-\d\d-\d\dT[\d:]{{8}}[+-]\d{{4}} 7_[12] {host} [abc]: \S.*")
     said = lines_of(lab / "out" / "slurm.log")

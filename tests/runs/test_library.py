@@ -228,5 +228,16 @@ if os.fork() == 0:
 assert os.waitstatus_to_exitcode(os.wait()[1]) == 0
 assert gas.advance(events=100).events == 100
 threading.Thread(target=gas.advance, kwargs={{"events": 10**12}}, daemon=True).start()
+if os.fork() == 0:  # what a thread steps that the child does not have is closed there
+    try:
+        gas.time
+    except ValueError as error:
+        os._exit(0 if "closed" in str(error) else 1)
+    os._exit(0)
+assert os.waitstatus_to_exitcode(os.wait()[1]) == 0
+other = threading.Thread(target=gas.advance, kwargs={{"events": 10**6}})
+other.start()
+gas.advance(events=10**6)  # two threads, one simulation
+other.join()
 """
     assert subprocess.run([sys.executable, "-c", script], timeout=300).returncode == 0

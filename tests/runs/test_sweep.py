@@ -80,6 +80,9 @@ def test_a_member_that_was_killed_says_so_and_one_that_failed_may_be_mended(
     host = re.escape(os.uname().nodename)
     assert table.state[0] == "unfinished"
     assert re.fullmatch(rf"killed by signal 9 \(out of memory\?\), .* on {host}", table.reason[0])
+    for state in ("unfinished", "failed"):
+        assert sweep(GAS, {"run.seed": [1]}, tmp_path / "runs").state[0] == state
+    assert ensemble(tmp_path / "runs").reason[0].startswith("given up after three attempts: killed")
     monkeypatch.setenv("RICOCHET", str(program))
     assert sweep(GAS, {"run.seed": [1]}, tmp_path / "runs").state[0] == "finished"
     heap = GAS.replace("'wall' /", "'wall' gravity = 0, -1 /").replace("= 5 ", "= 5000 ")
@@ -116,3 +119,14 @@ def wait_until(there) -> None:
 )
 def test_overrides_have_their_types(word, value):
     assert typed(word) == value and type(typed(word)) is type(value)
+
+
+@pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
+def test_nothing_is_written_through_a_link(tmp_path, link):
+    """Nor into a file with another name."""
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "runs").mkdir()
+    link(tmp_path / "runs/seed_1.log", tmp_path / "mine")
+    with pytest.raises((RunError, OSError)):
+        sweep(GAS, {"run.seed": [1]}, tmp_path / "runs")
+    assert (tmp_path / "mine").read_text() == "mine"

@@ -75,6 +75,18 @@ def test_the_threads_are_those_of_the_last_part(ricochet, gas):
         assert threads_of(gas / "many.h5") == threads
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, threads):
+    """In the summary and in the file; a spell of so few events is not worth two."""
+    few = "--set=stop.collisions=9000"
+    done = ricochet("gas.nml", "-o", "two.h5", few, f"--set=run.threads={threads}")
+    said = [line for line in done.stdout.splitlines() if line.startswith("events_on_one_core")]
+    with h5py.File(gas / "two.h5") as file:
+        alone = file["provenance"].attrs["events_on_one_core"]
+    assert said == [f"events_on_one_core = {alone}"] * (threads - 1)
+    assert (alone > 0) == (threads == 2)
+
+
 def test_too_little_memory_for_domains_is_said(program, gas):
     """As on a machine that has enough of it for one core, and not for several."""
     facts = Path("/proc/meminfo").read_text().splitlines()

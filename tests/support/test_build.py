@@ -156,7 +156,7 @@ def test_an_installed_program_and_its_scripts_run_from_anywhere(installed, tmp_p
 def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
     """By what the modulefile sets: a program in C, and the package."""
     (module,) = (installed / "share/modulefiles/ricochet").iterdir()
-    told = dict(re.findall(r"^prepend-path (\w+) (\S+)$", module.read_text(), re.MULTILINE))
+    told = dict(re.findall(r"^prepend-path (\w+) {(.+)}$", module.read_text(), re.MULTILINE))
     assert module.read_text().startswith("#%Module") and told["PATH"] == "/usr/bin"
     assert (installed / "lib/libricochet.so").exists()
     assert (installed / "include/ricochet.h").exists()
