@@ -168,21 +168,26 @@ function addGroup(kind, name) {
 
 // ---------- an input ----------
 
+// Its run starts before the form is there.
 async function choose(name) {
-  const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
-  if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
-  const form = await answer.json(), input = lab.inputs.find(one => one.name === name);
-  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: form.groups, settings: {}, waiting: {}, added: [] });
+  const input = lab.inputs.find(one => one.name === name);
+  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, waiting: {}, added: [] });
+  run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
   if (input.picture) $('own').src = input.picture;
   $('sentence').textContent = input.sentence;
+  $('sliders').replaceChildren();
+  const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
+  if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
+  const form = await answer.json();
+  if (state.input.name !== name) return;  // another has been chosen meanwhile
+  state.groups = form.groups;
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
   $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
   $('scanned').replaceChildren(...state.input.sliders.map((slider, k) => new Option(slider.words, k)));
   buildEverything();
   sync();
-  run();
 }
 
 function buildInputs() {
