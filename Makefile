@@ -67,7 +67,7 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
+targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check bench-lab sanitize lint coverage docs install \
   uninstall dist set-up clean distclean help
 .PHONY: $(targets) FORCE
 
@@ -250,6 +250,10 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 
 bench: all  ## measures collisions per second; FULL=1: and more
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
+
+bench-lab: all library  ## measures waits and pictures per second of the laboratory, in a browser
+	@.ci/set-up demo test
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/bench_lab.py
 
 bench-check:  ## counts instructions per collision against what is promised
 	@.ci/set-up bench

@@ -64,12 +64,14 @@ class Bench:
         self.actions: list[tuple[float, str, object]] = []  # since the start: time, what, value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
         self.happened: tuple | None = None
+        self.goal: tuple[float, int, int] | None = None  # of a step that is on its way
 
     # --- what it is told ---
 
     def start(self, wish: dict) -> None:
         """Another simulation in the place of this one, if it can be."""
         tell({"is": "starting"})
+        pace = max(0.0, float(wish["pace"] or 0.0))
         other = Simulation.__new__(Simulation)
         try:
             other._begin(wish["text"], settings_text(wish["settings"]))
@@ -80,9 +82,9 @@ class Bench:
             return
         if self.simulation:
             self.simulation.close()
-        self.simulation, self.wish, self.initial = other, wish, other.input
+        self.simulation, self.wish, self.initial, self.pace = other, wish, other.input, pace
         self.actions, self.ended, self.reason = [], False, ""
-        self.playing, self.pace = bool(wish["playing"]), wish["pace"] or 0.0
+        self.playing, self.goal = bool(wish["playing"]), None
         self.unseen = 0
         self.renew(changed=False)
 
@@ -133,12 +135,12 @@ class Bench:
 
     def play(self, _: dict) -> None:
         """Go on."""
-        self.playing, self.due = True, time.perf_counter()
+        self.playing, self.goal, self.due = True, None, time.perf_counter()
         self.tell_state()
 
     def pause(self, _: dict) -> None:
         """Stand still."""
-        self.playing = False
+        self.playing, self.goal = False, None
         self.speak()
         self.tell_state()
 
@@ -152,54 +154,69 @@ class Bench:
 
     def step(self, wish: dict) -> None:
         """Go on by some time, and stand still."""
-        self.playing = False
-        self.advance(self.simulation.time + float(wish["time"]), NEVER, wait=True)
+        if not (more := float(wish["time"])) >= 0:
+            raise ValueError("a step goes on")
+        self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
 
-    def event(self, _: dict) -> None:
+    def event(self, wish: dict) -> None:
         """Go on by one event, and stand still."""
-        self.playing = False
-        if not self.run.time_step and (coming := self.simulation.next_events(1)):
-            self.happened = coming[0]
-        self.advance(np.inf, self.simulation.events + 1, wait=True)
+        coming = [] if self.run.time_step else self.simulation.next_events(1)
+        if not coming and not self.run.time_step:
+            self.pause(wish)  # nothing will happen
+            return
+        self.playing, self.goal = False, (np.inf, NEVER, self.simulation.events + 1)
+        self.happened = coming[0] if coming else None
 
     def keep(self, wish: dict) -> None:
         """What the run was, as a file: `input`, `script` or `output`."""
-        kind, body = wish["part"], None
+        if self.simulation is None or self.wish["run"] != wish["run"]:
+            send(b"e", b"this run is not there any more")
+            return
         name = self.wish["input"]
-        if kind == "input":
-            body = (self.simulation.input if self.actions else self.initial).encode()
-        elif kind == "script":
-            body = script(name, self.initial, self.actions, self.simulation.time).encode()
-        elif kind == "output":
+        try:
+            if wish["part"] == "output":
+                body = self.saved(f"{name}.h5")
+            elif wish["part"] == "script":
+                body = script(name, self.initial, self.actions, self.simulation.time)
+            else:
+                body = self.simulation.input if self.actions else self.initial
+        except (OSError, ProgramError) as problem:
+            send(b"e", str(problem).encode())
+            return
+        send(b"f", body if isinstance(body, bytes) else body.encode(errors="surrogateescape"))
+
+    def saved(self, name: str) -> bytes:
+        """The output file; a signal that ends this process waits until its folder is gone."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])
+        try:
             with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
-                body = self.simulation.save(Path(folder) / f"{name}.h5").read_bytes()
-        tell({"is": "file", "bytes": len(body)})
-        send(b"f", body)
+                return self.simulation.save(Path(folder) / name).read_bytes()
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
 
     # --- what it does ---
 
     def moves(self) -> bool:
         """Whether it is to go on now."""
-        ready = self.simulation and self.playing and not self.ended and self.pace > 0
-        return bool(ready and self.unseen < AHEAD)
+        ready = self.simulation and not self.ended and self.unseen < AHEAD
+        return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
     def go_on(self) -> None:
         """To the time of the next frame, or as far as the engine comes in a while."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
-        self.advance(self.simulation.time + self.pace * passed, NEVER)
-
-    def advance(self, until: float, events: int, wait: bool = False) -> None:
-        """Advance, and show where that has led."""
+        stepping = self.goal
+        limits = stepping or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
-            while self.simulation._go_on((until, NEVER, events), SLICE) and wait:
-                pass
+            if self.simulation._go_on(limits, SLICE) and stepping:
+                return  # a step is shown as a whole
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
+        self.goal = None
         self.show()
-        if self.ended or not self.playing or time.perf_counter() > self.spoken + SPEAK:
+        if self.ended or stepping or now > self.spoken + SPEAK:
             self.speak()
-        if self.ended or wait:
+        if self.ended or stepping:
             self.tell_state()
 
     def show(self) -> None:
@@ -394,7 +411,11 @@ def send(kind: bytes, body: bytes) -> None:
 
 def tell(message: dict) -> None:
     """One answer in words."""
-    send(b"t", json.dumps(message, allow_nan=False).encode())
+    try:
+        text = json.dumps(message, allow_nan=False)
+    except ValueError:  # what is not known, or has no bounds, is null
+        text = json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
+    send(b"t", text.encode())
 
 
 def wishes(wait: float | None) -> list[dict]:
@@ -406,7 +427,9 @@ def wishes(wait: float | None) -> list[dict]:
         UNREAD.extend(news)
     *lines, rest = UNREAD.split(b"\n")
     UNREAD[:] = rest
-    return list(map(json.loads, lines))
+    found = list(map(json.loads, lines))
+    starts = [wish for wish in found if wish["do"] == "start"]
+    return [wish for wish in found if wish not in starts[:-1]]  # while one waits, the last counts
 
 
 def scan(wish: dict) -> None:
@@ -443,11 +466,9 @@ def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
     bench = Bench(pictured)
-    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace}
-    runs = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
-    tell({"is": "ready"})
+    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace, "keep": bench.keep}
+    runs = ("change", "heat", "play", "pause", "got", "step", "event")
     while True:
         wait = None
         if bench.moves():
@@ -459,7 +480,7 @@ def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
                     does[action](wish)
                 elif action in runs and bench.simulation:
                     getattr(bench, action)(wish)
-            except (AttributeError, LookupError, TypeError, ValueError) as problem:
+            except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as problem:
                 tell({"is": "state", "reason": f"not understood: {problem}"})
         if bench.moves() and time.perf_counter() >= bench.due + INTERVAL:
             bench.go_on()

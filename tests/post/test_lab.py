@@ -198,7 +198,10 @@ def test_few_disks_tell_what_comes_and_one_event_is_a_step(address):
         ({"contact.restitution": "2"}, "contact.restitution", "from 0 to 1"),
         ({"species.gas.count": "30001", "species.gas.radius": "1e-5"}, "", "20000"),
         ({"species.gas.file": "/etc/passwd"}, "", "--files FOLDER"),
-        ({"run.title": "two\nlines"}, "", "no line ends"),
+        ({"species.gas.FILE": "/etc/passwd"}, "", "--files FOLDER"),
+        ({"species.gas.file": " '/etc/passwd'"}, "", "--files FOLDER"),
+        ({"species.gas.file=/etc/passwd#": ""}, "", "no variable"),
+        ({"run.title": "two\nlines"}, "", "no variable"),
     ],
 )
 def test_a_wrong_value_gets_one_line_and_the_run_goes_on(address, settings, place, words):
@@ -214,6 +217,9 @@ def test_a_wrong_value_gets_one_line_and_the_run_goes_on(address, settings, plac
                 '{"do": "end"}',
                 '{"do": "pace", "pace": []}',
                 '{"do": "start"}',
+                '{"do": "step", "time": -1}',
+                '{"do": "heat", "factor": NaN}',
+                '{"do": "change", "settings": {"species.gas.file": "/etc/passwd"}}',
             ):
                 await one.socket.send_str(wrong)
             while "not understood" not in (await one.until("state"))["reason"]:
@@ -240,12 +246,80 @@ def test_an_added_group_is_run_and_in_what_is_kept(address):
     asyncio.run(visit())
 
 
+def test_no_file_is_read_by_another_door(address):
+    """Neither by groups that are added, nor by the values of a scan."""
+
+    async def visit():
+        async with film(address) as one:
+            await one.start()
+            wish = {"input": "gas", "settings": {}, "added": [], "of": "all/kinetic_energy"}
+            group = "species file = '/etc/passwd' /\n&species"
+            for added in ([group, "x"], ["species", "x' file = '/etc/passwd"], ["none", "x"]):
+                await one.say("start", **wish | {"added": [added]}, pace=1, playing=True)
+                problems = (await one.until("problems"))["problems"]
+                assert problems[0]["text"].startswith("no group can be called")
+            await one.say("scan", **wish, variable="species.gas.File", values=["/etc/passwd"])
+            problems = (await one.until("problems", "scan"))["problems"]
+            assert "--files FOLDER" in problems[0]["text"]
+
+    asyncio.run(visit())
+
+
+def test_of_many_starts_at_once_the_last_counts_and_a_step_without_end_can_be_left(address):
+    async def visit():
+        async with film(address) as one:
+            await one.start()
+            wish = {"input": "gas", "added": [], "pace": 0.1, "playing": True}
+            for speed in range(1, 200):
+                await one.say("start", settings={"species.gas.speed": str(speed)}, **wish)
+            scenes = 0
+            while one.last["scene"]["facts"]["top"] < 2.1 * 199:
+                await one.until("scene")
+                scenes += 1
+            assert scenes < 100
+            await one.say("step", time=1e9)
+            await one.say("change", settings={"box.gravity": "0,-1"})
+            await one.until("scene")
+            await one.say("pause")
+            while (await one.until("state"))["playing"]:
+                pass
+
+    asyncio.run(visit())
+
+
+def test_a_run_can_be_kept_after_a_wrong_wish_and_without_a_folder(program, tmp_path):
+    async def visit(address):
+        async with film(address) as one:
+            await one.start()
+            await one.start(settings={"species.gas.radius": "1"})
+            assert (await one.kept("output"))[0] == 200
+            await one.start(settings={"species.gas.count": "12"})
+            (tmp_path / "temporary").rmdir()
+            assert (await one.kept("output"))[0] in (200, 409)
+            replies = await asyncio.gather(*(one.kept("script") for _ in range(9)))
+            assert {200} <= {status for status, _ in replies} <= {200, 409}
+            (tmp_path / "own.nml").unlink()
+            wish = {"input": "own", "settings": {}, "added": [], "pace": 1, "playing": True}
+            await one.say("start", **wish)
+            assert "own.nml" in (await one.until("problems"))["problems"][0]["text"]
+            assert (await one.session.get(f"{address}form?own")).status == 409
+            await one.until("frame")
+
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "own.nml").write_text("&species count = 3 radius = 0.1 /\n")
+    with laboratory(program, tmp_path / "temporary", tmp_path / "own.nml") as (process, address):
+        asyncio.run(visit(address))
+        assert process.poll() is None
+
+
 def test_a_scan_gives_the_mean_for_each_value(address):
     async def visit():
         async with film(address) as one:
             await one.start()
             wish = {"input": "gas", "settings": {}, "added": [], "of": "all/kinetic_energy"}
-            await one.say("scan", **wish, variable="species.gas.speed", values=["1", "2"])
+            for _ in range(2):
+                await one.say("scan", **wish, variable="species.gas.speed", values=["1", "2"])
+            assert "one scan" in (await one.until("problems"))["problems"][0]["text"]
             return [await one.until("scan") for _ in range(2)]
 
     found = asyncio.run(visit())
