@@ -107,7 +107,7 @@ function buildSlider(spec) {
   row.sync = () => {
     const value = read(spec), top = most(), place = 1000 * (scaled(value) - scaled(from)) / (scaled(top) - scaled(from));
     if (document.activeElement !== range) range.value = clampTo(place);
-    if (document.activeElement !== field) field.value = short(value).replace('−', '-');
+    if (document.activeElement !== field) field.value = integer ? value : short(value).replace('−', '-');
     range.setAttribute('aria-valuetext', `${short(value)}, from ${short(from)} to ${short(top)}`);
     row.classList.toggle('changed', key in state.settings);
     row.classList.toggle('wrong', key in state.waiting);
@@ -260,7 +260,7 @@ function hear(source, news) {
     ready();
   } else if (news.is === 'state') {
     box.changes = news.changes;
-    if (news.reason) tell(news.reason, !news.ended);
+    if (news.reason) tell(news.reason, true);
     tellShelf();
   } else if (news.is === 'scan') addToScan(news);
   else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
@@ -305,7 +305,11 @@ function tellShelf() {
     const copy = make('button', { type: 'button', textContent: 'command', title: box.command });
     copy.addEventListener('click', () => navigator.clipboard.writeText(box.command).then(() => tell('copied: ' + box.command), () => prompt('The command:', box.command)));
     const seen = make('input', { type: 'checkbox', checked: box.shown, ariaLabel: `run ${box.letter} is seen` });
-    seen.addEventListener('change', () => { box.shown = seen.checked; arrangeAll(); });
+    seen.addEventListener('change', () => {
+      box.shown = seen.checked;
+      filmOf(box).play(box.shown && !state.paused);
+      arrangeAll();
+    });
     const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
     away.addEventListener('click', () => remove(box));
     const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), box.words + (box.changes.length ? ', then changed' : '')];

@@ -250,7 +250,7 @@ function drawEnergies() {
 function drawPressure() {
   const { time, pressure } = source.curves(), colour = ink.accent;
   const lines = overlaid.filter(({ curves }) => curves.pressure).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
-  if (pressure) lines.push({ time, values: pressure, colour });
+  if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour });
   $('pressures').hidden = !lines.length;
   if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);
   const now = pressure && lastOf('pressure');
@@ -279,8 +279,8 @@ const withError = ({ value, error }) => value === null ? '' : !error ? short(val
 
 function tellNumbers() {
   const { temperature, mean_speed: speed, mean_pressure: pressure } = source.numbers?.() ?? {};
-  $('numbers').hidden = !temperature;
-  if (!temperature) return;
+  $('measured').hidden = !temperature || disks < FEWEST;
+  if ($('measured').hidden) return;
   const row = ([name, one]) => `<tr><td>${name}</td><td>${withError(one)}</td><td>${one.theory === null ? '' : short(one.theory)}</td></tr>`;
   $('numbers').innerHTML = '<tr><th></th><th>measured</th><th>theory</th></tr>'
     + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');
