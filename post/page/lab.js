@@ -56,7 +56,7 @@ const wish = () => ({
 
 const changesInWords = () => Object.entries(wish().settings).map(([key, value]) => {
   const slider = state.input.sliders.find(one => one.key === key);
-  return `${slider ? slider.words : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
+  return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
 }).join(' · ') || 'as in the file';
 
 // ---------- sliders with words ----------
@@ -299,6 +299,8 @@ function remove(box) {
   arrangeAll();
 }
 
+const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changes.at(-1)[1]} = ${changes.at(-1)[2]}` : '');
+
 function tellShelf() {
   $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
     const base = `keep/${lab.page}/${box.run}/`, link = part => make('a', { textContent: part, href: base + part, download: '' });
@@ -312,19 +314,20 @@ function tellShelf() {
     });
     const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
     away.addEventListener('click', () => remove(box));
-    const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), box.words + (box.changes.length ? ', then changed' : '')];
+    const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
     return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, link('input'), copy, ...(box.changes.length ? [link('script')] : []), link('output'), ...(own ? [] : [away])));
   }));
   const changes = current()?.changes ?? [];
   $('changes').replaceChildren(...changes.slice(-6).map(([time, name, value]) => make('li', { textContent: `t = ${short(time)}: ${name} = ${value}` })));
-  state.boxes.forEach(({ figure, letter, words: text }) => { figure.firstChild.textContent = `${letter}: ${text}`; });
+  state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
 // Boxes of one size side by side; the newest has all plots, with the curves of the others in them.
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
-  const size = many ? { width: width - 12, height: Math.floor(clientHeight * (upright ? 0.36 : 0.46)) - 26 } : null;
+  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.46) - 26;
+  const size = many ? { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) } : null;
   $('runs').classList.toggle('many', many);
   $('runs').style.gridTemplateColumns = `repeat(${count}, minmax(0, 1fr))`;
   for (const box of state.boxes) {
@@ -332,6 +335,7 @@ function arrangeAll() {
     box.figure.hidden = !boxes.includes(box);
     box.figure.style.height = many && box !== current() ? `${size.height + 50}px` : '';
     box.figure.classList.toggle('current', box === current());
+    box.figure.firstChild.style.width = many ? `${size.width}px` : '';
     if (isThere(box)) filmOf(box).arrange(size, many && box !== current());
   }
   tellShelf();
