@@ -32,7 +32,7 @@ from . import hard_disks
 from .program import ProgramError
 from .reader import Run, obstacles_of, walls_of
 from .simulation import NEVER, Simulation
-from .statistics import equilibration, series_mean
+from .statistics import SeriesMean, equilibration, series_mean
 
 DISKS = 20000  # of a run
 MEMORY = 2 << 30  # bytes of a process
@@ -253,6 +253,7 @@ class Bench:
         self.spoken = time.perf_counter()
         now, seen = self.simulation.time, self.simulation._observed()
         run, value = self.run, {name: part[0].item() for name, part in seen.items()}
+        value["time"] = now
         energies = {
             kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
             for kind in ("kinetic", "potential", "rotational")
@@ -261,7 +262,8 @@ class Bench:
             energies["potential"] = None
         if TURNS not in run.elements:
             energies["rotational"] = None
-        sample = (now, value["all/temperature"], value["all/mean_speed"], value["virial"])
+        names = "time", "all/kinetic_energy", "virial", "all/temperature", "all/mean_speed"
+        sample = tuple(value[name] for name in names)
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample)
         hit = value["collisions"] > 0
@@ -308,13 +310,23 @@ def pictured_run(simulation: Simulation) -> Run:
     return run
 
 
+def pressure_between(
+    time: np.ndarray, kt: np.ndarray, virial: np.ndarray, count: int, value: dict
+) -> SeriesMean:
+    """Mean pressure from the first to the last of these samples; the observable is that so far."""
+    apart = np.diff(time)
+    area = count * value["all/kinetic_energy"] + value["virial"] / (2 * value["time"])
+    area /= value["pressure"] or 1.0
+    return series_mean((count * kt[1:] * apart + np.diff(virial) / 2) / area, apart)
+
+
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     """Temperature, mean speed and pressure: value, error, and what theory has for them.
 
     Of what settles they are means over the time since it has settled, with the error of its
     series; else the values of now.  The pressure is between first and last of these samples.
     """
-    time, kt, speed, virial = samples
+    time, _, _, kt, speed = samples
     found = {
         "temperature": (value["all/temperature"], None),
         "mean_speed": (value["all/mean_speed"], None),
@@ -322,15 +334,12 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     }
     if settles and len(time) >= FEWEST:
         first = max(equilibration(kt), equilibration(speed))
-        apart = np.diff(time[first:])
-        if len(apart) >= FEWEST // 2:
-            area = run.count * kt[-1] + virial[-1] / (2 * time[-1])
-            area /= value["pressure"] or 1.0  # the observable is their ratio
-            force = (run.count * kt[first + 1 :] * apart + np.diff(virial[first:]) / 2) / area
+        if len(time) - first > FEWEST // 2:
+            late = samples[:, first:]
             for name, one in (
                 ("temperature", series_mean(kt[first:])),
                 ("mean_speed", series_mean(speed[first:])),
-                ("mean_pressure", series_mean(force, apart)),
+                ("mean_pressure", pressure_between(*late[:3], run.count, value)),
             ):
                 known = one.mean, one.error
                 found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
@@ -445,18 +454,24 @@ def scan(wish: dict) -> None:
 
 
 def measured(text: str, lines: str, name: str) -> tuple[float, float]:
-    """Mean of an observable in the second half of a few seconds, and its error."""
-    simulation, values, began = Simulation.__new__(Simulation), [], time.perf_counter()
+    """Mean of an observable in the second half of a second, and its error."""
+    simulation, samples, began = Simulation.__new__(Simulation), [], time.perf_counter()
     simulation._begin(text, lines)
     with simulation:
-        step = max(1, simulation.count // 2)
-        while time.perf_counter() < began + LOOK or len(values) < 2 * FEWEST:
-            values.append(float(np.sum(simulation.observable(name))))
-            collisions = simulation.collisions
-            simulation._go_on((np.inf, collisions + step, NEVER), LOOK / FEWEST)
+        count = simulation.count
+        step = max(1, count // 2)
+        while time.perf_counter() < began + LOOK or len(samples) < 2 * FEWEST:
+            seen = simulation._observed()
+            value = {key: float(np.sum(part)) for key, part in seen.items()}
+            value["time"] = simulation.time
+            samples.append([value[key] for key in ("time", "all/kinetic_energy", "virial", name)])
+            simulation._go_on((np.inf, simulation.collisions + step, NEVER), LOOK / FEWEST)
             if time.perf_counter() > began + 4 * LOOK:
                 break
-    one = series_mean(np.array(values[len(values) // 2 :]))
+    late = np.array(samples[len(samples) // 2 :]).T
+    one = series_mean(late[-1])
+    if name == "pressure":  # that is a mean since the start
+        one = pressure_between(*late[:3], count, value)
     return float(one.mean), float(one.error) if np.isfinite(one.error) else 0.0
 
 
