@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -43,7 +44,8 @@ return new Promise(done => requestAnimationFrame(function look() {
 
 
 def opened(browser, address):
-    """Open the page; milliseconds until disks move."""
+    """Open the page after a while, as people do; milliseconds until disks move."""
+    time.sleep(2)
     browser.open(address)
     for _ in range(LONGEST // 16):
         if moved := browser.run("return window.moved"):

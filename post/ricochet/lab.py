@@ -252,7 +252,6 @@ class Lab:
             self.runs += 1
             wish["run"] = self.runs
             worker.runs[str(self.runs)] = wish["input"]
-            worker.end_in(START)
         await worker.send(wish)
 
     def found(self, wish: dict) -> dict:
@@ -302,7 +301,9 @@ class Lab:
                     else:
                         file.set_exception(RunError(body.decode()))
                 else:
-                    if body.startswith((b'{"is": "scene"', b'{"is": "problems"')):
+                    if body.startswith(b'{"is": "starting"'):
+                        worker.end_in(START)  # not before: on a busy computer Python starts slowly
+                    elif body.startswith((b'{"is": "scene"', b'{"is": "problems"')):
                         worker.relax()
                     await socket.send_str(body.decode())
         for file in worker.files:

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 
 import aiohttp
@@ -19,6 +19,7 @@ import pytest
 
 from ricochet import Simulation
 from ricochet import lab as module
+from ricochet.worker import AHEAD
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
@@ -173,6 +174,25 @@ def test_frames_come_at_the_pace_and_changes_act_at_once(address):
             await one.say("step", time=0.01)
             after = place(await one.until("frame"))
             assert 0 < np.abs(after - before).max() < 0.2
+
+    asyncio.run(visit())
+
+
+def test_a_page_that_draws_slowly_lets_nothing_pile_up(address):
+    async def visit():
+        async with film(address) as one:
+            await one.start(pace=1)
+            frames = 0
+            with suppress(TimeoutError):
+                async with asyncio.timeout(None) as limit:
+                    while frames <= AHEAD:
+                        message = await one.socket.receive()
+                        frames += message.type == aiohttp.WSMsgType.BINARY
+                        if frames == AHEAD:
+                            limit.reschedule(asyncio.get_running_loop().time() + 2)
+            assert frames == AHEAD
+            await one.say("got")
+            await one.until("frame")
 
     asyncio.run(visit())
 
