@@ -8,7 +8,7 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
 function tell() {
-  const { time, frame, collisions } = moment, unknown = film.guesses?.[frame];
+  const { time, frame, collisions } = moment;
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
@@ -17,11 +17,8 @@ function tell() {
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
-  $('guess').textContent = !film.guesses?.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
-    : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
-    : (stands(frame) ? `Here the film shows frames as they are: ${unknown} of ${disks} disks collide between two.`
-      : `Here ${unknown} of ${disks} disks, which collide, stand until the next frame.`)
-      + (film.logged ? '' : ' output.event_log = .true. in the input would tell their paths.');
+  $('guess').textContent = !stands(frame) ? 'Here all paths are true.' : 'Here the film shows frames as they are'
+    + (film.kicked ? ': kicks bend the paths between them.' : film.logged ? '.' : '. output.event_log = .true. in the input would tell the paths.');
 }
 
 // What is seen, for those who do not: of the stage, and of each plot.
