@@ -248,10 +248,10 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
-bench: all  ## measures collisions per second; FULL=1: and more
+bench: all  ## measures collisions per second; FULL=1; bench-lab: the laboratory
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
 
-bench-lab: all library  ## measures waits and pictures per second of the laboratory, in a browser
+bench-lab: all library
 	@.ci/set-up demo test
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/bench_lab.py
 

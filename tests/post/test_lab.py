@@ -457,10 +457,12 @@ def alive(pids):
         ("work", ["KILL"]),
         ("placing", ["INT", "INT"]),
         ("placing", ["KILL"]),
+        ("keeping", ["KILL"]),
+        ("keeping", ["HUP", "TERM"]),
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
-    """Neither of runs that go on, nor of one that is still looking for places."""
+    """Neither of runs that go on, nor of one that looks for places, nor of a file being made."""
     hard = {"species.gas.packing_fraction": "0.545", "species.gas.radius": "", "run.seed": "7"}
 
     async def act(process, address):
@@ -470,9 +472,14 @@ def test_nothing_is_left_behind(program, tmp_path, at, signs):
             await one.start(pace=1.0)
             if at == "placing":
                 await one.say("start", input="gas", settings=hard, added=[], pace=1, playing=True)
+            keeping = asyncio.create_task(one.kept("output")) if at == "keeping" else None
+            while keeping and not (keeping.done() or any(tmp_path.iterdir())):
+                await asyncio.sleep(0)
             pids = children(process.pid)
             for sign in signs:
                 process.send_signal(getattr(signal, f"SIG{sign}"))
+            if keeping:
+                await asyncio.wait([keeping])
             return pids
 
     with laboratory(program, tmp_path) as (process, address):
