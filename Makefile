@@ -248,7 +248,7 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
-bench: all  ## measures collisions per second; FULL=1; bench-lab: the laboratory
+bench: all  ## measures collisions per second; FULL=1, and more; bench-lab
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
 
 bench-lab: all library
