@@ -67,7 +67,7 @@ shared_objects := $(shared:tests/support/%.f90=$(T)/%.o)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := all
-targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check sanitize lint coverage docs install \
+targets := all library wheel demo film lab notebook figures test unit-tests check bench bench-check bench-lab sanitize lint coverage docs install \
   uninstall dist set-up clean distclean help
 .PHONY: $(targets) FORCE
 
@@ -247,8 +247,12 @@ check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
 	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
-bench: all  ## measures collisions per second; FULL=1: and more
+bench: all  ## measures collisions per second; FULL=1, and more; bench-lab
 	@RICOCHET=$(BUILD)/ricochet runs/bench.sh $(if $(FULL),--full)
+
+bench-lab: all library
+	@.ci/set-up demo test
+	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/bench_lab.py
 
 bench-check:  ## counts instructions per collision against what is promised
 	@.ci/set-up bench

@@ -64,7 +64,7 @@ def frames_that_fit(run: Run, room: float) -> int:
     """
     more = (run.collisions is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.elements)
-    one = run.count * (8 + more + 1 / 8) * 4 / 3
+    one = run.count * (8 + more) * 4 / 3
     fixed = run.count * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
     turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
     return int(np.clip((room - fixed - min(turns, room / 2)) / (one + 50), 2, MOST_FRAMES))
@@ -125,24 +125,23 @@ def moving(run: Run, frames: list[int], before: int, top: float) -> dict[str, np
 
 def coded_turns(
     run: Run, paths: Paths, frames: list[int]
-) -> tuple[dict[str, bytearray], list[int]]:
-    """Collisions between the frames, and how many disks have unknown paths.
+) -> tuple[dict[str, bytearray], list[bool]]:
+    """Collisions between the frames, and whether the paths of all disks are known there.
 
     Of each gap between two frames the number of collisions; of each collision its disk, and three
     numbers: when, as share of the gap, and the velocity afterwards.
     """
     kind = "<f8" if run.count <= FEW_DISKS else "<f4"
-    blocks = {name: bytearray() for name in ("gaps", "turning", "turns", "guessed")}
-    guesses = []
+    blocks = {name: bytearray() for name in ("gaps", "turning", "turns")}
+    sure = []
     for k, turns in enumerate(paths.along(frames)):
         start, end = run.time[[frames[k], frames[k + 1]]]
         when = (turns.time - start) / (end - start if end > start else 1)
         blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
         blocks["turning"] += turns.disk.astype("<u4").tobytes()
         blocks["turns"] += np.column_stack([when, turns.velocity]).astype(kind).tobytes()
-        blocks["guessed"] += np.packbits(turns.guessed, bitorder="little").tobytes()
-        guesses.append(int(turns.guessed.sum()))
-    return blocks, guesses
+        sure.append(not turns.guessed.any())
+    return blocks, [*sure, True]
 
 
 def told_by_log(
@@ -294,7 +293,7 @@ def film(
     blocks = {name: b"".join(part[name].tobytes() for part in parts) for name in parts[0]}
     most = 0.4 * room // TURN  # the rest of its half is for the moments of events
     paths = Paths(run, most)
-    turns, guesses = coded_turns(run, paths, frames)
+    turns, sure = coded_turns(run, paths, frames)
     told, moments = told_by_log(run, paths, frames, most / 2)
     blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
     # Where displacements count from, without jumps until the first frame of the film.
@@ -303,7 +302,7 @@ def film(
     facts, own = scene(run)
     facts |= {
         "time": run.time[frames].tolist(),
-        "guesses": guesses,
+        "known": sure,
         "curves": curves(run),
         "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,

@@ -57,25 +57,22 @@ function cross(frame, moved) {
 // ---------- the way from frame to frame ----------
 
 // In the time between two frames a disk flies from the first one on, by way of its turns; each flight is straight, or a parabola
-// under gravity. A disk whose path is not known stands still until the next frame; where many do, all stand: the frame is shown
-// as it is. What comes from a worker has no ways, but frames that are close enough.
-const MANY = 0.1;              // of the disks
-let ways;                      // of a film: what is known between frames
-// start: the first collision after each frame; disk, and share of the time, new velocity of each; bits: disks whose paths are
-// not known, of `row` bytes a gap; pairs, others: times of all collisions of two disks, and of other ones, if they are known
-const isGuessed = (k, disk) => !ways || ways.bits[k * ways.row + (disk >> 3)] >> (disk & 7) & 1;
-const stands = k => !ways || film.guesses[k] > MANY * disks;
+// under gravity. Where not all ways are known all disks stand: the frame is shown as it is. What comes from a worker has no ways,
+// but frames that are close enough.
+let ways;  // of a film: the first collision after each frame (start); disk, and share of the time, new velocity of each (turns);
+           // times of all collisions of two disks (pairs), and of other ones, if they are known
+const stands = k => !film.known?.[k];
 
 function move(time) {
   moment.time = clamp(time, first(), last());
   const k = moment.frame = frameAt(moment.time), here = past[k], then = past[k + 1], { place, velocity, crossed } = here;
   const passed = stands(k) ? 0 : moment.time - here.time, share = passed && then ? passed / (then.time - here.time) : 0;
   const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic, [gx, gy] = film.gravity;
-  const { start, disk, turns } = ways ?? {}, stop = start?.[k + 1], unknown = film.guesses?.[k];
+  const { start, disk, turns } = ways ?? {}, stop = start?.[k + 1];
   moment.shown = here.time + passed;
   for (let i = 0, turn = start?.[k]; i < disks; i++) {
     let x = place[2 * i], y = place[2 * i + 1], vx = velocity[2 * i], vy = velocity[2 * i + 1], since = 0, met = 0, dt;
-    if (passed && !(unknown && isGuessed(k, i))) {
+    if (passed) {
       for (; turn < stop && disk[turn] === i && turns[3 * turn] <= share; turn++) {
         dt = (then.time - here.time) * turns[3 * turn] - since;
         x += (vx + 0.5 * gx * dt) * dt;
@@ -129,7 +126,7 @@ function displacement(i) {
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
-    const here = past[k], then = past[k + 1], h = then.time - here.time, guessed = isGuessed(k, i), own = [], { start, disk, turns } = ways ?? {};
+    const here = past[k], then = past[k + 1], h = then.time - here.time, guessed = stands(k), own = [], { start, disk, turns } = ways ?? {};
     const pair = array => [array[2 * i], array[2 * i + 1]], g = guessed ? [0, 0] : film.gravity;
     let place = pair(here.place), velocity = pair(here.velocity), since = 0;
     if (guessed) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
@@ -171,7 +168,7 @@ function loadFilm({ facts, blocks }) {
   }, signs)));
   angles = turned && new Float32Array(disks);
   origins = block('origins', Float32Array).map((one, k) => lower[k % 2] + edges[k % 2] * one);
-  ways = { disk: block('turning', Uint32Array), turns: block('turns', real), bits: bytes(blocks.guessed), row: Math.ceil(disks / 8), start: [0] };
+  ways = { disk: block('turning', Uint32Array), turns: block('turns', real), start: [0] };
   block('gaps', Uint32Array).forEach((count, k) => ways.start.push(ways.start[k] + count));
   for (const name of ['pairs', 'others']) ways[name] = block(name, Float64Array);
   source = fromFile;

@@ -12,7 +12,7 @@ const state = {
   paused: false,
 };
 // What acts on the disks that move; all else starts anew.
-const ACTS = /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|motion|amplitude|period|velocity))/;
+const ACTS = /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|velocity))/;
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', pressure: 'pressure', dissipated_energy: 'energy lost', collisions: 'collisions' };
 const MOST_KEPT = 3, FULL = 0.5;  // runs on the shelf; share of the area that random placing fills with ease
 
@@ -56,7 +56,7 @@ const wish = () => ({
 
 const changesInWords = () => Object.entries(wish().settings).map(([key, value]) => {
   const slider = state.input.sliders.find(one => one.key === key);
-  return `${slider ? slider.words : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
+  return `${slider ? slider.words.replace(/ \(.*/, '') : key} = ${slider?.at >= 0 ? split(value)[slider.at] : value}`;
 }).join(' · ') || 'as in the file';
 
 // ---------- sliders with words ----------
@@ -107,7 +107,7 @@ function buildSlider(spec) {
   row.sync = () => {
     const value = read(spec), top = most(), place = 1000 * (scaled(value) - scaled(from)) / (scaled(top) - scaled(from));
     if (document.activeElement !== range) range.value = clampTo(place);
-    if (document.activeElement !== field) field.value = short(value).replace('−', '-');
+    if (document.activeElement !== field) field.value = integer ? value : short(value).replace('−', '-');
     range.setAttribute('aria-valuetext', `${short(value)}, from ${short(from)} to ${short(top)}`);
     row.classList.toggle('changed', key in state.settings);
     row.classList.toggle('wrong', key in state.waiting);
@@ -168,21 +168,26 @@ function addGroup(kind, name) {
 
 // ---------- an input ----------
 
+// Its run starts before the form is there.
 async function choose(name) {
-  const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
-  if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
-  const form = await answer.json(), input = lab.inputs.find(one => one.name === name);
-  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: form.groups, settings: {}, waiting: {}, added: [] });
+  const input = lab.inputs.find(one => one.name === name);
+  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, waiting: {}, added: [] });
+  run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
   if (input.picture) $('own').src = input.picture;
   $('sentence').textContent = input.sentence;
+  $('sliders').replaceChildren();
+  const answer = await fetch('form?' + encodeURIComponent(name)).catch(() => null);
+  if (!answer?.ok) { tell(answer ? await answer.text() : 'No answer: the laboratory has ended.', true); return; }
+  const form = await answer.json();
+  if (state.input.name !== name) return;  // another has been chosen meanwhile
+  state.groups = form.groups;
   $('about').replaceChildren(...form.about.split(/\n\n+/).map(text => make('p', { textContent: text })));
   $('sliders').replaceChildren(...state.input.sliders.map(buildSlider));
   $('scanned').replaceChildren(...state.input.sliders.map((slider, k) => new Option(slider.words, k)));
   buildEverything();
   sync();
-  run();
 }
 
 function buildInputs() {
@@ -255,7 +260,7 @@ function hear(source, news) {
     ready();
   } else if (news.is === 'state') {
     box.changes = news.changes;
-    if (news.reason) tell(news.reason, !news.ended);
+    if (news.reason) tell(news.reason, true);
     tellShelf();
   } else if (news.is === 'scan') addToScan(news);
   else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
@@ -294,28 +299,35 @@ function remove(box) {
   arrangeAll();
 }
 
+const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${changes.at(-1)[1]} = ${changes.at(-1)[2]}` : '');
+
 function tellShelf() {
   $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
     const base = `keep/${lab.page}/${box.run}/`, link = part => make('a', { textContent: part, href: base + part, download: '' });
     const copy = make('button', { type: 'button', textContent: 'command', title: box.command });
     copy.addEventListener('click', () => navigator.clipboard.writeText(box.command).then(() => tell('copied: ' + box.command), () => prompt('The command:', box.command)));
     const seen = make('input', { type: 'checkbox', checked: box.shown, ariaLabel: `run ${box.letter} is seen` });
-    seen.addEventListener('change', () => { box.shown = seen.checked; arrangeAll(); });
+    seen.addEventListener('change', () => {
+      box.shown = seen.checked;
+      filmOf(box).play(box.shown && !state.paused);
+      arrangeAll();
+    });
     const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
     away.addEventListener('click', () => remove(box));
-    const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), box.words + (box.changes.length ? ', then changed' : '')];
+    const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
     return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, link('input'), copy, ...(box.changes.length ? [link('script')] : []), link('output'), ...(own ? [] : [away])));
   }));
   const changes = current()?.changes ?? [];
   $('changes').replaceChildren(...changes.slice(-6).map(([time, name, value]) => make('li', { textContent: `t = ${short(time)}: ${name} = ${value}` })));
-  state.boxes.forEach(({ figure, letter, words: text }) => { figure.firstChild.textContent = `${letter}: ${text}`; });
+  state.boxes.forEach(box => { box.figure.firstChild.textContent = `${box.letter}: ${whatIs(box)}`; });
 }
 
 // Boxes of one size side by side; the newest has all plots, with the curves of the others in them.
 function arrangeAll() {
   const boxes = shownBoxes(), many = boxes.length > 1, { clientWidth, clientHeight } = $('runs');
   const upright = clientWidth < 560, count = many ? boxes.length : 1, width = Math.floor(clientWidth / count);
-  const size = many ? { width: width - 12, height: Math.floor(clientHeight * (upright ? 0.36 : 0.46)) - 26 } : null;
+  const shapes = films().map(one => one.inside().film?.edges).filter(Boolean).map(([x, y]) => y / x), highest = clientHeight * (upright ? 0.36 : 0.46) - 26;
+  const size = many ? { width: width - 12, height: Math.floor(Math.min(highest, (width - 12) * Math.max(0.5, ...shapes))) } : null;
   $('runs').classList.toggle('many', many);
   $('runs').style.gridTemplateColumns = `repeat(${count}, minmax(0, 1fr))`;
   for (const box of state.boxes) {
@@ -323,6 +335,7 @@ function arrangeAll() {
     box.figure.hidden = !boxes.includes(box);
     box.figure.style.height = many && box !== current() ? `${size.height + 50}px` : '';
     box.figure.classList.toggle('current', box === current());
+    box.figure.firstChild.style.width = many ? `${size.width}px` : '';
     if (isThere(box)) filmOf(box).arrange(size, many && box !== current());
   }
   tellShelf();

@@ -8,7 +8,7 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
 function tell() {
-  const { time, frame, collisions } = moment, unknown = film.guesses?.[frame];
+  const { time, frame, collisions } = moment;
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
@@ -17,11 +17,8 @@ function tell() {
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
-  $('guess').textContent = !film.guesses?.some(count => count) ? '' : !unknown ? 'Here all paths are true.'
-    : film.kicked ? 'Here the film shows frames as they are: kicks bend the paths between them.'
-    : (stands(frame) ? `Here the film shows frames as they are: ${unknown} of ${disks} disks collide between two.`
-      : `Here ${unknown} of ${disks} disks, which collide, stand until the next frame.`)
-      + (film.logged ? '' : ' output.event_log = .true. in the input would tell their paths.');
+  $('guess').textContent = !stands(frame) ? 'Here all paths are true.' : 'Here the film shows frames as they are'
+    + (film.kicked ? ': kicks bend the paths between them.' : film.logged ? '.' : '. output.event_log = .true. in the input would tell the paths.');
 }
 
 // What is seen, for those who do not: of the stage, and of each plot.
@@ -250,7 +247,7 @@ function drawEnergies() {
 function drawPressure() {
   const { time, pressure } = source.curves(), colour = ink.accent;
   const lines = overlaid.filter(({ curves }) => curves.pressure).map(({ letter, curves }) => ({ time: curves.time, values: curves.pressure, colour, letter }));
-  if (pressure) lines.push({ time, values: pressure, colour });
+  if (pressure?.some(one => one !== null)) lines.push({ time, values: pressure, colour });
   $('pressures').hidden = !lines.length;
   if (lines.length) plotLines($('pressure'), lines, overlaid.length ? Infinity : moment.time);
   const now = pressure && lastOf('pressure');
@@ -279,8 +276,8 @@ const withError = ({ value, error }) => value === null ? '' : !error ? short(val
 
 function tellNumbers() {
   const { temperature, mean_speed: speed, mean_pressure: pressure } = source.numbers?.() ?? {};
-  $('numbers').hidden = !temperature;
-  if (!temperature) return;
+  $('measured').hidden = !temperature || disks < FEWEST;
+  if ($('measured').hidden) return;
   const row = ([name, one]) => `<tr><td>${name}</td><td>${withError(one)}</td><td>${one.theory === null ? '' : short(one.theory)}</td></tr>`;
   $('numbers').innerHTML = '<tr><th></th><th>measured</th><th>theory</th></tr>'
     + Object.entries({ temperature, 'mean speed': speed, pressure }).filter(([, one]) => one && one.value !== null).map(row).join('');

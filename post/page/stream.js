@@ -146,7 +146,8 @@ const fromWorker = {
   // One step beyond what is there is the worker's.
   goOn(what) {
     play(false);
-    if (moment.time !== last()) return false;
+    if (what === 'step' && moment.time !== last()) return false;
+    show(last(), true);
     stream.live = stream.asked = true;
     send({ do: what, time: paceNow() / 30 });
     return true;

@@ -14,6 +14,7 @@ import shlex
 import shutil
 import struct
 import subprocess
+from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -28,6 +29,10 @@ RUNS = 4  # of a page
 START = 20.0  # seconds that placing the disks may take
 SCAN = 60.0  # seconds that a scan may take
 DOWNLOAD = 20.0  # seconds
+GRACE = 3.0  # seconds, after which a worker that has been asked to end is forced to
+FILES = 3  # of a run that are on their way
+NAME = re.compile(r"[\w.-]{1,200}")  # of a variable or a group
+GONE = "this run is not there any more"
 DOES = {"start", "change", "heat", "play", "pause", "pace", "step", "event", "got", "scan"}
 
 
@@ -78,13 +83,17 @@ class Worker:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         """Take one that has been started."""
-        self.process, self.run, self.name, self.file = process, 0, "", None
+        self.process = process
+        self.runs: dict[str, str] = {}  # number of each run that was wished, and its input
+        self.files: deque[asyncio.Future] = deque()  # that it has been asked for
+        self.scan: asyncio.Task | None = None
         self.deadline: asyncio.TimerHandle | None = None
 
-    def send(self, wish: Mapping) -> None:
-        """Tell it what to do; nothing happens if it has ended."""
+    async def send(self, wish: Mapping) -> None:
+        """Tell it what to do, as soon as it listens; nothing happens if it has ended."""
         with suppress(ConnectionError, RuntimeError):
             self.process.stdin.write(json.dumps(wish).encode() + b"\n")
+            await self.process.stdin.drain()
 
     async def heard(self) -> tuple[bytes, bytes]:
         """Its next answer: a letter, and what it says.  Raises IncompleteReadError at its end."""
@@ -103,9 +112,9 @@ class Worker:
             self.deadline = None
 
     def kill(self) -> None:
-        """End it, whatever it does."""
+        """End it, whatever it does; unless it is busy with a file, which it removes first."""
         with suppress(ProcessLookupError):
-            self.process.kill()
+            self.process.terminate()
 
 
 class Lab:
@@ -117,11 +126,10 @@ class Lab:
         self.folders = [folder.resolve() for folder in folders]
         self.command = command
         self.table = printed("--print-variables")
-        self.pages: dict[str, dict[int, Worker]] = {}  # the workers of each, by a number of its own
+        self.pages: dict[str, dict[object, Worker | None]] = {}  # the workers of each
         self.waiting: list[str] = []  # numbers of pages that have not opened a socket yet
         self.workers: set[Worker] = set()
         self.spare: asyncio.Task | None = None
-        self.scans: set[asyncio.Task] = set()
         self.runs = 0
         self.closed = False
 
@@ -158,7 +166,12 @@ class Lab:
         """It is not needed any more."""
         worker.relax()
         worker.kill()
-        await worker.process.wait()
+        try:
+            async with asyncio.timeout(GRACE):
+                await worker.process.wait()
+        except TimeoutError:
+            worker.process.kill()
+            await worker.process.wait()
         self.workers.discard(worker)
 
     async def close(self) -> None:
@@ -187,31 +200,42 @@ class Lab:
         if len(runs) >= RUNS or (number not in self.pages and len(self.pages) >= PAGES):
             raise RunError(f"{RUNS} runs of a page and {PAGES} pages can be open: close one")
         self.pages[number] = runs
-        place = max(runs, default=0) + 1
-        runs[place] = worker = await self.worker()
+        place = object()
+        runs[place] = None  # taken from now on
         socket = web.WebSocketResponse(heartbeat=30.0, max_msg_size=1_000_000)
         try:
+            runs[place] = worker = await self.worker()
             await socket.prepare(request)
-            listening = asyncio.create_task(self.listen(worker, socket, number))
+            await self.converse(worker, socket)
+        finally:
+            worker = runs.pop(place)
+            if not runs:
+                self.pages.pop(number, None)
+                self.waiting = [*self.waiting[1 - 16 * PAGES :], number]  # it may come back
+            if worker:
+                await self.end(worker)
+        return socket
+
+    async def converse(self, worker: Worker, socket: web.WebSocketResponse) -> None:
+        """Until the page leaves, or the worker has ended."""
+        listening = asyncio.create_task(self.listen(worker, socket))
+        try:
             async for message in socket:
                 if message.type != WSMsgType.TEXT:
                     continue
                 try:
                     await self.hear(worker, socket, json.loads(message.data))
-                except RunError as problem:
-                    lines = [{"place": "", "text": str(problem), "limit": None}]
-                    news = {"is": "problems", "change": False, "problems": lines}
-                    await socket.send_json(news)
+                except (RunError, OSError) as problem:
+                    with suppress(ConnectionError):
+                        await socket.send_json(wrong(problem))
                 except (AttributeError, LookupError, RecursionError, TypeError, ValueError):
-                    await socket.send_json({"is": "state", "reason": "not understood"})
-            listening.cancel()
+                    with suppress(ConnectionError):
+                        await socket.send_json({"is": "state", "reason": "not understood"})
         finally:
-            del runs[place]
-            if not runs:
-                self.pages.pop(number, None)
-                self.waiting = [*self.waiting[1 - 16 * PAGES :], number]  # it may come back
-            await self.end(worker)
-        return socket
+            listening.cancel()
+            if worker.scan:
+                worker.scan.cancel()
+                await asyncio.wait([worker.scan])
 
     async def hear(self, worker: Worker, socket: web.WebSocketResponse, wish: dict) -> None:
         """What a page wants of a worker."""
@@ -220,16 +244,15 @@ class Lab:
         if wish["do"] in ("start", "scan"):
             wish |= self.found(wish)
         if wish["do"] == "scan":
-            task = asyncio.create_task(self.scan(socket, wish))
-            self.scans.add(task)
-            task.add_done_callback(self.scans.discard)
+            if worker.scan and not worker.scan.done():
+                raise RunError("one scan at a time")
+            worker.scan = asyncio.create_task(self.scan(socket, wish))
             return
         if wish["do"] == "start":
             self.runs += 1
-            worker.run = wish["run"] = self.runs
-            worker.name = wish["input"]
-            worker.end_in(START)
-        worker.send(wish)
+            wish["run"] = self.runs
+            worker.runs[str(self.runs)] = wish["input"]
+        await worker.send(wish)
 
     def found(self, wish: dict) -> dict:
         """The text of an input with the groups that are added; the command for the same run.
@@ -240,10 +263,15 @@ class Lab:
         path = self.inputs[name]
         text = path.read_text(encoding="utf-8", errors="surrogateescape")
         for kind, label in added:
-            text = f"{text.rstrip()}\n\n&{kind}\n  name = {value_text('name', str(label))}\n/\n"
-        for key, value in settings.items():
-            if key.endswith(".file"):
-                self.allow(value.strip("'\" "))
+            if kind not in self.table or not NAME.fullmatch(label):
+                raise RunError(f"no group can be called {kind} {label}")
+            text = f"{text.rstrip()}\n\n&{kind}\n  name = {value_text('name', label)}\n/\n"
+        scanned = [(wish["variable"], one) for one in wish.get("values", ())]
+        for key, value in [*settings.items(), *scanned]:
+            if not NAME.fullmatch(key) or not value.isprintable():
+                raise RunError(f"{key!r:.80} and {value!r:.80}: no variable and its value")
+            if key.lower().endswith("file"):
+                self.allow(value)
         program = shown(Path(find_program()))
         words = [word for item in settings.items() for word in ("--set", "=".join(item))]
         words = [program, shown(path), *words, "-o", f"runs/{name}.h5"]
@@ -253,30 +281,37 @@ class Lab:
 
     def allow(self, file: str) -> None:
         """Refuse a file of disks that is not where those of inputs are."""
-        path = Path(file).resolve()
+        path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
             raise RunError(f"{file}: lies elsewhere; start the laboratory with --files FOLDER")
 
-    async def listen(self, worker: Worker, socket: web.WebSocketResponse, number: str) -> None:
+    async def listen(self, worker: Worker, socket: web.WebSocketResponse) -> None:
         """Pass on what a worker says; the socket closes with it."""
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 kind, body = await worker.heard()
                 if kind == b"b":
                     await socket.send_bytes(body)
-                elif kind == b"f":
-                    worker.file.set_result(body)
-                elif body.startswith((b'{"is": "scene"', b'{"is": "problems"')):
-                    worker.relax()
+                elif kind in b"fe":
+                    file = worker.files.popleft()
+                    if file.done():  # nobody waits any more
+                        continue
+                    if kind == b"f":
+                        file.set_result(body)
+                    else:
+                        file.set_exception(RunError(body.decode()))
+                else:
+                    if body.startswith(b'{"is": "starting"'):
+                        worker.end_in(START)  # not before: on a busy computer Python starts slowly
+                    elif body.startswith((b'{"is": "scene"', b'{"is": "problems"')):
+                        worker.relax()
                     await socket.send_str(body.decode())
-                elif not body.startswith((b'{"is": "ready"', b'{"is": "file"')):
-                    await socket.send_str(body.decode())
-        if worker.file and not worker.file.done():
-            worker.file.set_exception(RunError("the run has ended"))
+        for file in worker.files:
+            if not file.done():
+                file.set_exception(RunError("the run has ended"))
         if not socket.closed:
-            lines = [{"place": "", "limit": None, "text": self.cause(worker)}]
             with suppress(ConnectionError):
-                await socket.send_json({"is": "problems", "change": False, "problems": lines})
+                await socket.send_json(wrong(self.cause(worker)))
             await socket.close()
 
     def cause(self, worker: Worker) -> str:
@@ -288,29 +323,40 @@ class Lab:
     async def scan(self, socket: web.WebSocketResponse, wish: dict) -> None:
         """A scan, by a worker of its own."""
         worker = await self.worker()
-        worker.end_in(SCAN)
-        worker.send(wish)
-        left = len(wish["values"])
-        with suppress(asyncio.IncompleteReadError, ConnectionError):
-            while left > 0:
-                _, body = await worker.heard()
-                if body.startswith(b'{"is": "scan"'):
+        try:
+            worker.end_in(SCAN)
+            await worker.send(wish)
+            left = len(wish["values"])
+            with suppress(asyncio.IncompleteReadError, ConnectionError):
+                while left > 0:
+                    _, body = await worker.heard()
                     left = 0 if b'"text"' in body else left - 1
                     await socket.send_str(body.decode())
-        await self.end(worker)
+        finally:
+            await self.end(worker)
 
     async def kept(self, number: str, run: str, part: str) -> tuple[str, bytes]:
         """A part of what a run was: the name of the file, and its bytes."""
         workers = self.pages.get(number, {}).values()
-        worker = next((one for one in workers if str(one.run) == run), None)
+        worker = next((one for one in workers if one and run in one.runs), None)
         if worker is None:
-            raise RunError("this run is not there any more")
-        if worker.file and not worker.file.done():
+            raise RunError(GONE)
+        if len(worker.files) >= FILES:
             raise RunError("one file at a time")
-        worker.file = asyncio.get_running_loop().create_future()
-        worker.send({"do": "keep", "part": part})
-        async with asyncio.timeout(DOWNLOAD):
-            return worker.name, await worker.file
+        file = asyncio.get_running_loop().create_future()
+        worker.files.append(file)
+        try:
+            async with asyncio.timeout(DOWNLOAD):
+                await worker.send({"do": "keep", "part": part, "run": int(run)})
+                return worker.runs[run], await file
+        except TimeoutError:
+            raise RunError("the run is busy: try again") from None
+
+
+def wrong(problem: object) -> dict:
+    """What a page is told of a wish that cannot be."""
+    lines = [{"place": "", "text": str(problem), "limit": None}]
+    return {"is": "problems", "change": False, "problems": lines}
 
 
 def path_of(folder: Path, name: str) -> Path:

@@ -24,6 +24,7 @@ LOOK = 0.5  # seconds between looks whether the run has ended
 DIED = "was killed or has crashed"
 PATIENCE = 10.0  # seconds since a page last asked, after which none is left to be told the end
 LONGEST = 1_000_000  # bytes of a request
+SILENCE = 5.0  # seconds that a connection may wait with its first request
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -49,18 +50,19 @@ async def guarded(request: web.Request, handler: Callable) -> web.StreamResponse
     own &= request.headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")
     if "Upgrade" in request.headers:  # browsers always say where a socket is opened
         own &= bool(origin)
+    request.app[SERVER]["heard"].add(request.protocol)
     if not own:
         return web.Response(status=403, text="only for pages of this server\n")
     try:
         return await handler(request)
-    except RunError as problem:
+    except (RunError, OSError) as problem:
         return web.Response(status=409, text=f"{problem}\n")
 
 
 def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Application:
     """A server with a function for each path; `frames`: whose pages may show its own as a part."""
     app = web.Application(middlewares=[guarded], client_max_size=LONGEST)
-    app[SERVER] = {}
+    app[SERVER] = {"heard": set()}  # connections that have asked for something
     app.add_routes([web.get(path, handler) for path, handler in paths.items()])
 
     async def sign(_: web.Request, response: web.StreamResponse) -> None:
@@ -71,13 +73,28 @@ def application(paths: Mapping[str, Callable], frames: str = "'none'") -> web.Ap
     return app
 
 
+async def drop_silent(app: web.Application, server: web.Server) -> None:
+    """Close connections on which nobody asks, so that a crowd of them keeps nobody out."""
+    heard, clock = app[SERVER]["heard"], asyncio.get_running_loop().time
+    since: dict = {}
+    while True:
+        await asyncio.sleep(LOOK)
+        now = clock()
+        heard.intersection_update(server.connections)
+        since = {one: since.get(one, now) for one in server.connections if one not in heard}
+        for one, first in since.items():
+            if now > first + SILENCE:
+                one.force_close()
+
+
 @asynccontextmanager
 async def serving(app: web.Application, port: int = 0):
     """Answer requests; gives the address, and an event that Ctrl-C, TERM and HUP set.
 
     Raises RunError if the port is taken.
     """
-    logging.getLogger("aiohttp").setLevel(logging.CRITICAL)  # requests are of no interest
+    for name in ("aiohttp", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # requests are of no interest
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
@@ -90,9 +107,11 @@ async def serving(app: web.Application, port: int = 0):
         except OSError as problem:
             raise RunError(f"port {port}: {os.strerror(problem.errno)}") from None
         app[SERVER]["port"] = runner.addresses[0][1]
+        watch = asyncio.create_task(drop_silent(app, runner.server))
         address = f"http://{ADDRESS}:{app[SERVER]['port']}/"
         print(f"{address}  (Ctrl-C ends)", flush=True)
         yield address, stop
+        watch.cancel()
     finally:
         await runner.cleanup()
 

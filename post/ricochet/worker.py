@@ -32,7 +32,7 @@ from . import hard_disks
 from .program import ProgramError
 from .reader import Run, obstacles_of, walls_of
 from .simulation import NEVER, Simulation
-from .statistics import equilibration, series_mean
+from .statistics import SeriesMean, equilibration, series_mean
 
 DISKS = 20000  # of a run
 MEMORY = 2 << 30  # bytes of a process
@@ -64,12 +64,14 @@ class Bench:
         self.actions: list[tuple[float, str, object]] = []  # since the start: time, what, value
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
         self.happened: tuple | None = None
+        self.goal: tuple[float, int, int] | None = None  # of a step that is on its way
 
     # --- what it is told ---
 
     def start(self, wish: dict) -> None:
         """Another simulation in the place of this one, if it can be."""
         tell({"is": "starting"})
+        pace = max(0.0, float(wish["pace"] or 0.0))
         other = Simulation.__new__(Simulation)
         try:
             other._begin(wish["text"], told(wish["settings"]))
@@ -80,9 +82,9 @@ class Bench:
             return
         if self.simulation:
             self.simulation.close()
-        self.simulation, self.wish, self.initial = other, wish, other.input
+        self.simulation, self.wish, self.initial, self.pace = other, wish, other.input, pace
         self.actions, self.ended, self.reason = [], False, ""
-        self.playing, self.pace = bool(wish["playing"]), wish["pace"] or 0.0
+        self.playing, self.goal = bool(wish["playing"]), None
         self.unseen = 0
         self.renew(changed=False)
 
@@ -133,12 +135,12 @@ class Bench:
 
     def play(self, _: dict) -> None:
         """Go on."""
-        self.playing, self.due = True, time.perf_counter()
+        self.playing, self.goal, self.due = True, None, time.perf_counter()
         self.tell_state()
 
     def pause(self, _: dict) -> None:
         """Stand still."""
-        self.playing = False
+        self.playing, self.goal = False, None
         self.speak()
         self.tell_state()
 
@@ -152,54 +154,72 @@ class Bench:
 
     def step(self, wish: dict) -> None:
         """Go on by some time, and stand still."""
-        self.playing = False
-        self.advance(self.simulation.time + float(wish["time"]), NEVER, wait=True)
+        if not (more := float(wish["time"])) >= 0:
+            raise ValueError("a step goes on")
+        self.playing, self.goal = False, (self.simulation.time + more, NEVER, NEVER)
 
-    def event(self, _: dict) -> None:
+    def event(self, wish: dict) -> None:
         """Go on by one event, and stand still."""
-        self.playing = False
-        if not self.run.time_step and (coming := self.simulation.next_events(1)):
-            self.happened = coming[0]
-        self.advance(np.inf, self.simulation.events + 1, wait=True)
+        coming = [] if self.run.time_step else self.simulation.next_events(1)
+        if not coming and not self.run.time_step:
+            self.pause(wish)  # nothing will happen
+            return
+        self.playing, self.goal = False, (np.inf, NEVER, self.simulation.events + 1)
+        self.happened = coming[0] if coming else None
 
     def keep(self, wish: dict) -> None:
         """What the run was, as a file: `input`, `script` or `output`."""
-        kind, body = wish["part"], None
+        if self.simulation is None or self.wish["run"] != wish["run"]:
+            send(b"e", b"this run is not there any more")
+            return
         name = self.wish["input"]
-        if kind == "input":
-            body = (self.simulation.input if self.actions else self.initial).encode()
-        elif kind == "script":
-            body = script(name, self.initial, self.actions, self.simulation.time).encode()
-        elif kind == "output":
+        try:
+            if wish["part"] == "output":
+                body = self.saved(f"{name}.h5")
+            elif wish["part"] == "script":
+                body = script(name, self.initial, self.actions, self.simulation.time)
+            else:
+                body = self.simulation.input if self.actions else self.initial
+        except (OSError, ProgramError) as problem:
+            send(b"e", str(problem).encode())
+            return
+        send(b"f", body if isinstance(body, bytes) else body.encode(errors="surrogateescape"))
+
+    def saved(self, name: str) -> bytes:
+        """The output file; a signal that ends this process waits until its folder is gone."""
+        ends: list[int] = []  # not blocked: another thread of a library would take the signal
+        before = signal.signal(signal.SIGTERM, lambda number, _: ends.append(number))
+        try:
             with tempfile.TemporaryDirectory(prefix="ricochet-lab-") as folder:
-                body = self.simulation.save(Path(folder) / f"{name}.h5").read_bytes()
-        tell({"is": "file", "bytes": len(body)})
-        send(b"f", body)
+                return self.simulation.save(Path(folder) / name).read_bytes()
+        finally:
+            signal.signal(signal.SIGTERM, before)
+            if ends:
+                sys.exit()
 
     # --- what it does ---
 
     def moves(self) -> bool:
         """Whether it is to go on now."""
-        ready = self.simulation and self.playing and not self.ended and self.pace > 0
-        return bool(ready and self.unseen < AHEAD)
+        ready = self.simulation and not self.ended and self.unseen < AHEAD
+        return bool(ready and (self.goal or (self.playing and self.pace > 0)))
 
     def go_on(self) -> None:
         """To the time of the next frame, or as far as the engine comes in a while."""
         now = time.perf_counter()
         passed, self.due = min(now - self.due, 0.1), now
-        self.advance(self.simulation.time + self.pace * passed, NEVER)
-
-    def advance(self, until: float, events: int, wait: bool = False) -> None:
-        """Advance, and show where that has led."""
+        stepping = self.goal
+        limits = stepping or (self.simulation.time + self.pace * passed, NEVER, NEVER)
         try:
-            while self.simulation._go_on((until, NEVER, events), SLICE) and wait:
-                pass
+            if self.simulation._go_on(limits, SLICE) and stepping:
+                return  # a step is shown as a whole
         except ProgramError as problem:
             self.ended, self.reason = True, str(problem)
+        self.goal = None
         self.show()
-        if self.ended or not self.playing or time.perf_counter() > self.spoken + SPEAK:
+        if self.ended or stepping or now > self.spoken + SPEAK:
             self.speak()
-        if self.ended or wait:
+        if self.ended or stepping:
             self.tell_state()
 
     def show(self) -> None:
@@ -236,6 +256,7 @@ class Bench:
         self.spoken = time.perf_counter()
         now, seen = self.simulation.time, self.simulation._observed()
         run, value = self.run, {name: part[0].item() for name, part in seen.items()}
+        value["time"] = now
         energies = {
             kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
             for kind in ("kinetic", "potential", "rotational")
@@ -244,7 +265,8 @@ class Bench:
             energies["potential"] = None
         if TURNS not in run.elements:
             energies["rotational"] = None
-        sample = (now, value["all/temperature"], value["all/mean_speed"], value["virial"])
+        names = "time", "all/kinetic_energy", "virial", "all/temperature", "all/mean_speed"
+        sample = tuple(value[name] for name in names)
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample)
         hit = value["collisions"] > 0
@@ -291,13 +313,23 @@ def pictured_run(simulation: Simulation) -> Run:
     return run
 
 
+def pressure_between(
+    time: np.ndarray, kt: np.ndarray, virial: np.ndarray, count: int, value: dict
+) -> SeriesMean:
+    """Mean pressure from the first to the last of these samples; the observable is that so far."""
+    apart = np.diff(time)
+    area = count * value["all/kinetic_energy"] + value["virial"] / (2 * value["time"])
+    area /= value["pressure"] or 1.0
+    return series_mean((count * kt[1:] * apart + np.diff(virial) / 2) / area, apart)
+
+
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     """Temperature, mean speed and pressure: value, error, and what theory has for them.
 
     Of what settles they are means over the time since it has settled, with the error of its
     series; else the values of now.  The pressure is between first and last of these samples.
     """
-    time, kt, speed, virial = samples
+    time, _, _, kt, speed = samples
     found = {
         "temperature": (value["all/temperature"], None),
         "mean_speed": (value["all/mean_speed"], None),
@@ -305,15 +337,12 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     }
     if settles and len(time) >= FEWEST:
         first = max(equilibration(kt), equilibration(speed))
-        apart = np.diff(time[first:])
-        if len(apart) >= FEWEST // 2:
-            area = run.count * kt[-1] + virial[-1] / (2 * time[-1])
-            area /= value["pressure"] or 1.0  # the observable is their ratio
-            force = (run.count * kt[first + 1 :] * apart + np.diff(virial[first:]) / 2) / area
+        if len(time) - first > FEWEST // 2:
+            late = samples[:, first:]
             for name, one in (
                 ("temperature", series_mean(kt[first:])),
                 ("mean_speed", series_mean(speed[first:])),
-                ("mean_pressure", series_mean(force, apart)),
+                ("mean_pressure", pressure_between(*late[:3], run.count, value)),
             ):
                 known = one.mean, one.error
                 found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
@@ -394,7 +423,11 @@ def send(kind: bytes, body: bytes) -> None:
 
 def tell(message: dict) -> None:
     """One answer in words."""
-    send(b"t", json.dumps(message, allow_nan=False).encode())
+    try:
+        text = json.dumps(message, allow_nan=False)
+    except ValueError:  # what is not known, or has no bounds, is null
+        text = json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
+    send(b"t", text.encode())
 
 
 def wishes(wait: float | None) -> list[dict]:
@@ -406,7 +439,9 @@ def wishes(wait: float | None) -> list[dict]:
         UNREAD.extend(news)
     *lines, rest = UNREAD.split(b"\n")
     UNREAD[:] = rest
-    return list(map(json.loads, lines))
+    found = list(map(json.loads, lines))
+    starts = [wish for wish in found if wish["do"] == "start"]
+    return [wish for wish in found if wish not in starts[:-1]]  # while one waits, the last counts
 
 
 def scan(wish: dict) -> None:
@@ -422,18 +457,24 @@ def scan(wish: dict) -> None:
 
 
 def measured(text: str, lines: list[str], name: str) -> tuple[float, float]:
-    """Mean of an observable in the second half of a few seconds, and its error."""
-    simulation, values, began = Simulation.__new__(Simulation), [], time.perf_counter()
+    """Mean of an observable in the second half of a second, and its error."""
+    simulation, samples, began = Simulation.__new__(Simulation), [], time.perf_counter()
     simulation._begin(text, lines)
     with simulation:
-        step = max(1, simulation.count // 2)
-        while time.perf_counter() < began + LOOK or len(values) < 2 * FEWEST:
-            values.append(float(np.sum(simulation.observable(name))))
-            collisions = simulation.collisions
-            simulation._go_on((np.inf, collisions + step, NEVER), LOOK / FEWEST)
+        count = simulation.count
+        step = max(1, count // 2)
+        while time.perf_counter() < began + LOOK or len(samples) < 2 * FEWEST:
+            seen = simulation._observed()
+            value = {key: float(np.sum(part)) for key, part in seen.items()}
+            value["time"] = simulation.time
+            samples.append([value[key] for key in ("time", "all/kinetic_energy", "virial", name)])
+            simulation._go_on((np.inf, simulation.collisions + step, NEVER), LOOK / FEWEST)
             if time.perf_counter() > began + 4 * LOOK:
                 break
-    one = series_mean(np.array(values[len(values) // 2 :]))
+    late = np.array(samples[len(samples) // 2 :]).T
+    one = series_mean(late[-1])
+    if name == "pressure":  # that is a mean since the start
+        one = pressure_between(*late[:3], count, value)
     return float(one.mean), float(one.error) if np.isfinite(one.error) else 0.0
 
 
@@ -443,11 +484,9 @@ def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
     bench = Bench(pictured)
-    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace}
-    runs = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
-    tell({"is": "ready"})
+    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace, "keep": bench.keep}
+    runs = ("change", "heat", "play", "pause", "got", "step", "event")
     while True:
         wait = None
         if bench.moves():
@@ -459,7 +498,7 @@ def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
                     does[action](wish)
                 elif action in runs and bench.simulation:
                     getattr(bench, action)(wish)
-            except (AttributeError, LookupError, TypeError, ValueError) as problem:
+            except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as problem:
                 tell({"is": "state", "reason": f"not understood: {problem}"})
         if bench.moves() and time.perf_counter() >= bench.due + INTERVAL:
             bench.go_on()

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 
 import aiohttp
@@ -19,6 +19,7 @@ import pytest
 
 from ricochet import Simulation
 from ricochet import lab as module
+from ricochet.worker import AHEAD
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 
@@ -177,6 +178,25 @@ def test_frames_come_at_the_pace_and_changes_act_at_once(address):
     asyncio.run(visit())
 
 
+def test_a_page_that_draws_slowly_lets_nothing_pile_up(address):
+    async def visit():
+        async with film(address) as one:
+            await one.start(pace=1)
+            frames = 0
+            with suppress(TimeoutError):
+                async with asyncio.timeout(None) as limit:
+                    while frames <= AHEAD:
+                        message = await one.socket.receive()
+                        frames += message.type == aiohttp.WSMsgType.BINARY
+                        if frames == AHEAD:
+                            limit.reschedule(asyncio.get_running_loop().time() + 2)
+            assert frames == AHEAD
+            await one.say("got")
+            await one.until("frame")
+
+    asyncio.run(visit())
+
+
 def test_few_disks_tell_what_comes_and_one_event_is_a_step(address):
     async def visit():
         async with film(address) as one:
@@ -198,7 +218,10 @@ def test_few_disks_tell_what_comes_and_one_event_is_a_step(address):
         ({"contact.restitution": "2"}, "contact.restitution", "from 0 to 1"),
         ({"species.gas.count": "30001", "species.gas.radius": "1e-5"}, "", "20000"),
         ({"species.gas.file": "/etc/passwd"}, "", "--files FOLDER"),
-        ({"run.title": "two\nlines"}, "", "no line ends"),
+        ({"species.gas.FILE": "/etc/passwd"}, "", "--files FOLDER"),
+        ({"species.gas.file": " '/etc/passwd'"}, "", "--files FOLDER"),
+        ({"species.gas.file=/etc/passwd#": ""}, "", "no variable"),
+        ({"run.title": "two\nlines"}, "", "no variable"),
     ],
 )
 def test_a_wrong_value_gets_one_line_and_the_run_goes_on(address, settings, place, words):
@@ -214,6 +237,9 @@ def test_a_wrong_value_gets_one_line_and_the_run_goes_on(address, settings, plac
                 '{"do": "end"}',
                 '{"do": "pace", "pace": []}',
                 '{"do": "start"}',
+                '{"do": "step", "time": -1}',
+                '{"do": "heat", "factor": NaN}',
+                '{"do": "change", "settings": {"species.gas.file": "/etc/passwd"}}',
             ):
                 await one.socket.send_str(wrong)
             while "not understood" not in (await one.until("state"))["reason"]:
@@ -240,12 +266,80 @@ def test_an_added_group_is_run_and_in_what_is_kept(address):
     asyncio.run(visit())
 
 
+def test_no_file_is_read_by_another_door(address):
+    """Neither by groups that are added, nor by the values of a scan."""
+
+    async def visit():
+        async with film(address) as one:
+            await one.start()
+            wish = {"input": "gas", "settings": {}, "added": [], "of": "all/kinetic_energy"}
+            group = "species file = '/etc/passwd' /\n&species"
+            for added in ([group, "x"], ["species", "x' file = '/etc/passwd"], ["none", "x"]):
+                await one.say("start", **wish | {"added": [added]}, pace=1, playing=True)
+                problems = (await one.until("problems"))["problems"]
+                assert problems[0]["text"].startswith("no group can be called")
+            await one.say("scan", **wish, variable="species.gas.File", values=["/etc/passwd"])
+            problems = (await one.until("problems", "scan"))["problems"]
+            assert "--files FOLDER" in problems[0]["text"]
+
+    asyncio.run(visit())
+
+
+def test_of_many_starts_at_once_the_last_counts_and_a_step_without_end_can_be_left(address):
+    async def visit():
+        async with film(address) as one:
+            await one.start()
+            wish = {"input": "gas", "added": [], "pace": 0.1, "playing": True}
+            for speed in range(1, 200):
+                await one.say("start", settings={"species.gas.speed": str(speed)}, **wish)
+            scenes = 0
+            while one.last["scene"]["facts"]["top"] < 2.1 * 199:
+                await one.until("scene")
+                scenes += 1
+            assert scenes < 100
+            await one.say("step", time=1e9)
+            await one.say("change", settings={"box.gravity": "0,-1"})
+            await one.until("scene")
+            await one.say("pause")
+            while (await one.until("state"))["playing"]:
+                pass
+
+    asyncio.run(visit())
+
+
+def test_a_run_can_be_kept_after_a_wrong_wish_and_without_a_folder(program, tmp_path):
+    async def visit(address):
+        async with film(address) as one:
+            await one.start()
+            await one.start(settings={"species.gas.radius": "1"})
+            assert (await one.kept("output"))[0] == 200
+            await one.start(settings={"species.gas.count": "12"})
+            (tmp_path / "temporary").rmdir()
+            assert (await one.kept("output"))[0] in (200, 409)
+            replies = await asyncio.gather(*(one.kept("script") for _ in range(9)))
+            assert {200} <= {status for status, _ in replies} <= {200, 409}
+            (tmp_path / "own.nml").unlink()
+            wish = {"input": "own", "settings": {}, "added": [], "pace": 1, "playing": True}
+            await one.say("start", **wish)
+            assert "own.nml" in (await one.until("problems"))["problems"][0]["text"]
+            assert (await one.session.get(f"{address}form?own")).status == 409
+            await one.until("frame")
+
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "own.nml").write_text("&species count = 3 radius = 0.1 /\n")
+    with laboratory(program, tmp_path / "temporary", tmp_path / "own.nml") as (process, address):
+        asyncio.run(visit(address))
+        assert process.poll() is None
+
+
 def test_a_scan_gives_the_mean_for_each_value(address):
     async def visit():
         async with film(address) as one:
             await one.start()
             wish = {"input": "gas", "settings": {}, "added": [], "of": "all/kinetic_energy"}
-            await one.say("scan", **wish, variable="species.gas.speed", values=["1", "2"])
+            for _ in range(2):
+                await one.say("scan", **wish, variable="species.gas.speed", values=["1", "2"])
+            assert "one scan" in (await one.until("problems"))["problems"][0]["text"]
             return [await one.until("scan") for _ in range(2)]
 
     found = asyncio.run(visit())
@@ -363,10 +457,12 @@ def alive(pids):
         ("work", ["KILL"]),
         ("placing", ["INT", "INT"]),
         ("placing", ["KILL"]),
+        ("keeping", ["KILL"]),
+        ("keeping", ["HUP", "TERM"]),
     ],
 )
 def test_nothing_is_left_behind(program, tmp_path, at, signs):
-    """Neither of runs that go on, nor of one that is still looking for places."""
+    """Neither of runs that go on, nor of one that looks for places, nor of a file being made."""
     hard = {"species.gas.packing_fraction": "0.545", "species.gas.radius": "", "run.seed": "7"}
 
     async def act(process, address):
@@ -376,9 +472,14 @@ def test_nothing_is_left_behind(program, tmp_path, at, signs):
             await one.start(pace=1.0)
             if at == "placing":
                 await one.say("start", input="gas", settings=hard, added=[], pace=1, playing=True)
+            keeping = asyncio.create_task(one.kept("output")) if at == "keeping" else None
+            while keeping and not (keeping.done() or any(tmp_path.iterdir())):
+                await asyncio.sleep(0)
             pids = children(process.pid)
             for sign in signs:
                 process.send_signal(getattr(signal, f"SIG{sign}"))
+            if keeping:
+                await asyncio.wait([keeping])
             return pids
 
     with laboratory(program, tmp_path) as (process, address):

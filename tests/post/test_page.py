@@ -192,14 +192,12 @@ def test_everything_has_a_name_and_nothing_is_covered_or_too_wide(opened, size):
         if kept:
             opened.run("keep()")
             moving(opened, 1)
-        wide = opened.run(
-            """const isWide = (part, one) => part.offsetParent
+        wide = """const isWide = (part, one) => part.offsetParent
               && part.getBoundingClientRect().right > one.innerWidth + 1;
             const all = [window, ...films()].flatMap(one =>
               [...one.document.querySelectorAll('body *')].filter(part => isWide(part, one)));
             return all.map(one => one.outerHTML.slice(0, 90));"""
-        )
-        assert wide == []
+        wait_for(lambda script=wide: opened.run(script) == [])
     stage, form = opened.run(
         """const film = filmOf(current()).document, box = film.getElementById('stage');
         const [stage, frame, form] = [box, current().frame, $('form')].map(
