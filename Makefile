@@ -53,7 +53,7 @@ objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wi
 PFUNIT_DIR ?= $(lastword $(sort $(wildcard /usr/local/PFUNIT-* $(HOME)/.local/PFUNIT-*)))
 pfunit_mk := $(if $(PFUNIT_DIR),$(firstword $(wildcard $(PFUNIT_DIR)/include/PFUNIT.mk $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk)))
 suites := tests/unit
-unit_build := DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized' BUILD=$(BUILD)/tests
+unit_build := DEBUG=1 OPT='-O1 -Wno-maybe-uninitialized -Wno-uninitialized' BUILD=$(BUILD)/tests
 T := $(BUILD)/$(if $(PFUNIT_DIR),pfunit,substitute)
 -include $(pfunit_mk)
 translator := $(if $(PFUNIT_DIR),$(PFUNIT_BIN_DIR)/funitproc,tests/support/translate_pf.py)

@@ -212,7 +212,7 @@ CRATER = """&species name = 'bed' count = 40 radius = 0.04 region = 0, 1, 0, 0.5
 TARGET = "&species radius = 0.05 position = 0.8, 0.5 /\n"
 ROUGH = "&contact tangential_restitution = 0.5 restitution = 0.9 /\n"
 STEPS = "&run dynamics = 'steps' dt = 4e-3 /\n"
-LOG = "event_log = .true. virial_tensor = .true. "
+LOG = "helfand = .true. "
 GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "player", "cooling")
 SETTLED = ("correlations", "equation_of_state", "rates", "melting", "transport")
 SOON = ("--skip", "1", "--apart", "1")
