@@ -1,10 +1,13 @@
 """The process behind a page of the laboratory: one simulation, and frames of it as they are made.
 
 It is told what to do by lines of JSON on its input, and answers on its output: a letter, the length
-as four bytes, and a text in JSON (t) or a frame (b).  A frame has, in this order and in the byte
-order of the machine: time, collisions per disk and the places of the left, right, bottom and top
-side as 8-byte floats; then as 4-byte floats x and y of all disks, their velocities, and their
-angles if they turn.
+as four bytes, and a text in JSON (t), a frame (b), a file (f), or why there is no file (e).  Texts
+are named by `is`: starting, scene (what stays as it is in a picture), numbers, events (to come),
+state, problems, scan.  A page has two frames that it has not drawn (`got`) at most.
+
+A frame has, in this order and in the byte order of the machine: time, collisions per disk and the
+places of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and y of
+all disks, their velocities, and their angles if they turn.
 
 Whatever is changed on the way is changed at a time that has been reached with all its events, so
 that `script` can do the same again, to the last bit.
