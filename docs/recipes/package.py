@@ -1,5 +1,7 @@
-# Spack: put it into packages/ricochet/ of a repository of yours, with the address of this project as `git`. Not tried here.
+# Spack: put it into packages/ricochet/ of a repository of yours, with the address of this project
+# as `git`. Not tried here.
 from spack.package import *
+from spack_repo.builtin.build_systems.makefile import MakefilePackage
 
 
 class Ricochet(MakefilePackage):
@@ -16,8 +18,8 @@ class Ricochet(MakefilePackage):
     depends_on("gmake", type="build")
     depends_on("hdf5@1.10: +fortran ~mpi")
     depends_on("python@3.11:", type=("build", "run"))
-    for package in ("py-numpy", "py-scipy", "py-h5py", "py-matplotlib@3.9:", "py-tqdm", "py-aiohttp"):
-        depends_on(package, type="run", when="+python")
+    for package in ("numpy", "scipy", "h5py", "matplotlib@3.9:", "tqdm", "aiohttp"):
+        depends_on(f"py-{package}", type="run", when="+python")
 
     requires("%fortran=gcc@12:", msg="built and tested with gfortran")
 
