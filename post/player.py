@@ -166,20 +166,6 @@ def told_by_log(
         parts = {"time": time, "i": i - 1, "j": j - 1}
         facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
     return facts, moments
-    time, i, j = paths.log[:3]
-    before = np.searchsorted(time[j > 0], run.time[frames], "right")
-    facts["collisions"] = (2 * before / run.count).tolist()
-    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
-    time, i, j = time[some], i[some], j[some]
-    if len(time) <= most:
-        moments = {"pairs": time[j > 0], "others": time[j <= 0]}
-    if run.count <= FEW_DISKS:
-        parts = {"time": time, "i": i - 1, "j": j - 1}
-        facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
-        facts["surfaces"] = [f"the {side} side" for side in SIDES]  # what j < 0 is called
-        facts["surfaces"] += [f"obstacle {k + 1}" for k in range(len(run.obstacles))]
-        facts["surfaces"] += [f"wall {k + 1}" for k in range(len(run.walls))]
-    return facts, moments
 
 
 def species(run: Run) -> list[dict]:

@@ -24,7 +24,7 @@ from typing import TextIO
 import numpy as np
 
 from .files import RunError, open_file, plain
-from .program import find_program, namelist, tied, value_text
+from .program import find_program, namelist, settings_of, tied, value_text
 from .reader import committed, series_in
 from .simulation import Simulation, read_input
 
@@ -94,10 +94,7 @@ def combinations(values: Mapping[str, Iterable]) -> dict[str, dict[str, object]]
 
 def words_of(settings: Mapping[str, object]) -> str:
     """Overrides as a line of a manifest."""
-    pairs = (
-        f"{name}={value_text(name, value).replace(', ', ',')}" for name, value in settings.items()
-    )
-    return " ".join(f"--set {pair}" for pair in pairs)
+    return " ".join(f"--set {pair.replace(', ', ',')}" for pair in settings_of(settings))
 
 
 def read_manifest(folder: Path) -> dict[str, str]:

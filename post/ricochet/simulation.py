@@ -68,6 +68,13 @@ class Simulation:
             message = named(problem.message, text if unseen else None)
             raise ProgramError(message, problem.code) from None
 
+    @classmethod
+    def _of(cls, text: str, settings: list[str]) -> Self:
+        """Of an input's text, with overrides GROUP.VARIABLE=VALUE."""
+        self = cls.__new__(cls)
+        self._begin(text, settings)
+        return self
+
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
         """With overrides GROUP.VARIABLE=VALUE."""
         words = text.encode(), "\n".join(settings).encode()

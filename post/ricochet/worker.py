@@ -75,9 +75,8 @@ class Bench:
         """Another simulation in the place of this one, if it can be."""
         tell({"is": "starting"})
         pace = max(0.0, float(wish["pace"] or 0.0))
-        other = Simulation.__new__(Simulation)
         try:
-            other._begin(wish["text"], told(wish["settings"]))
+            other = Simulation._of(wish["text"], told(wish["settings"]))
             if other.count > DISKS:
                 raise ProgramError(f"{other.count} disks; here a run may have {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
@@ -96,7 +95,6 @@ class Bench:
         run = self.run = pictured_run(self.simulation)
         self.settles = run.nature.in_equilibrium
         self.samples.clear()
-        self.names = set(self.simulation.observables)
         facts, blocks = self.pictured(run)
         letters = {name: base64.b64encode(block).decode() for name, block in blocks.items()}
         speed = run.speed(0)
@@ -293,7 +291,7 @@ def pictured_run(simulation: Simulation) -> Run:
     if "all/rotational_energy" in simulation.observables:
         elements[TURNS] = simulation.angular_velocity[None]
     run = Run(
-        path=Path(simulation.parameters.get("run", {}).get("title") or "simulation"),
+        path=Path(parameters.get("run", {}).get("title") or "simulation"),
         time=np.array([simulation.time]),
         position=simulation.position[None],
         velocity=simulation.velocity[None],
@@ -461,9 +459,8 @@ def scan(wish: dict) -> None:
 
 def measured(text: str, lines: list[str], name: str) -> tuple[float, float]:
     """Mean of an observable in the second half of a second, and its error."""
-    simulation, samples, began = Simulation.__new__(Simulation), [], time.perf_counter()
-    simulation._begin(text, lines)
-    with simulation:
+    samples, began = [], time.perf_counter()
+    with Simulation._of(text, lines) as simulation:
         count = simulation.count
         step = max(1, count // 2)
         while time.perf_counter() < began + LOOK or len(samples) < 2 * FEWEST:
