@@ -3,12 +3,11 @@
 module library
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
   use changes, only: change_system, change_velocities
-  use disks, only: columns, image_column, n_columns
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use kinds, only: int64, never, real64
-  use moments, only: frame_sample, in_frames
+  use moments, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
   use partners, only: n_sides, side_name
   use run_setup, only: choose_evolution, input_from_text, new_simulation, start_threads
@@ -234,7 +233,8 @@ contains
     integer(c_int) :: width
     type(session_t), pointer :: session
     real(real64), allocatable :: sample(:, :)
-    integer :: n, k, last
+    type(frame_column_t), allocatable :: list(:)
+    integer :: n
 
     session => session_of(handle)
     associate (sim => session%sim)
@@ -252,31 +252,13 @@ contains
       end select
       if (width > 0) return
       call make_team(session%input%settings%run%threads)
-      sample = frame_sample(sim, 0_int64)
-      last = 2                                        ! behind its step and time
-      call find("position", 2, .true.)
-      call find("velocity", 2, .true.)
-      call find("collisions", 1, .true.)
-      call find("image", 2, sim%row(image_column) > 0)
-      do k = 1, n_columns
-        call find(trim(columns(k)%name), 1, in_frames(sim, k))
-      end do
+      list = frame_columns(sim)
+      list = pack(list, list%name == text_of(name))
+      if (size(list) == 0) return
+      width = list(1)%width
+      sample = frame_sample(sim, 0_int64, list)
+      values(:width*n) = sample(3:, 1)                ! behind step and time
     end associate
-  contains
-
-    !> Passes the part of the frame that comes next, if it is there, and copies it if it is the one that is wanted.
-    subroutine find(part, its_width, there)
-      character(len=*), intent(in) :: part
-      integer, intent(in) :: its_width
-      logical, intent(in) :: there
-
-      if (.not. there) return
-      if (part == text_of(name)) then
-        width = its_width
-        values(:width*n) = sample(last + 1:last + width*n, 1)
-      end if
-      last = last + its_width*n
-    end subroutine find
   end function copy_column
 
   !> See ricochet.h.

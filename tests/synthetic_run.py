@@ -73,7 +73,9 @@ def write_run(
         species = np.ones(count, np.int32) if species is None else np.asarray(species, np.int32)
         disks["species"], disks["id"] = species, np.arange(1, count + 1)
         disks["committed"] = np.int64(frames if committed is None else committed)
-        write_observables(file, time if observable_time is None else observable_time, observables)
+        clock = time if observable_time is None else observable_time
+        energy = np.interp(clock, time, (mass * (velocity**2).sum(axis=2) / 2).mean(axis=1))
+        write_observables(file, clock, {"all/kinetic_energy": energy, **(observables or {})})
         write_parameters(file, parameters, names, species, obstacles, walls)
         sides = [text("periodic" if p else "wall") for p in periodic]
         file.require_group("parameters/box").attrs["boundary"] = sides
@@ -96,7 +98,7 @@ def add_element(group, name, time, value):
 def write_observables(file, time, observables):
     """All observables share one clock."""
     group = file.create_group("observables")
-    for name, value in {"dissipated_energy": np.zeros(len(time)), **(observables or {})}.items():
+    for name, value in {"dissipated_energy": np.zeros(len(time)), **observables}.items():
         add_element(group, name, time, np.asarray(value))
     group["committed"] = np.int64(len(time))
 

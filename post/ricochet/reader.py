@@ -138,6 +138,8 @@ class Frames:
         """These frames, in this order."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
+            if self.name not in file[DISKS]:
+                raise Unsound(f"has no {self.name} in its frames, see output.frame_columns")
             data = file[f"{DISKS}/{self.name}/value"]
             if len(chosen) == 0:
                 values = data[:0]
@@ -145,7 +147,7 @@ class Frames:
                 values = data[chosen[0] : chosen[-1] + 1 : steps[0]]
             else:  # far faster than a list as index in h5py
                 values = np.stack([data[k] for k in chosen])
-        return values.astype(float) if values.dtype.kind == "f" else values
+        return values.astype(float if values.dtype.kind == "f" else np.int64)
 
 
 class Restitution(NamedTuple):
@@ -179,9 +181,9 @@ class Run:
     path: Path
     time: np.ndarray  # (T,)
     position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
-    velocity: Frames  # (T, N, 2)
-    image: Frames | None  # (T, N, 2) how many periods a disk has travelled
-    collisions: Frames | None  # (T, N) collisions of any kind since the start
+    velocity: Frames  # (T, N, 2); to read it fails where `output.frame_columns` has left it out
+    image: Frames | None  # (T, N, 2) periods a disk has travelled; None: no side is periodic
+    collisions: Frames | None  # (T, N) of any kind since the start; None: not in the frames
     elements: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
@@ -276,7 +278,7 @@ class Run:
     def element(self, name: str) -> Frames:
         """(T, N) what only some runs have of each disk, such as 'angular_velocity'."""
         if name not in self.elements:
-            raise RunError(f"{self.path}: its frames have no {name}")
+            raise RunError(f"{self.path}: has no {name} in its frames")
         return self.elements[name]
 
     @property
@@ -416,13 +418,13 @@ class Run:
     def nature(self) -> Nature:
         """What kind of run this is: see `ricochet.nature`."""
         lost = self.observable("dissipated_energy").value[-1]
-        most = self.kinetic_energy([0, -1]).sum(axis=1).max()
+        most = self.count * self.observable("all/kinetic_energy").value[[0, -1]].max()
         return nature_of(
             self.parameters,
             self.mass,
             self.radius,
             lost=lost / most if most else 0.0,
-            turning="angular_velocity" in self.elements,
+            turning="all/rotational_energy" in self.observables,
             collapsed="collapse" in str(self.provenance.get("note", "")),
         )
 
@@ -476,12 +478,14 @@ def run_of(path: Path, file: h5py.File) -> Run:
     }
     parameters = tree(file["parameters"])
     box = tree(disks["box"])
+    periodic = np.array(box["boundary"]) == "periodic"
+    plane = (count, len(disks["id"]), 2)
     return Run(
         path=path,
         time=rows(disks["position/time"], count),
         position=frames.pop("position"),
-        velocity=frames.pop("velocity"),
-        image=frames.pop("image", None),
+        velocity=frames.pop("velocity", Frames(path, "velocity", plane)),
+        image=frames.pop("image", Frames(path, "image", plane) if any(periodic) else None),
         collisions=frames.pop("collisions", None),
         elements=frames,
         mass=rows(disks["mass"]),
@@ -490,7 +494,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         names=tuple(parameters["species"]["names"]),
         lower=box["lower"],
         edges=box["edges"],
-        periodic=np.array(box["boundary"]) == "periodic",
+        periodic=periodic,
         obstacles=obstacles_of(parameters.get("obstacle", {})),
         walls=walls_of(parameters.get("wall", {})),
         parameters=parameters,

@@ -89,13 +89,14 @@ contains
 
   !> Opens a dataset whose values are in this file, all of them. Those of another file may be a device, or not ours to
   !> write; and of a damaged one HDF5 1.10 reads what is not there.
-  subroutine open_dataset(self, name, dataset, extents, status, like)
+  subroutine open_dataset(self, name, dataset, extents, status, like, bytes_each)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(hid_t), intent(out) :: dataset
     integer(hsize_t), allocatable, intent(out) :: extents(:)
     integer, intent(out) :: status                !! negative: there is none
     integer(hid_t), intent(in), optional :: like  !! an HDF5 type of the kind that it must have: real, integer, text
+    integer, intent(out), optional :: bytes_each  !! of a value
     integer(hid_t) :: creation, space, type
     integer(hsize_t) :: most(32), shape(32), n, stored
     integer(size_t) :: bytes                      ! of a value
@@ -118,6 +119,7 @@ contains
     call h5sclose_f(space, closed)
     if (status >= 0) call h5dget_type_f(dataset, type, status)
     if (status >= 0) call h5tget_size_f(type, bytes, status)
+    if (present(bytes_each)) bytes_each = merge(int(bytes), 0, status >= 0)
     if (status >= 0 .and. layout /= h5d_chunked_f .and. n > 0) then
       call h5dget_storage_size_f(dataset, stored, status)
       if (stored /= n*int(bytes, hsize_t)) status = -1
@@ -134,16 +136,17 @@ contains
   end subroutine open_dataset
 
   !> Shape of a dataset; [-1] if it does not exist.
-  function extents(self, name) result(extent)
+  function extents(self, name, bytes) result(extent)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
+    integer, intent(out), optional :: bytes       !! of a value in the file
     integer(hsize_t), allocatable :: extent(:)
     integer(hid_t) :: dataset
     integer :: status
 
     extent = [-1_hsize_t]
     if (allocated(self%failure)) return
-    call self%open_dataset(name, dataset, extent, status)
+    call self%open_dataset(name, dataset, extent, status, bytes_each=bytes)
     if (status >= 0) call h5dclose_f(dataset, status)
   end function extents
 

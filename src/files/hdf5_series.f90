@@ -31,6 +31,7 @@ module hdf5_series
     procedure :: read => read_sample
     procedure :: copy
     procedure :: width
+    procedure :: holds
     procedure :: room
     procedure, private :: exchange
     procedure, private :: storage_type
@@ -45,6 +46,16 @@ contains
 
     width = product(self%shape)
   end function width
+
+  !> Whether no value is too large for the storage.
+  pure function holds(self, values) result(yes)
+    class(series_t), intent(in) :: self
+    real(real64), intent(in) :: values(:, :)      !! (width,samples)
+    logical :: yes
+
+    yes = .true.
+    if (self%storage == short_integer) yes = all(abs(values) <= huge(0_int32))
+  end function holds
 
   !> Bytes of one sample in the file.
   elemental function room(self) result(bytes)
@@ -74,18 +85,20 @@ contains
       int([int(self%shape(:self%rank), int64), capacity], hsize_t))
   end subroutine make
 
-  !> Finds the series in a file that has it; its samples must have the shape that is expected.
+  !> Finds the series in a file that has it; its samples must have the shape that is expected, integers may be longer.
   subroutine find(self, file)
     class(series_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(hsize_t), allocatable :: extents(:)
+    integer :: bytes
     logical :: there
 
-    allocate (extents, source=file%extents(trim(self%name)))
+    allocate (extents, source=file%extents(trim(self%name), bytes))
+    if (self%storage == short_integer .and. bytes == bytes_of(long_integer)) self%storage = long_integer
     there = size(extents) == self%rank + 1 .and. extents(1) >= 0
     if (there) there = all(extents(:self%rank) == self%shape(:self%rank))
     if (there) self%capacity = extents(self%rank + 1)
-    call file%check(merge(0, -1, there), "be read: "//trim(self%name))
+    call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
   !> Writes samples, converted to what is stored: HDF5 would take ten times as long to shorten reals. A

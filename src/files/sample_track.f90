@@ -6,7 +6,7 @@
 module sample_track
   use kinds, only: int64, real64
   use hdf5_objects, only: hdf5_file_t, scalar
-  use hdf5_series, only: series_t
+  use hdf5_series, only: long_integer, series_t
   use system, only: seconds
   use texts, only: written
   implicit none
@@ -33,6 +33,7 @@ module sample_track
     procedure :: room
     procedure :: first_capacity
     procedure :: enlarged
+    procedure :: widen
     procedure :: make
     procedure :: resume
     procedure :: commit
@@ -89,6 +90,26 @@ contains
       n = max(growth*n, 1_int64)
     end do
   end function enlarged
+
+  !> Lets series have longer integers, in the next file, where these samples need them.
+  subroutine widen(self, samples, widened)
+    class(track_t), intent(inout) :: self
+    real(real64), intent(in) :: samples(:, :)           !! (width,count)
+    logical, intent(out) :: widened                     !! whether any series has changed
+    integer :: k, first
+
+    widened = .false.
+    first = 1
+    do k = 1, size(self%series)
+      associate (series => self%series(k))
+        if (.not. series%holds(samples(first:first + series%width() - 1, :))) then
+          series%storage = long_integer
+          widened = .true.
+        end if
+        first = first + series%width()
+      end associate
+    end do
+  end subroutine widen
 
   !> Makes the track in a new file.
   subroutine make(self, file, capacity)

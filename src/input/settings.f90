@@ -4,7 +4,7 @@ module settings
   use kinds, only: int64, never, real64
   use disks, only: species_t
   use errors, only: error_t
-  use input_groups, only: group_t
+  use input_groups, only: group_t, text_length
   use simulation_state, only: system_t
   use stop_rules, only: stop_settings_t
   use texts, only: text_t
@@ -74,6 +74,7 @@ module settings
 
   type :: output_settings_t
     type(sampling_t) :: sampling(2)                   !! of `sampled`
+    character(len=text_length), allocatable :: frame_columns(:)  !! wanted beside the positions; not allocated: all
     logical :: single_precision                       !! precision == 'single'
     logical :: event_log
     logical :: virial_tensor                          !! of smooth disks, too

@@ -263,6 +263,9 @@ module variables
       "samples at these times, too, in their order", not_negative, "time"), &
     variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
       "samples at so many times in each power of ten, too, from frames_from on", per_decade), &
+    variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
+      "what frames have beside the positions; default: all that there is", &
+      choices="position velocity collisions image angular_velocity orientation"), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
     variable_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &
@@ -396,7 +399,7 @@ contains
       if (row%choices /= "") words = either(words_of(row%choices))
     end select
     if (row%range%words /= "") words = words//" "//trim(row%range%words)
-    if (row%size > 1 .and. row%kind == "text") words = "values, each "//words
+    if (row%size /= 1 .and. row%kind == "text") words = "values, each "//words
     if (row%size > 1) words = written(row%size)//" "//words
   end function allowed
 

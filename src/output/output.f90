@@ -13,7 +13,7 @@ module output
   use evolution, only: limits_t
   use h5md_layout, only: changes_at_work, event_counter, frame_counter, replaced_file, sample_counter, saved_at, wall_time
   use hdf5_objects, only: hdf5_file_t, scalar
-  use moments, only: frame_sample, observable_sample
+  use moments, only: frame_column_t, frame_columns, frame_sample, observable_sample
   use observables, only: observed
   use run_description, only: describe_end, describe_run, describes
   use run_files, only: check_places, check_replaced, is_file, lock, source_of, take_final_name, unfinished, unfinished_new
@@ -39,6 +39,7 @@ module output
     type(run_input_t) :: input                    !! described in the file
     type(hdf5_file_t), private :: file
     type(track_t), allocatable, private :: track(:)      !! frames, observables, and the event log if there is one
+    type(frame_column_t), allocatable, private :: columns(:)  !! of the frames
     type(lock_t), private :: lock
     integer(int64), private :: replaced(3) = 0_int64     !! identity of the file that had this path when the run began
     real(real64), private :: opened = 0.0_real64  !! by the clock of `seconds` [s]
@@ -192,7 +193,8 @@ contains
     associate (settings => input%settings%output)
       allocate (self%track(merge(events, values, settings%event_log)))
       self%track(frames)%counter = frame_counter
-      self%track(frames)%series = frame_series(sim, settings%single_precision)
+      self%columns = frame_columns(sim, settings%frame_columns)
+      self%track(frames)%series = frame_series(self%columns, sim%n_disks(), settings%single_precision)
       self%track(values)%counter = sample_counter
       self%track(values)%series = observable_series(observed(sim))
       self%track(:values)%planned = self%progress%cadence%planned(rule%limits)
@@ -260,7 +262,7 @@ contains
     type(simulation_t), intent(inout) :: sim
 
     associate (cadence => self%progress%cadence(track))
-      if (track == frames) call self%append(track, frame_sample(sim, cadence%count), sim)
+      if (track == frames) call self%append(track, frame_sample(sim, cadence%count, self%columns), sim)
       if (track == values) call self%append(track, observable_sample(sim, cadence%count), sim)
       call cadence%take(sim)
     end associate
@@ -278,17 +280,19 @@ contains
     log%n = 0
   end subroutine write_events
 
-  !> Appends samples to a track, in a larger file if there is no room for them in this one.
+  !> Appends samples to a track, in another file if there is no room for them in this one.
   subroutine append(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
     real(real64), intent(in) :: samples(:, :)     !! (width,count)
     type(simulation_t), intent(inout) :: sim
     integer(int64) :: capacities(size(self%track))
+    logical :: widened
 
     capacities = self%track%capacity
     capacities(track) = self%track(track)%enlarged(size(samples, 2, int64))
-    if (any(capacities > self%track%capacity)) call self%rebuild(capacities, sim, kept)
+    call self%track(track)%widen(samples, widened)
+    if (widened .or. any(capacities > self%track%capacity)) call self%rebuild(capacities, sim, kept)
     call self%track(track)%append(self%file, samples)
   end subroutine append
 

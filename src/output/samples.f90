@@ -2,12 +2,10 @@
 !> which `moments` has their values.
 module samples
   use kinds, only: int32, int64, most_exact
-  use disks, only: columns, image_column, n_columns
   use errors, only: error_t, exit_broken, fail
-  use h5md_layout, only: disk_collisions, disks_group, events_group, image, observables_group, position, step_of, time_of, &
-    value_of, velocity
+  use h5md_layout, only: disks_group, events_group, observables_group, position, step_of, time_of, value_of
   use hdf5_series, only: double_precision, long_integer, series_t, short_integer, single_precision
-  use moments, only: in_frames
+  use moments, only: frame_column_t
   use observables, only: observable_list_t
   use simulation_state, only: simulation_t
   implicit none
@@ -17,20 +15,20 @@ module samples
 contains
 
   !> The series of the frames: step, time, and the values of all disks.
-  pure function frame_series(sim, single) result(series)
-    type(simulation_t), intent(in) :: sim
+  pure function frame_series(list, n, single) result(series)
+    type(frame_column_t), intent(in) :: list(:)   !! the columns
+    integer, intent(in) :: n                      !! disks
     logical, intent(in) :: single                 !! numbers with a fraction in single precision
-    type(series_t), allocatable :: series(:)
-    integer :: reals, n, k
+    type(series_t) :: series(2 + size(list))
+    integer :: k
 
-    n = sim%n_disks()
-    reals = merge(single_precision, double_precision, single)
-    series = [step_and_time(position), series_t(position//value_of, reals, 2, [2, n]), &
-      series_t(velocity//value_of, reals, 2, [2, n]), series_t(disk_collisions//value_of, long_integer, 1, [n, 1])]
-    if (sim%row(image_column) > 0) series = [series, series_t(image//value_of, long_integer, 2, [2, n])]
-    do k = 1, n_columns
-      if (in_frames(sim, k)) series = [series, series_t(disks_group//trim(columns(k)%name)//value_of, &
-        reals, 1, [n, 1])]
+    series(:2) = step_and_time(position)
+    do k = 1, size(list)
+      associate (width => list(k)%width)
+        series(2 + k) = series_t(disks_group//trim(list(k)%name)//value_of, merge(single_precision, double_precision, single), &
+          width, merge([2, n], [n, 1], width == 2))
+        if (list(k)%is_count) series(2 + k)%storage = short_integer
+      end associate
     end do
   end function frame_series
 

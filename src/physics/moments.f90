@@ -7,53 +7,78 @@ module moments
   use team, only: many
   implicit none
   private
-  public :: frame_sample, in_frames, observable_sample
+  public :: frame_column_t, frame_columns, frame_sample, observable_sample
+
+  !> What a frame has of each disk.
+  type :: frame_column_t
+    character(len=16) :: name
+    integer :: width = 1
+    logical :: is_count = .false.
+  end type frame_column_t
+
+  !> What every disk has, and may have, without a column of its own in `disks: columns`.
+  type(frame_column_t), parameter :: common(4) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
+    frame_column_t("collisions", is_count=.true.), frame_column_t("image", 2, is_count=.true.)]
 
 contains
 
-  !> Whether an optional column is an element of its own in frames.
-  pure function in_frames(sim, k) result(yes)
+  !> The columns of a frame: of those that there are the positions, and the wanted ones [all].
+  pure function frame_columns(sim, wanted) result(list)
     type(simulation_t), intent(in) :: sim
-    integer, intent(in) :: k                      !! number in `disks: columns`
-    logical :: yes
+    character(len=*), intent(in), optional :: wanted(:)   !! their names
+    type(frame_column_t), allocatable :: list(:)
+    integer :: k
 
-    yes = columns(k)%is_element .and. sim%row(k) > 0
-  end function in_frames
+    list = common(:merge(4, 3, sim%row(image_column) > 0))
+    do k = 1, n_columns
+      if (columns(k)%is_element .and. sim%row(k) > 0) list = [list, frame_column_t(columns(k)%name)]
+    end do
+    if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
+  end function frame_columns
 
   !> The frame of this moment, disks in the order of the input.
-  function frame_sample(sim, step) result(sample)
+  function frame_sample(sim, step, list) result(sample)
     type(simulation_t), intent(in) :: sim
     integer(int64), intent(in) :: step            !! number of the frame, from 0
+    type(frame_column_t), intent(in) :: list(:)   !! the columns
     real(real64), allocatable :: sample(:, :)     !! (width,1)
-    logical :: periodic, shared
+    logical :: shared, there(4)
+    real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
-    integer :: c, last
+    integer :: c, at(4), column, first
 
     n = sim%n_disks()
-    periodic = sim%row(image_column) > 0
-    last = 2 + merge(7, 5, periodic)*n
-    allocate (sample(last + n*count([(in_frames(sim, c), c=1, n_columns)]), 1))
+    allocate (sample(2 + n*sum(list%width), 1))
     sample(:2, 1) = [real(step, real64), sim%time()]
-    shared = n >= many
-    associate (x => sample(3:2 + 2*n, 1), v => sample(3 + 2*n:2 + 4*n, 1), &
-      collisions => sample(3 + 4*n:2 + 5*n, 1), images => sample(3 + 5*n:last, 1))
-      !$omp parallel do private(k) if (shared)
-      do i = 1, n
-        k = sim%tag(i)%id
-        x(2*k - 1:2*k) = sim%position(i)
-        v(2*k - 1:2*k) = sim%velocity(i)
-        collisions(k) = sim%tag(i)%collisions
-        if (.not. periodic) cycle
-        images(2*k - 1:2*k) = sim%image(i)
-        call wrap(sim, x(2*k - 1:2*k), v(2*k - 1:2*k), images(2*k - 1:2*k))
-      end do
-      !$omp end parallel do
-    end associate
-    do c = 1, n_columns
-      if (.not. in_frames(sim, c)) cycle
-      sample(last + sim%tag%id, 1) = sim%values_now(c)
-      last = last + n
+    first = 3
+    there = .false.
+    do c = 1, size(list)
+      column = findloc(common%name, list(c)%name, dim=1)
+      if (column > 0) then
+        there(column) = .true.
+        at(column) = first
+      else
+        sample(first - 1 + sim%tag%id, 1) = sim%values_now(findloc(columns%name, list(c)%name, dim=1))
+      end if
+      first = first + n*list(c)%width
     end do
+    shared = n >= many
+    !$omp parallel do private(k, x, v, image) if (shared)
+    do i = 1, n
+      k = sim%tag(i)%id - 1
+      x = sim%position(i)
+      v = sim%velocity(i)
+      image = 0
+      if (sim%row(image_column) > 0) then
+        image = sim%image(i)
+        call wrap(sim, x, v, image)
+      end if
+      if (there(1)) sample(at(1) + 2*k:at(1) + 2*k + 1, 1) = x
+      if (there(2)) sample(at(2) + 2*k:at(2) + 2*k + 1, 1) = v
+      if (there(3)) sample(at(3) + k, 1) = sim%tag(i)%collisions
+      if (there(4)) sample(at(4) + 2*k:at(4) + 2*k + 1, 1) = image
+    end do
+    !$omp end parallel do
   end function frame_sample
 
   !> Moves a disk by whole periods into the box, which holds its lower sides only, and counts them. The rows come first: in

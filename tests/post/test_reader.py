@@ -119,7 +119,7 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
     assert run.observable("walls/w/impulse").value.shape[1:] == (2,)
     size = np.hypot(*run.events.momentum_change.T)
     assert size == pytest.approx(run.events.impulse)
-    with pytest.raises(RunError, match="its frames have no wall_hits"):
+    with pytest.raises(RunError, match="no wall_hits in its frames"):
         run.element("wall_hits")
     axes = plt.subplots()[1]
     marks = radius_marks(axes, run, run.frames - 1)

@@ -56,7 +56,7 @@ def test_the_layout_is_h5md(ran):
     for name, kind, shape in [
         ("position", np.float64, (frames, 80, 2)),
         ("velocity", np.float64, (frames, 80, 2)),
-        ("collisions", np.int64, (frames, 80)),
+        ("collisions", np.int32, (frames, 80)),
     ]:
         assert disks[name]["value"].shape == shape and disks[name]["value"].dtype == kind
         assert disks[name]["step"] == disks["position/step"], "a hard link"
@@ -152,6 +152,43 @@ def test_single_precision_is_the_same_run_rounded(ran):
         rounded = double[name]["value"][:].astype(np.float32)
         assert (single[name]["value"][:] == rounded).all()
     assert (single["position/time"][:] == double["position/time"][:]).all()
+
+
+TURNING = GRAVITY + "&contact friction = 0.2 tangential_restitution = 0.3 /\n"
+COLUMNS = "velocity", "collisions", "image", "angular_velocity", "orientation"
+
+
+@pytest.mark.parametrize("wanted", [["position"], COLUMNS[:1], COLUMNS[1:4:2], COLUMNS])
+def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
+    """The positions always, and of the others those that the run has; nothing else changes."""
+    whole = ran(TURNING, name="whole")["particles/disks"]
+    words = ", ".join(f"'{name}'" for name in wanted)
+    part = ran(TURNING, f"--set=output.frame_columns={words}", name="part")["particles/disks"]
+    found, there = ({name for name in disks if f"{name}/value" in disks} for disks in (part, whole))
+    assert there >= {"position", "velocity", "collisions", "image", "angular_velocity"}
+    assert found == there & {"position", *wanted}
+    for name in found:
+        for item in ("step", "time", "value"):
+            assert (part[name][item][:] == whole[name][item][:]).all()
+
+
+@pytest.mark.parametrize("cut", [0, 1.5, 3.0])
+def test_counts_in_frames_grow_longer_where_they_must(ricochet, tmp_path, cut):
+    """A disk that crosses a box of length 1 so fast that 32 bits hold its periods up to t = 2.1."""
+    path = write_input(
+        tmp_path,
+        """&box boundary = 'periodic', 'periodic' /
+        &species name = 'a' count = 1 radius = 0.1 velocity = 1e9, 0 /
+        &run dynamics = 'steps' dt = 0.25 /
+        &stop time = 4 /
+        &output frames_every_time = 0.5 /""",
+    )
+    ricochet(path, "-o", "a.h5", *([f"--set=stop.time={cut}"] if cut else []))
+    ended = ricochet(path, "-o", "a.h5", *(["--resume"] if cut else []))
+    with h5py.File(tmp_path / "a.h5", "r") as file:
+        image = file["particles/disks/image/value"]
+        assert image.dtype == np.int64, ended.stderr
+        assert image[:, 0, 0].tolist() == [500_000_000 * k for k in range(9)]
 
 
 def test_the_same_input_gives_the_same_bytes(ran, tmp_path):
