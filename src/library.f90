@@ -184,13 +184,12 @@ contains
     type(session_t), pointer :: session
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: list
 
     session => session_of(handle)
     changed = session%sim
     call change_velocities(changed, reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())]))
-    list = changes_of(session)//written_exactly(changed%time())//" velocity"//eol
-    call renew(session, changed, input_of(session%input%groups), list, error)
+    call renew(session, changed, input_of(session%input%groups), &
+      changes_of(session)//written_exactly(changed%time())//" velocity"//eol, error)
     code = answer(error, message, room)
   end function give_velocities
 

@@ -17,7 +17,7 @@ import re
 import signal
 import stat
 import subprocess
-import tempfile
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -64,19 +64,18 @@ def sweep(
     folder.mkdir(parents=True, exist_ok=True)
     overrides = {name: words_of(settings) for name, settings in members.items()}
     remember(folder, text, overrides)
-    for old in folder.glob(f".*.{os.uname().nodename}"):
-        if not wanted(old):  # of a Python that was killed
-            old.unlink(missing_ok=True)
-    number, mark = tempfile.mkstemp(f".{os.uname().nodename}", f".{os.getpid()}.", folder)
-    os.close(number)
+    mark = folder / f".sweep {os.getpid()} {threading.get_ident()} {os.uname().nodename}"
+    for left in folder.glob(".sweep * * *"):
+        wanted(left)
+    mark.touch()
     pool, waiting = executor or ThreadPoolExecutor(os.cpu_count()), []
     try:
         for name, own in overrides.items():
-            waiting.append(pool.submit(run_member, folder, name, own, Path(mark)))
+            waiting.append(pool.submit(run_member, folder, name, own, mark))
         for member in waiting:
             member.result()
     finally:
-        Path(mark).unlink(missing_ok=True)  # members stop, with a checkpoint, wherever they are
+        mark.unlink(missing_ok=True)  # members stop, with a checkpoint, wherever they are
         for member in waiting:
             member.cancel()
         if executor is None:
@@ -181,33 +180,6 @@ def log_of(path: Path) -> TextIO:
 
 def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
     """Run a member to its end, unless it is there or another process is at it; its exit code."""
-    try:
-        return run_wanted(folder, name, overrides, mark)
-    finally:
-        parent = multiprocessing.parent_process()
-        if parent and not is_there(parent.pid):
-            os._exit(STOPPED)  # of a pool whose Python was killed: for ever it would wait for work
-
-
-def is_there(pid: int) -> bool:
-    """Whether there is a process of this number here."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
-    return True
-
-
-def wanted(mark: Path) -> bool:
-    """Whether the call of `sweep` that left this mark, .PID.x.HOST, goes on."""
-    _, pid, _, host = mark.name.split(".", 3)
-    return mark.exists() and (host != os.uname().nodename or is_there(int(pid)))
-
-
-def run_wanted(folder: Path, name: str, overrides: str, mark: Path) -> int:
-    """The same, unless nobody wants it any more."""
     if not wanted(mark):
         return STOPPED
     with log_of(folder / f"{name}.log") as log:
@@ -238,6 +210,23 @@ def run_wanted(folder: Path, name: str, overrides: str, mark: Path) -> int:
         return code
 
 
+def is_there(pid: int) -> bool:
+    """Whether there is a process of this number here."""
+    try:
+        os.kill(pid, 0)
+    except OSError as problem:
+        return isinstance(problem, PermissionError)  # somebody else's
+    return True
+
+
+def wanted(mark: Path) -> bool:
+    """Whether the call of `sweep` that left this mark goes on; of a killed Python it is removed."""
+    _, pid, _, host = mark.name.split(" ", 3)
+    if host == os.uname().nodename and not is_there(int(pid)):
+        mark.unlink(missing_ok=True)
+    return mark.exists()
+
+
 def finished_with(command: list, mark: Path, **pipes: object) -> int:
     """The exit code of a command, which ends, with a checkpoint, when nobody wants it any more."""
     process = subprocess.Popen(tied(command), **pipes)
@@ -249,6 +238,9 @@ def finished_with(command: list, mark: Path, **pipes: object) -> int:
                 process.terminate()
     finally:
         process.terminate()  # nothing, if it has ended
+        parent = multiprocessing.parent_process()
+        if parent and not is_there(parent.pid):
+            os._exit(STOPPED)  # this process of a pool would wait for work for ever
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
