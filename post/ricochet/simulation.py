@@ -248,7 +248,7 @@ class Simulation:
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
             if "side" in found[group]:
                 found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
-        if changes := self.changes:
+        if changes := self._text("changes"):
             found["changes"] = changes
         return found
 
