@@ -20,13 +20,13 @@ module library
   use stop_rules, only: stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: eol, growing_text_t, text_t, written, written_exactly
+  use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
   use timeline, only: adapted, advance_once, passed_collapse
   use variable_help, only: input_of
   use variables, only: may_change_at_work
   implicit none
   private
-  public :: answer, begin, lines_of, session_of, session_t, text_of
+  public :: answer, begin, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the answer of `advance` that is no exit code
   integer(int64), parameter :: longest_look = 2000000 !! ahead, for what may never come [events, kicks of a disk]
@@ -439,22 +439,5 @@ contains
       text(k:k) = bytes(k)
     end do
   end function text_of
-
-  !> The lines of a text, without their ends.
-  subroutine lines_of(text, lines)
-    character(len=*), intent(in) :: text
-    type(text_t), allocatable, intent(out) :: lines(:)
-    type(text_t) :: line
-    integer :: first, last
-
-    allocate (lines(0))
-    first = 1
-    do while (first <= len(text))
-      last = first - 1 + index(text(first:)//eol, eol)
-      line%text = text(first:last - 1)
-      lines = [lines, line]                           ! see `command_line: take_option`
-      first = last + 1
-    end do
-  end subroutine lines_of
 
 end module library
