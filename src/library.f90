@@ -6,6 +6,8 @@ module library
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
+  use initial_state, only: check_speeds
+  use input_problems, only: problem_list_t
   use kinds, only: int64, never, real64
   use moments, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
@@ -17,13 +19,13 @@ module library
   use stop_rules, only: stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: eol, growing_text_t, text_t, written, written_exactly
+  use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
   use timeline, only: adapted, advance_once, passed_collapse
   use variable_help, only: input_of
   use variables, only: may_change_at_work
   implicit none
   private
-  public :: answer, begin, lines_of, session_of, session_t, text_of
+  public :: answer, begin, session_of, session_t, text_of
 
   integer(c_int), parameter :: going_on = 1          !! the answer of `advance` that is no exit code
   integer(int64), parameter :: longest_look = 2000000 !! ahead, for what may never come [events, kicks of a disk]
@@ -137,6 +139,7 @@ contains
     integer(c_int) :: code
     type(session_t), pointer :: session
     type(run_input_t) :: input
+    type(simulation_t) :: changed
     type(error_t), allocatable :: error
     type(text_t), allocatable :: lines(:)
     character(len=:), allocatable :: problem, side, text, list
@@ -162,23 +165,32 @@ contains
     end do
     if (.not. allocated(error)) call input_from_text(text, session%input%path, [session%input%overrides, lines], input, error)
     if (.not. allocated(error)) then
-      call change_system(session%sim, input%settings%system_t, problem)
+      changed = session%sim
+      call change_system(changed, input%settings%system_t, problem)
       if (problem /= "") call fail(error, exit_usage, problem)
     end if
-    if (.not. allocated(error)) call renew(session, input_of(input%groups), list)
+    if (.not. allocated(error)) call renew(session, changed, input_of(input%groups), list, error)
     code = answer(error, message, room)
   end function change
 
   !> See ricochet.h.
-  subroutine give_velocities(handle, values) bind(C, name="ricochet_set_velocities")
+  function give_velocities(handle, values, message, room) bind(C, name="ricochet_set_velocities") result(code)
     type(c_ptr), value :: handle
     real(c_double), intent(in) :: values(*)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_int), value :: room
+    integer(c_int) :: code
     type(session_t), pointer :: session
+    type(simulation_t) :: changed
+    type(error_t), allocatable :: error
 
     session => session_of(handle)
-    call change_velocities(session%sim, reshape(values(:2*session%sim%n_disks()), [2, int(session%sim%n_disks())]))
-    call renew(session, session%input%text, changes_of(session)//written_exactly(session%sim%time())//" velocity"//eol)
-  end subroutine give_velocities
+    changed = session%sim
+    call change_velocities(changed, reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())]))
+    call renew(session, changed, input_of(session%input%groups), &
+      changes_of(session)//written_exactly(changed%time())//" velocity"//eol, error)
+    code = answer(error, message, room)
+  end function give_velocities
 
   !> The changes so far.
   function changes_of(session) result(list)
@@ -189,14 +201,20 @@ contains
     if (allocated(session%input%changes)) list = session%input%changes
   end function changes_of
 
-  !> Goes on with a text as the input, that of now, after a change.
-  subroutine renew(session, text, changes)
+  !> Goes on with what has changed, and a text as the input, that of now; unless its numbers are out of range.
+  subroutine renew(session, sim, text, changes, error)
     type(session_t), intent(inout) :: session
+    type(simulation_t), intent(in) :: sim
     character(len=*), intent(in) :: text, changes
-    type(error_t), allocatable :: error
+    type(error_t), allocatable, intent(out) :: error
+    type(problem_list_t) :: problems
     type(text_t) :: none(0)
     type(run_input_t) :: input
 
+    call check_speeds(sim, problems)
+    call problems%report(session%input%path, none, error)
+    if (allocated(error)) return
+    session%sim = sim
     call input_from_text(text, session%input%path, none, input, error)
     input%settings%run%threads = session%input%settings%run%threads
     input%changes = changes
@@ -403,22 +421,5 @@ contains
       text(k:k) = bytes(k)
     end do
   end function text_of
-
-  !> The lines of a text, without their ends.
-  subroutine lines_of(text, lines)
-    character(len=*), intent(in) :: text
-    type(text_t), allocatable, intent(out) :: lines(:)
-    type(text_t) :: line
-    integer :: first, last
-
-    allocate (lines(0))
-    first = 1
-    do while (first <= len(text))
-      last = first - 1 + index(text(first:)//eol, eol)
-      line%text = text(first:last - 1)
-      lines = [lines, line]                           ! see `command_line: take_option`
-      first = last + 1
-    end do
-  end subroutine lines_of
 
 end module library

@@ -8,7 +8,7 @@ module library_files
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
   use last_frame, only: read_last_frame
-  use library, only: answer, begin, lines_of, session_of, session_t, text_of
+  use library, only: answer, begin, session_of, session_t, text_of
   use output, only: output_t
   use run_files, only: output_of, source_of
   use run_setup, only: input_from_text, new_simulation
@@ -16,7 +16,7 @@ module library_files
   use simulation_state, only: simulation_t
   use starting_disks, only: read_run
   use status_line, only: status_line_t
-  use texts, only: text_t
+  use texts, only: lines_of, text_t
   implicit none
   private
 

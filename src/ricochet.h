@@ -39,7 +39,7 @@ int ricochet_observables(ricochet *, char *names, int room, double *values);
 int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 
 /* Gives the disks other velocities, now: x and y of one disk after the other. Likewise. */
-void ricochet_set_velocities(ricochet *, const double *velocities);
+int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
 
 /* Copies a text about this moment: `input`, a file with overrides and changes; `parameters`, GROUP.VARIABLE = JSON for each
    that has a value; `changes`, TIME GROUP.VARIABLE=VALUE for each; `note`, of a collapse that was passed. Returns its bytes

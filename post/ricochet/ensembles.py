@@ -8,13 +8,16 @@ A folder of members is what `runs/ensemble.sh` makes: input.nml, manifest.txt wi
 each, NAME.h5 and NAME.log.  Each goes on with what the other has left.
 """
 
+import contextlib
 import fcntl
 import itertools
+import multiprocessing
 import os
 import re
 import signal
 import stat
 import subprocess
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -24,45 +27,57 @@ from typing import TextIO
 import numpy as np
 
 from .files import RunError, open_file, plain
-from .program import find_program, namelist, settings_of, tied, value_text
+from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
 from .reader import committed, series_in
 from .simulation import Simulation, read_input
 
 BROKE_OFF = ": its run broke off "
-AT_WORK: set[subprocess.Popen] = set()
+LOOK = 0.2  # s, between two looks whether members are still wanted
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
 
 
 def sweep(
     system: str | Path | Mapping,
-    values: Mapping[str, Iterable],
+    values: Mapping[str, object],
     folder: str | Path,
     executor: Executor | None = None,
 ):
     """Run every combination of values, the first varying slowest; a DataFrame as of `ensemble`.
 
-    `system` is that of `ricochet.run`.  Members that are finished are left out, others go on where
-    they were stopped: repeat the call after an interrupt.  They run on all cores of this machine,
-    or where an `executor` of `concurrent.futures` takes them, which sees the same folder.
+    `system` is that of `ricochet.run`; a variable has a list of values (None is its default), or
+    one.  Members that are finished are left out, others go on where they were stopped: repeat the
+    call after an interrupt.  They run on all cores of this machine, or where an `executor` of
+    `concurrent.futures` takes them, which sees the same folder.
     """
-    text = namelist(system) if isinstance(system, Mapping) else read_input(system)
-    values = {name: list(own) for name, own in values.items()}
+    import pandas  # noqa: F401 (who has none hears of it before members run)
+
+    text = read_input(system)
+    values = {
+        name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
+        for name, own in values.items()
+    }
+    if not values:
+        raise ValueError("sweep: there are no values; ricochet.run makes a single run")
     members = combinations(values)
     check(text, values)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     overrides = {name: words_of(settings) for name, settings in members.items()}
     remember(folder, text, overrides)
-    pool = executor or ThreadPoolExecutor(os.cpu_count())
-    waiting = [pool.submit(run_member, folder, name, own) for name, own in overrides.items()]
+    mark = folder / f".sweep {os.getpid()} {threading.get_ident()} {os.uname().nodename}"
+    for left in folder.glob(".sweep * * *"):
+        wanted(left)
+    mark.touch()
+    pool, waiting = executor or ThreadPoolExecutor(os.cpu_count()), []
     try:
+        for name, own in overrides.items():
+            waiting.append(pool.submit(run_member, folder, name, own, mark))
         for member in waiting:
             member.result()
     finally:
+        mark.unlink(missing_ok=True)  # members stop, with a checkpoint, wherever they are
         for member in waiting:
             member.cancel()
-        for process in [*AT_WORK]:
-            process.terminate()  # with a checkpoint
         if executor is None:
             pool.shutdown()
     return ensemble(folder)
@@ -72,11 +87,13 @@ def check(text: str, values: Mapping[str, list]) -> None:
     """Refuse now what a member would refuse: each value, with the first of the other variables."""
     first = {name: own[0] for name, own in values.items() if own}
     for name, own in values.items():
-        for value in own:
-            Simulation(text, first | {name: value}).close()
+        for value in own[: 1 if name == "run.seed" else None]:
+            with Simulation(text, first | {name: value}) as member:
+                if member._endless():
+                    raise ProgramError("stop: no rule ends a member", 2)
 
 
-def combinations(values: Mapping[str, Iterable]) -> dict[str, dict[str, object]]:
+def combinations(values: Mapping[str, list]) -> dict[str, dict[str, object]]:
     """The settings of each member by its name, which is that of runs/ensemble.sh."""
     choices = [[(name, value) for value in own] for name, own in values.items()]
     members = {}
@@ -86,7 +103,7 @@ def combinations(values: Mapping[str, Iterable]) -> dict[str, dict[str, object]]
             short = variable.removeprefix("species.")
             if "." not in short.partition(".")[2] and not variable.startswith("species."):
                 short = short.partition(".")[2]
-            word = value_text(variable, value).replace(", ", ",")
+            word = "default" if value is None else value_text(variable, value).replace(", ", ",")
             parts.append(f"{short}_{re.sub('[^A-Za-z0-9.+-]', '_', word)}")
         members["_".join(parts)] = settings
     return members
@@ -161,8 +178,10 @@ def log_of(path: Path) -> TextIO:
     return log
 
 
-def run_member(folder: Path, name: str, overrides: str) -> int:
+def run_member(folder: Path, name: str, overrides: str, mark: Path) -> int:
     """Run a member to its end, unless it is there or another process is at it; its exit code."""
+    if not wanted(mark):
+        return STOPPED
     with log_of(folder / f"{name}.log") as log:
         try:
             fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -178,9 +197,9 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         command = [find_program(), folder / "input.nml", *output]
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         pipes = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
-        code = finished_with([*command, *["--resume"] * bool(unfinished)], **pipes)
+        code = finished_with([*command, *["--resume"] * bool(unfinished)], mark, **pipes)
         if unfinished and BROKE_OFF in last_words(folder, name):
-            code = finished_with(command, **pipes)  # it starts over
+            code = finished_with(command, mark, **pipes)  # it starts over
         if code < 0:
             memory = " (out of memory?)" * (-code == signal.SIGKILL)
             moment = time.strftime("%FT%T%z")
@@ -191,14 +210,37 @@ def run_member(folder: Path, name: str, overrides: str) -> int:
         return code
 
 
-def finished_with(command: list, **pipes: object) -> int:
-    """The exit code of a command, which ends with Python."""
-    process = subprocess.Popen(tied(command), **pipes)
-    AT_WORK.add(process)
+def is_there(pid: int) -> bool:
+    """Whether there is a process of this number here."""
     try:
-        return process.wait()
+        os.kill(pid, 0)
+    except OSError as problem:
+        return isinstance(problem, PermissionError)  # somebody else's
+    return True
+
+
+def wanted(mark: Path) -> bool:
+    """Whether the call of `sweep` that left this mark goes on; of a killed Python it is removed."""
+    _, pid, _, host = mark.name.split(" ", 3)
+    if host == os.uname().nodename and not is_there(int(pid)):
+        mark.unlink(missing_ok=True)
+    return mark.exists()
+
+
+def finished_with(command: list, mark: Path, **pipes: object) -> int:
+    """The exit code of a command, which ends, with a checkpoint, when nobody wants it any more."""
+    process = subprocess.Popen(tied(command), **pipes)
+    try:
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return process.wait(LOOK)
+            if not wanted(mark):
+                process.terminate()
     finally:
-        AT_WORK.discard(process)
+        process.terminate()  # nothing, if it has ended
+        parent = multiprocessing.parent_process()
+        if parent and not is_there(parent.pid):
+            os._exit(STOPPED)  # this process of a pool would wait for work for ever
 
 
 def pairs_of(overrides: str) -> Iterator[tuple[str, str]]:
@@ -277,6 +319,8 @@ def row_of(folder: Path, name: str, overrides: str) -> dict:
 
 def typed(value: str) -> object:
     """A value of an override as a number, a truth value, a tuple of numbers, or text."""
+    if not value:
+        return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):
         return value.strip(".").lower()[0] == "t"
     numbers = []
@@ -288,7 +332,7 @@ def typed(value: str) -> object:
             except ValueError:
                 continue
         else:
-            return value.strip("'\"")
+            return value.strip("'\"").replace("''", "'")
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
+from numbers import Integral
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +50,8 @@ def run(
 ) -> Run:
     """Simulate `system` and open the result.
 
-    It is an input file, or its groups as in `{"species": {"count": 9, "radius": 0.1}, ...}`, with
-    a list of dictionaries for a repeated group.  `overrides` are those of --set, as
+    It is an input file, its text, or its groups as in `{"species": {"count": 9, "radius": 0.1}}`,
+    with a list of dictionaries for a repeated group.  `overrides` are those of --set, as
     `{"species.gas.mass": 2}`; None gives a variable its default back.  `force` and `resume` are the
     options of these names, `threads` is run.threads.  Without `output` the file is a temporary one,
     which is there until Python ends.  `progress` shows how far it is, on a terminal and in a
@@ -59,13 +60,14 @@ def run(
     program = find_program()
     work = Path(tempfile.mkdtemp(prefix="ricochet-"))
     atexit.register(shutil.rmtree, work, ignore_errors=True)
-    text = None
-    if isinstance(system, Mapping):
-        text, system = namelist(system), work / "input.nml"
+    groups = namelist(system) if isinstance(system, Mapping) else None
+    if (text := unseen(system)) is not None:
+        system = work / "input.nml"
         system.write_text(text, encoding="utf-8")
     output = work / "run.h5" if output is None else Path(output)
-    overrides = dict(overrides or {}) | ({"run.threads": threads} if threads else {})
-    words = [word for pair in settings_of(overrides) for word in ("--set", pair)]
+    threads = {"run.threads": threads} if whole_threads(threads) else {}
+    pairs = settings_of({} if overrides is None else overrides) + settings_of(threads)
+    words = [word for pair in pairs for word in ("--set", pair)]
     command = [program, "-o", output, *words]
     command += ["--force"] * force + ["--resume"] * resume + ["--", system]
     began = time.time()
@@ -74,11 +76,20 @@ def run(
     if code != 0:
         part = output.with_name(f"{output.name}.part")
         written = part.is_file() and part.stat().st_mtime > began - 1  # else it is another run's
-        message = named(message, text) or f"{program} ended with exit code {code}"
+        message = named(message, groups) or f"{program} ended with exit code {code}"
         raise ProgramError(message, code, part if written else None)
     if message:
         print(message, file=sys.stderr)
     return read_run(output)
+
+
+def whole_threads(threads: int | None) -> int:
+    """The number of threads that somebody wants, 0 for what the input says."""
+    if threads is None:
+        return 0
+    if not isinstance(threads, Integral) or not 1 <= threads <= 1024:
+        raise ValueError(f"threads: a whole number from 1 to 1024, not {threads!r}")
+    return int(threads)
 
 
 def find_program() -> str:
@@ -162,6 +173,16 @@ def lines_from(terminal: int) -> Iterator[str]:
 # --- the input ---
 
 
+def unseen(system: str | Path | Mapping) -> str | None:
+    """The text of an input that is no file: of groups, or the words themselves; None of a file."""
+    if isinstance(system, Mapping):
+        return namelist(system)
+    if not isinstance(system, str | os.PathLike):
+        kind = type(system).__name__
+        raise TypeError(f"an input is a file, its text, or a dictionary of its groups, not {kind}")
+    return system if isinstance(system, str) and ("&" in system or "\n" in system) else None
+
+
 def namelist(groups: Mapping[str, object]) -> str:
     """The text of an input file; whether it makes sense is for the program to say."""
     text = []
@@ -181,6 +202,9 @@ def namelist(groups: Mapping[str, object]) -> str:
 
 def settings_of(overrides: Mapping[str, object]) -> list[str]:
     """GROUP.VARIABLE=VALUE of each; without a value it is the default."""
+    if not isinstance(overrides, Mapping):
+        kind = type(overrides).__name__
+        raise TypeError(f"values are a dictionary as {{'run.seed': 2}}, not {kind}")
     return [
         f"{name}={'' if value is None else value_text(name, value)}"
         for name, value in overrides.items()
@@ -199,7 +223,7 @@ def named(message: str, text: str | None) -> str:
 
     if text is None:
         return message
-    return re.sub(r"^input(?:\.nml)?(?::(\d+))?: (\w+)", place, message, flags=re.MULTILINE)
+    return re.sub(r"^input(?:\.nml)?(?::(\d+))?: &?(\w+)", place, message, flags=re.MULTILINE)
 
 
 def value_text(name: str, value: object) -> str:

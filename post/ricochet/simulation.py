@@ -24,10 +24,11 @@ import numpy as np
 
 from .files import RunError, did_you_mean
 from .nature import Nature, nature_of
-from .program import ProgramError, named, namelist, settings_of
+from .program import ProgramError, named, settings_of, unseen, whole_threads
 
 ROOM = 100_000  # bytes for a message
-ENDLESS = b"stop.time=1e100"
+ENDLESS = "stop.time=1e100"
+NO_STOP = "stop: no rule ends the run"
 PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
@@ -60,12 +61,11 @@ class Simulation:
         threads: int | None = None,
     ):
         """Problems with the input raise `ProgramError`, with the program's own lines."""
-        unseen = isinstance(system, Mapping)
-        text = namelist(system) if unseen else read_input(system)
+        text, groups = read_input(system), isinstance(system, Mapping)
         try:
-            self._begin(text, settings_of(overrides or {}), threads)
+            self._begin(text, settings_of({} if overrides is None else overrides), threads)
         except ProgramError as problem:
-            message = named(problem.message, text if unseen else None)
+            message = named(problem.message, text if groups else None)
             raise ProgramError(message, problem.code) from None
 
     @classmethod
@@ -83,17 +83,17 @@ class Simulation:
                 raise ValueError("an input has no zero bytes")
         engine = library(files=b".h5" in b"".join(words))
         try:
-            handle = opened(engine.ricochet_open, *words, int(threads or 0))
+            handle = opened(engine.ricochet_open, *words, whole_threads(threads))
         except ProgramError as problem:
-            if not str(problem).startswith("input: stop: no rule ends the run"):
+            if NO_STOP not in problem.message:
                 raise
-            settings = [*settings, ENDLESS.decode()]  # who steps it knows when to stop
+            settings = [*settings, ENDLESS]  # who steps it knows when to stop
             words = words[0], "\n".join(settings).encode()
-            handle = opened(engine.ricochet_open, *words, int(threads or 0))
-        self._take(handle, endless=words[1].endswith(ENDLESS))
+            handle = opened(engine.ricochet_open, *words, whole_threads(threads))
+        self._take(handle)
 
-    def _take(self, handle: int, endless: bool = False) -> None:
-        self._handle, self._lock, self._endless = handle, threading.RLock(), endless
+    def _take(self, handle: int) -> None:
+        self._handle, self._lock = handle, threading.RLock()
         ALIVE.add(self)
         self._start_energy = self.observable("all/kinetic_energy") * self.count
 
@@ -102,7 +102,7 @@ class Simulation:
         """The simulation of the last checkpoint of a run, finished or not."""
         self = cls.__new__(cls)
         where = os.fsencode(Path(path))
-        self._take(opened(library(files=True).ricochet_load, where, int(threads or 0)))
+        self._take(opened(library(files=True).ricochet_load, where, whole_threads(threads)))
         return self
 
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
@@ -140,19 +140,19 @@ class Simulation:
         raise TypeError("a simulation cannot be copied or sent; save it, and load it there")
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Give all disks other velocities (N, 2), now; other arrays are only to be read."""
-        if name in COLUMNS and name != "velocity":
-            raise AttributeError(f"{name} cannot be set in a simulation at work")
-        if name != "velocity":
+        """Give all disks other velocities (N, 2), now; all else is only to be read."""
+        if name.startswith("_"):
             super().__setattr__(name, value)
             return
+        if name != "velocity":
+            raise AttributeError(f"{name} cannot be set in a simulation at work; velocity can")
         array = np.ascontiguousarray(value, dtype=float)
         if array.shape != (self.count, 2):
             raise ValueError(f"velocity: has the shape {array.shape}, not ({self.count}, 2)")
         if not np.abs(array).max() < FASTEST:
             raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
         with self._open() as handle:
-            library().ricochet_set_velocities(handle, array.ctypes.data)
+            called(library().ricochet_set_velocities, handle, array.ctypes.data)
 
     def _open(self) -> "Held":
         return Held(self)
@@ -170,10 +170,10 @@ class Simulation:
         """
         limits = (
             math.inf if time is None else float(time),
-            NEVER if collisions is None else int(collisions),
-            NEVER if events is None else int(events),
+            NEVER if collisions is None else min(int(collisions), NEVER),
+            NEVER if events is None else min(int(events), NEVER),
         )
-        if self._endless and limits == (math.inf, NEVER, NEVER):
+        if limits == (math.inf, NEVER, NEVER) and self._endless():
             raise ValueError(
                 "advance: how far? The input has no &stop; give time, collisions or events"
             )
@@ -184,6 +184,10 @@ class Simulation:
         while self._go_on(limits, PATIENCE):
             pass
         return self
+
+    def _endless(self) -> bool:
+        """Whether the input has no rule that stops it."""
+        return self.parameters["stop"] == {"time": 1e100}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
         """Towards these limits for some seconds; whether they are still ahead."""
@@ -244,7 +248,7 @@ class Simulation:
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
             if "side" in found[group]:
                 found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
-        if changes := self.changes:
+        if changes := self._text("changes"):
             found["changes"] = changes
         return found
 
@@ -300,6 +304,9 @@ class Simulation:
             raise AttributeError(f"these disks have no {name}")
         values = values.reshape(-1)[: width * len(values)].astype(COLUMNS[name])
         return values.reshape(-1, 2) if width == 2 else values
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *COLUMNS]
 
     def _observed(self) -> dict[str, np.ndarray]:
         room = ROOM
@@ -375,10 +382,10 @@ class Held:
 # --- the library ---
 
 
-def read_input(system: str | Path) -> str:
-    """The text of an input: of the file of that path, or the words themselves."""
-    if isinstance(system, str) and ("&" in system or "\n" in system):
-        return system
+def read_input(system: str | Path | Mapping) -> str:
+    """The text of an input, of whatever kind."""
+    if (text := unseen(system)) is not None:
+        return text
     try:
         return Path(system).read_text(encoding="utf-8", errors="surrogateescape")
     except OSError as error:
@@ -399,7 +406,7 @@ def called(function, *arguments: object) -> bool:
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
-        raise ProgramError(message.value.decode(errors="replace"), code)
+        raise ProgramError(named(message.value.decode(errors="replace"), ""), code)
     return code == 1
 
 
@@ -426,7 +433,7 @@ def library(files: bool = False) -> ctypes.CDLL:
         "observables": (n, p, text, n, p),
         "next_events": (n, p, n, p),
         "change": (n, p, text, *answer),
-        "set_velocities": (None, p, p),
+        "set_velocities": (n, p, p, *answer),
         "text": (n, p, text, text, n),
     }
     if files:

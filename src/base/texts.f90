@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: about, counted, line_at, size_text
+  public :: about, counted, line_at, lines_of, size_text
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -287,5 +287,22 @@ contains
     line = text(index(text(:k - 1), eol, back=.true.) + 1:)
     line = line(:index(line//eol, eol) - 1)
   end function line_at
+
+  !> The lines of a text, without their ends.
+  subroutine lines_of(text, lines)
+    character(len=*), intent(in) :: text
+    type(text_t), allocatable, intent(out) :: lines(:)
+    type(text_t) :: line
+    integer :: first, last
+
+    allocate (lines(0))
+    first = 1
+    do while (first <= len(text))
+      last = first - 1 + index(text(first:)//eol, eol)
+      line%text = text(first:last - 1)
+      lines = [lines, line]                           ! see `command_line: take_option`
+      first = last + 1
+    end do
+  end subroutine lines_of
 
 end module texts

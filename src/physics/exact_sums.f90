@@ -33,7 +33,7 @@ contains
     if (.not. before > 0 .or. self%units == 0) return
     finer = exponent(self%per_one) - exponent(before)
     if (finer > 0) self%units = self%units*2_int128**finer
-    if (finer < 0) self%units = self%units/2_int128**(-finer)
+    if (finer < 0) self%units = self%units/2_int128**min(-finer, 126)
   end subroutine choose_unit
 
   !> Adds a term, less what is below a unit.

@@ -14,7 +14,7 @@ module initial_state
   use starting_velocities, only: set_in_motion
   implicit none
   private
-  public :: create_simulation, describe_system
+  public :: check_speeds, create_simulation, describe_system
 
   real(real64), parameter :: most = 1.0e130_real64          !! of what is squared later: 1e308 is the limit of numbers
 

@@ -49,8 +49,11 @@ def test_a_dictionary_is_the_same_run_as_the_file(tmp_path, ricochet):
     heavier = {"species.light.mass": np.array(2.5)}
     run = package.run(GROUPS, heavier, tmp_path / "b.h5")
     assert run.parameter("run", "title") == "it's a test" and run.mass[0] == 2.5
-    of_file = package.run("gas.nml", overrides=heavier)
-    np.testing.assert_array_equal(of_file.position[-1], run.position[-1])
+    for system in "gas.nml", Path("gas.nml").read_text():
+        of_file = package.run(system, overrides=heavier)
+        np.testing.assert_array_equal(of_file.position[-1], run.position[-1])
+    with pytest.raises(ValueError, match="from 1 to 1024, not 0"):
+        package.run("gas.nml", threads=0)
     told = {"parameters/input", "parameters/overrides"}  # the same words, otherwise written
     assert {name.strip("/") for name in differences("a.h5", "b.h5")} <= told
 
@@ -58,6 +61,8 @@ def test_a_dictionary_is_the_same_run_as_the_file(tmp_path, ricochet):
 @pytest.mark.parametrize("begin", [package.run, package.Simulation])
 def test_what_the_program_says_names_variables_where_nobody_sees_lines(begin):
     one = {"massa": 1, "count": 1, "radius": 0.1}
+    with pytest.raises(ProgramError, match=r"^specie: unknown group"):
+        begin({"specie": one})
     with pytest.raises(ProgramError, match=r"^species\.massa: unknown") as failure:
         begin({"species": one, "stop": {"time": 1}})
     assert failure.value.code == USAGE and failure.value.message == str(failure.value)

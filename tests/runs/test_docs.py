@@ -271,12 +271,13 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
 
 def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_path):
     code = []
-    for title in (
-        "## Running it from Python",
-        "## In Python's own process",
-        "## Many runs in Python",
+    for page, title in (
+        ("../README", "## In Python"),
+        ("output", "## Running it from Python"),
+        ("output", "## In Python's own process"),
+        ("output", "## Many runs in Python"),
     ):
-        code += re.findall(r"^    (?!build/).*", section("output", title), re.M)
+        code += re.findall(r"^    (?!build/).*", section(page, title), re.M)
     code.append("    assert box.collisions == 3000")
     own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
     said = ran(sys.executable, "-c", textwrap.dedent("\n".join(code)), cwd=tmp_path, env=own)

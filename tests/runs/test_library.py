@@ -44,6 +44,7 @@ def whole(program, tmp_path_factory):
 def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
     """Arrays, observables, counts and the collisions to come, at the start and at the end."""
     with Simulation(GAS) as gas:
+        assert {*COLUMNS} < {*dir(gas)}
         log = whole.events
         assert gas.next_events(9) == list(zip(log.time[:9], log.i[:9], log.j[:9], strict=True))
         for frame in (0, -1):
@@ -108,6 +109,11 @@ def test_other_threads_of_python_run_meanwhile():
     assert counted[0] > 10 and gas.events == 10**6
 
 
+def kept(system) -> Simulation:
+    """Saved and loaded."""
+    return Simulation.load(Simulation(system).save("kept.h5", force=True))
+
+
 @pytest.mark.parametrize(
     ("act", "error", "words"),
     [
@@ -118,17 +124,20 @@ def test_other_threads_of_python_run_meanwhile():
         (lambda gas: gas.observable("all/temperatur"), RunError, "all/temperature"),
         (lambda gas: gas.colour, AttributeError, "colour"),
         (lambda gas: gas.next_events("x"), ValueError, "x"),
-        (
-            lambda _: Simulation({"species": {"count": 9, "radius": 0.1}}).advance(),
-            ValueError,
-            "&stop",
-        ),
+        (lambda _: kept({"species": {"count": 9, "radius": 0.1}}).advance(), ValueError, "&stop"),
         (lambda gas: gas.change({"species.a.count": 3}), ProgramError, "cannot change"),
         (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "columns"),
         (lambda gas: gas.change({"contact.restitution": 2}), ProgramError, "from 0 to 1"),
         (lambda gas: setattr(gas, "velocity", np.zeros(3)), ValueError, "(3,)"),
         (lambda gas: setattr(gas, "velocity", gas.velocity * np.nan), ValueError, "below"),
+        (lambda gas: setattr(gas, "velocity", 1e90 * gas.velocity), ProgramError, "out of range"),
         (lambda gas: setattr(gas, "mass", gas.mass), AttributeError, "mass"),
+        (lambda gas: setattr(gas, "velocities", gas.velocity), AttributeError, "velocity can"),
+        (lambda gas: gas.change([("box.gravity", 1)]), TypeError, "a dictionary"),
+        (lambda _: Simulation(GAS, threads=0), ValueError, "from 1 to 1024"),
+        (lambda _: Simulation.load("no.h5", threads=1.5), ValueError, "not 1.5"),
+        (lambda _: Simulation(None), TypeError, "its text"),
+        (lambda _: Simulation("&species count = -1 radius = 1 /"), ProgramError, "from 1 to"),
         (lambda gas: gas.save("/proc/none/x.h5"), ProgramError, "/proc/none"),
         (copy.copy, TypeError, "save it"),
         (lambda gas: [gas.close(), gas.close(), gas.position], ValueError, "closed"),
@@ -141,8 +150,9 @@ def test_other_threads_of_python_run_meanwhile():
         (lambda _: Simulation.load("/dev/null"), ProgramError, "/dev/null"),
     ],
 )
-def test_wrong_use_is_said_in_one_line(act, error, words):
+def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch):
     """The process goes on, and so does another simulation."""
+    monkeypatch.chdir(tmp_path)
     gas = Simulation(GAS)
     with pytest.raises(error, match=re.escape(words)) as caught:
         act(gas)
@@ -182,7 +192,10 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
     """With the input that was saved; that of the start is refused by name."""
     monkeypatch.chdir(tmp_path)
     Path("gas.nml").write_text(GAS)
-    gas = Simulation("gas.nml").advance(events=100)
+    gas = Simulation("gas.nml", {"run.seed": 5}).advance(events=50)
+    gas.velocity = gas.velocity[::-1]
+    assert "seed = 5" in gas.input
+    gas.advance(events=100)
 
     def balance():
         flows = [gas.observable(name) for name in ("heat", "work") if name in gas.observables]
@@ -197,7 +210,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
     assert balance() == pytest.approx(before, rel=1e-12)
     assert {"changed", "thermal", "falling", "soft"} <= gas.nature
     gas.save("gas.h5", input="changed.nml")
-    told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet")
+    told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet", "--set=run.seed=5")
     assert told.returncode == 2 and "there box.gravity = [0, 3]" in told.stderr
     ran(program, "changed.nml", "-o", "gas.h5", "--resume", "--quiet", check=True)
     whole, gas = read_run("gas.h5"), gas.advance()

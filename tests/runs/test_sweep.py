@@ -52,6 +52,10 @@ def test_a_sweep_and_the_script_go_on_with_each_others_members(tmp_path):
 def test_what_a_member_would_refuse_is_refused_before_any_runs(tmp_path):
     with pytest.raises(ProgramError, match="from 0 to 1"):
         sweep(GAS, {"contact.restitution": [1, 2]}, tmp_path)
+    with pytest.raises(ProgramError, match="no rule ends a member"):
+        sweep(GAS, {"stop.collisions_per_disk": None}, tmp_path)
+    with pytest.raises(ValueError, match="no values"):
+        sweep(GAS, {}, tmp_path)
     assert not [*tmp_path.iterdir()]
 
 
@@ -93,16 +97,36 @@ def test_a_member_that_was_killed_says_so_and_one_that_failed_may_be_mended(
     assert sweep(GAS, {"run.seed": [1]}, tmp_path / "heap").state[0] == "finished"
 
 
-def test_a_killed_python_leaves_checkpoints_and_no_process(program, tmp_path):
+@pytest.mark.usefixtures("_tools")
+def test_a_value_may_be_one_or_none(tmp_path):
+    values = {"run.title": "it's, or not", "contact.restitution": [0.8, None], "run.seed": 3}
+    table = sweep(GAS, values, tmp_path)
+    assert [*table.state] == 2 * ["finished"] and [*table.seed] == [3, 3]
+    assert [*table["contact.restitution"].isna()] == [False, True]
+    assert set(table["run.title"]) == {"it's,or not"}
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("pool", ["ThreadPoolExecutor", "ProcessPoolExecutor"])
+def test_a_python_that_ends_leaves_checkpoints_and_no_process(program, tmp_path, pool, end):
     (tmp_path / "gas.nml").write_text(GAS.replace("collisions_per_disk = 5", "events = 2000000000"))
-    call = "import ricochet; ricochet.sweep('gas.nml', {'run.seed': [1, 2]}, 'runs')"
+    call = f"""
+import ricochet, signal
+from concurrent.futures import {pool}
+signal.signal(signal.SIGINT, signal.default_int_handler)
+with {pool}(2) as pool:
+    ricochet.sweep('gas.nml', {{'run.seed': [1, 2, 3]}}, 'runs', pool)"""
     environment = {**os.environ, "RICOCHET": str(program), "PYTHONPATH": str(ROOT / "post")}
-    python = subprocess.Popen([sys.executable, "-c", call], cwd=tmp_path, env=environment)
+    way = {"cwd": tmp_path, "env": environment, "stderr": subprocess.PIPE}
+    python = subprocess.Popen([sys.executable, "-c", call], **way)
     parts = [tmp_path / f"runs/seed_{k}.h5.part" for k in (1, 2)]
     wait_until(lambda: all(part.exists() for part in parts))
-    python.send_signal(signal.SIGKILL)
+    python.send_signal(end)
     python.wait()
-    wait_until(lambda: "stopped" in "".join(p.read_text() for p in tmp_path.glob("runs/*.log")))
+    logs = [tmp_path / f"runs/seed_{k}.log" for k in (1, 2)]
+    wait_until(lambda: all("stopped" in log.read_text() for log in logs))
+    python.stderr.read()  # until workers have closed it, too
+    assert not [*tmp_path.glob("runs/seed_3*")]
 
 
 def wait_until(there) -> None:
