@@ -110,8 +110,8 @@ contains
     if (.not. (s%radius_spread > 0 .and. s%count > 0)) return
     radius = drawn_radii(s, k, seed)
     s%radius = maxval(radius)
-    if (all(s%region([1, 3]) < s%region([2, 4]))) call group%put_reals("packing_fraction", &
-      [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
+    if (all(s%region([1, 3]) < s%region([2, 4])) .and. .not. group%given("packing_fraction")) &
+      call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
   end subroutine survey_spread
 
   !> Reports why the disks of a file cannot be had.
