@@ -74,8 +74,9 @@ def check(run: Run, first: Run) -> None:
 def bins(run: Run) -> dict[str, np.ndarray]:
     """Of distances and wave numbers, in mean diameters."""
     half = 0.5 * run.edges.min() / (2 * run.radius.mean())
+    least = float(run.radius.min() / run.radius.mean())
     found = {
-        "g": np.linspace(1, max(1.1, min(6.0, 0.9 * half)), 151),
+        "g": np.linspace(least, max(1.1, min(6.0, 0.9 * half)), 151),
         "g6": np.geomspace(1, max(1.1, half), 41),
     }
     return found | ({"S": np.linspace(0, 20, 101)} if run.periodic.all() else {})

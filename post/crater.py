@@ -91,10 +91,11 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     ticks = np.array([0, *(10**k for k in range(0, int(top), 1 + int(top) // 5))])
     bar.set_ticks(np.log10(1.0 + ticks), labels=[f"{tick:g}" for tick in ticks])
     draw_energy(energy, run)
-    tip, lying = projectile(run), np.flatnonzero(bed(run))[0]
+    tip, lying = projectile(run), bed(run)
+    mass, radius = (of[tip] / of[lying].mean() for of in (run.mass, run.radius))
     figure.suptitle(
-        f"{caption([run])},  projectile: mass {run.mass[tip] / run.mass[lying]:.4g} m, radius "
-        f"{run.radius[tip] / run.radius[lying]:.4g} r, speed {run.speed(0)[tip]:.4g}\n"
+        f"{caption([run])},  projectile: mass {mass:.4g} m, radius {radius:.4g} r, "
+        f"speed {run.speed(0)[tip]:.4g}\n"
         f"hole: width {size.hole_width:.3f}, depth {size.hole_depth:.3f};  {size.hit} disks hit;  "
         f"{size.displaced} displaced by more than r, from a width {size.width:.3f}, depth "
         f"{size.depth:.3f}"

@@ -8,8 +8,8 @@ Errors take the memory of the pressure into account; `samples` is how many indep
 virial is worth.  Runs at equal packing fraction are combined.  Elastic gases without gravity; walls
 and kicks may heat them, all at one temperature.  kT is then its mean, and its error counts.  Disks
 between walls are denser away from them: the wall pressure belongs to the area open to the centres,
-and differs from the bulk by about 1/sqrt(N).  The curves are those of disks of one radius, and are
-left out for others.
+and differs from the bulk by about 1/sqrt(N).  Of disks of many radii r the curves are those of
+Santos, Yuste and Lopez de Haro 1999, of the fluid, for their <r>^2 / <r^2>: one for all runs.
 """
 
 from ricochet import Run, RunError, hard_disks
@@ -21,21 +21,26 @@ from ricochet.thermodynamics import z_ways
 import numpy as np
 from matplotlib.ticker import LogLocator
 
+UNLIKE = 0.02  # of <r>^2 / <r^2>, between runs of one figure
 WAYS = {"virial": "virial", "rate": "collision rate", "walls": "force on the walls"}
 
 
-def one_radius(runs: list[Run]) -> bool:
-    """Whether the curves apply: to all runs, or to none."""
-    equal = [bool(np.ptp(run.radius) == 0) for run in runs]
-    if len(set(equal)) > 1:
-        other = runs[equal.index(not equal[0])].path
-        raise RunError(f"{other}: not of one radius, or of several, as {runs[0].path} is")
-    return equal[0]
+def likeness(runs: list[Run]) -> float:
+    """<r>^2 / <r^2>, for which the curves are: 1 for equal disks, and much the same for all."""
+    found = np.array([np.mean(run.radius) ** 2 / np.mean(run.radius**2) for run in runs])
+    equal = np.array([np.ptp(run.radius) == 0 for run in runs])
+    other = (np.abs(found - found[0]) > UNLIKE) | (equal != equal[0])
+    if other.any():
+        path = runs[int(np.argmax(other))].path
+        raise RunError(
+            f"{path}: not of one radius, or not of radii that differ as in {runs[0].path}"
+        )
+    return 1.0 if equal.all() else float(found.mean())
 
 
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """A row per packing fraction, empty where a way does not apply; and what speaks against it."""
-    rows, notes, known = [], [], one_radius(runs)
+    rows, notes, alike = [], [], likeness(runs)
     for eta, same in by_packing(runs):
         row = {"packing": eta, "runs": len(same)}
         found = [z_ways(run, skip) for run in same]
@@ -45,26 +50,27 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
             row |= cells if len(members) == len(same) else measured(f"Z_{name}", None)
         row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
         z = hard_disks.published(eta, same[0].count, bool(same[0].periodic.all()))
-        rows.append(row | {"Z_reference": z if known and np.isfinite(z) else None})
+        z = hard_disks.of_sizes(z, eta, alike)
+        known = np.isfinite(z) and (alike == 1 or eta <= hard_disks.FLUID[-1, 0])
+        rows.append(row | {"Z_reference": z if known else None})
     return rows, notes
 
 
 def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
     """Z above, its deviation from the reference below."""
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 8), height_ratios=(2, 1))
-    if one_radius(runs):
-        fluid, solid = np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
-        published = hard_disks.simulated(fluid)
-        label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
-        above.plot(fluid, hard_disks.henderson(fluid), color="0.6", label="Henderson 1975")
-        above.plot(fluid, published, color="black", lw=1, label=label)
+    alike, fluid, solid = likeness(runs), np.linspace(0, 0.72, 200), np.linspace(0.715, 0.86, 100)
+    laws = (hard_disks.henderson(fluid), hard_disks.simulated(fluid))
+    henderson, published = (hard_disks.of_sizes(z, fluid, alike) for z in laws)
+    label = "Kolafa and Rottner 2006; above 0.5 Erpenbeck and Luban 1985"
+    if alike < 1:
+        label = "Santos, Yuste and López de Haro 1999, from those of equal disks"
+    above.plot(fluid, henderson, color="0.6", label="Henderson 1975")
+    above.plot(fluid, published, color="black", lw=1, label=label)
+    if alike == 1:
         label = "crystal, Alder, Hoover and Young 1968"
         above.plot(solid, hard_disks.crystal(solid), color="black", lw=1, ls="--", label=label)
-        below.plot(fluid, 100 * (hard_disks.henderson(fluid) / published - 1), color="0.6")
-    else:
-        below.set_visible(False)
-        above.set_xlabel("packing fraction $\\eta$")
-        above.tick_params(labelbottom=True)
+    below.plot(fluid, 100 * (henderson / published - 1), color="0.6")
     found = {name: np.array(values, dtype=float) for name, values in columns(rows).items()}
     eta, expected = found["packing"], found["Z_reference"]
     for (name, way), marker, colour in zip(WAYS.items(), "oxs", COLOURS, strict=False):

@@ -86,6 +86,15 @@ def published(eta: float, count: int, periodic: bool) -> float:
     return float(crystal(eta, count) if eta >= 0.72 else simulated(eta))
 
 
+def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
+    """Z of a fluid of many radii from that of equal disks; `alike` = <r>^2 / <r^2>.
+
+    Santos, Yuste and Lopez de Haro, Mol. Phys. 96, 1 (1999): the second virial coefficient is
+    exact, and scaled-particle theory gives itself.
+    """
+    return (1 - alike) / (1 - eta) + alike * z
+
+
 def contact_value(z: float, eta: float) -> float:
     """The chi of Z = 1 + 2 eta chi."""
     return (z - 1) / (2 * eta)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import hard_disks
-from .nature import KICKED, ROUNDING, SETTLED, allow
+from .nature import KICKED, ROUNDING, SETTLED, Refused, allow
 from .reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
@@ -211,7 +211,7 @@ def kinds_of_disks(run: Run) -> tuple[Species, ...]:
     """The species, each of one mass and one radius, as laws by species are."""
     for kind in run.by_species:
         if not kind.alike:
-            raise RunError(f"{run.path}: the disks of '{kind.name}' are not of one mass and radius")
+            raise Refused(f"{run.path}: the disks of '{kind.name}' are not of one mass and radius")
     return run.by_species
 
 

@@ -38,14 +38,15 @@ contains
     call take_run(groups(place_of("run", groups%name)))
     call take_box(groups(place_of("box", groups%name)))
     call take_obstacles(groups(o(1):o(2)), settings%box, problems)
-    call take_species(groups(s(1):s(2)), settings%box, settings%species, problems)
+    call take_species(groups(s(1):s(2)), settings%box, settings%run%seed, settings%species, problems)
     call take_contact(groups(place_of("contact", groups%name)), size(settings%species))
     call take_wall_laws(groups(w(1):w(2)), groups(o(1):o(2)), wall_law, settings%box, problems)
     call take_drive(groups(place_of("drive", groups%name)))
     call take_stop(groups(place_of("stop", groups%name)))
     call take_output(groups(place_of("output", groups%name)))
     associate (law => settings%law, box => settings%box, with => settings%with)
-      with%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file)
+      with%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file &
+        .or. settings%species%radius_spread > 0)
       with%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
         .or. any(settings%species%rotational_temperature >= 0)
       with%orientation = with%rotation .or. settings%drive%kind == active

@@ -7,6 +7,7 @@ module input_species
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use observables, only: own_names
+  use radii, only: drawn_radii, widest_spread
   use settings, only: species_settings_t
   use texts, only: counted, digits, letters, place_of, shown, suggestion, written
   use variables, only: largest, most_disks, row_of, smallest
@@ -17,9 +18,10 @@ module input_species
 contains
 
   !> Fills the settings of all species; derived values go back into the groups.
-  subroutine take_species(groups, box, species, problems)
+  subroutine take_species(groups, box, seed, species, problems)
     type(group_t), intent(inout) :: groups(:)             !! the species
     type(box_t), intent(in) :: box
+    integer(int64), intent(in) :: seed                    !! of the run
     type(species_settings_t), allocatable, intent(out) :: species(:)
     type(problem_list_t), intent(inout) :: problems
     integer(int64) :: total
@@ -35,6 +37,7 @@ contains
         call groups(k)%complain("velocities", "'file' needs species.file", problems)
       call groups(k)%check_choices(problems)
       call take_placement(groups(k), species(k))
+      call take_spread(groups(k), species(k))
       call take_count(groups(k), species(k))
       call take_velocities(groups(k), species(k))
     end do
@@ -48,8 +51,8 @@ contains
         if (.not. s%mass_in_file) call group%put_reals("mass", [s%mass])
         if (s%mass_in_file) call group%values(row_of("species", "mass"))%clear()
         if (.not. s%radius_in_file) call group%put_reals("radius", [s%radius])
-        if (s%radius > 0 .and. s%radius < sqrt(area(s%region))) call group%put_reals("packing_fraction", &
-          [s%count*pi*s%radius**2/area(s%region)])
+        if (s%radius > 0 .and. s%radius < sqrt(area(s%region)) .and. .not. s%radius_spread > 0) &
+          call group%put_reals("packing_fraction", [s%count*pi*s%radius**2/area(s%region)])
         call group%put_reals("region", s%region)
       end associate
     end do
@@ -76,6 +79,22 @@ contains
       end associate
       call take_pairs(group, "position", s%position)
     end subroutine take_placement
+
+    !> How much the radii differ, and whether masses follow from them.
+    subroutine take_spread(group, s)
+      type(group_t), intent(in) :: group
+      type(species_settings_t), intent(inout) :: s
+
+      s%radius_spread = group%real_of("radius_spread", 0.0_real64)
+      s%distribution = group%text_of("radius_distribution")
+      s%mass_by_area = s%radius_spread > 0 .and. group%text_of("mass_by") == "area"
+      s%mass_in_file = s%mass_in_file .and. .not. s%mass_by_area
+      if (s%radius_spread > widest_spread(s%distribution)) call group%complain("radius_spread", "radii would differ by more " &
+        //"than a factor of 10; allowed with '"//s%distribution//"': up to "//written(widest_spread(s%distribution)) &
+        //"; or give several species", problems)
+      if (s%radius_in_file .and. group%given("radius_spread")) call group%complain("radius_spread", &
+        "has no effect on the radii of a file; give their mean as radius", problems)
+    end subroutine take_spread
 
     !> x1, y1, x2, y2, ... as (2,n).
     subroutine take_pairs(group, name, pairs)
@@ -148,7 +167,7 @@ contains
         base(k) = 0
         if (wanted /= "") base(k) = place_of(wanted, groups%instance)
         mass(k) = groups(k)%real_of("mass", 1.0_real64)
-        radius(k) = own_radius(groups(k), species(k))
+        radius(k) = own_radius(groups(k), species(k), k)
         if (wanted == "") cycle
         if (base(k) == 0) then
           radius(k) = 0
@@ -176,12 +195,14 @@ contains
         call groups(k)%complain("relative_to", "leads back to the species itself, or to sizes out of range", problems)
         species(k)%radius = 0
       end do
+      species%mean_radius = species%radius
     end subroutine resolve_sizes
 
     !> The radius as given, or a multiple, or from the packing fraction; 0 if it cannot be known.
-    function own_radius(group, s) result(radius)
+    function own_radius(group, s, number) result(radius)
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(in) :: s
+      integer, intent(in) :: number                       !! of the species
       real(real64) :: radius
       logical :: given, relative
 
@@ -193,6 +214,7 @@ contains
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
+        if (s%radius_spread > 0 .and. radius > 0) radius = radius*sqrt(s%count/sum(drawn_radii(s, number, seed)**2))
       else if (relative .and. .not. given) then
         radius = 1
       else if (.not. (given .or. s%radius_in_file)) then

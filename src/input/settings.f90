@@ -35,7 +35,11 @@ module settings
 
   !> A species, and how its disks start.
   type, extends(species_t) :: species_settings_t
-    real(real64) :: radius = 0.0_real64               !! of each disk, or the largest in the file [length]
+    real(real64) :: radius = 0.0_real64               !! of each disk, or the largest in the file, or of those drawn [length]
+    real(real64) :: mean_radius = 1.0_real64          !! of all that may be drawn [length]
+    real(real64) :: radius_spread = 0.0_real64        !! its standard deviation over the mean; 0: all are equal
+    character(len=:), allocatable :: distribution     !! 'uniform', 'normal', 'lognormal'
+    logical :: mass_by_area = .false.                 !! of the disks of a spread; the mass is that of the mean radius
     logical :: mass_in_file = .false.                 !! the input leaves the masses to the file, which may have none
     logical :: radius_in_file = .false.               !! the input leaves the radii to the file
     logical :: spin_in_file = .false.                 !! angular velocities come with the velocities of the file

@@ -35,6 +35,7 @@ module variables
   type(range_t), parameter :: fraction = range_t(smallest, nearest(1.0_real64, -1.0), "> 0 and < 1")
   type(range_t), parameter :: part_of_all = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter :: energy_left = range_t(1.0e-12_real64, fraction%upper, ">= 1e-12 and < 1")
+  type(range_t), parameter :: spread_of_radii = range_t(0, fraction%upper, ">= 0 and < 1")
   type(range_t), parameter :: tangential = range_t(-1, 1, "from -1 to 1")
   type(range_t), parameter :: moment = range_t(smallest, 1, "> 0 and <= 1")
   type(range_t), parameter :: per_decade = range_t(1, 1000, "from 1 to 1000")
@@ -143,6 +144,14 @@ module variables
       "radius of a disk; give it or packing_fraction, or leave it to file", positive, "length"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
       "area of the disks divided by the area of their region; fixes the radius", fraction, excludes="radius relative_to"), &
+    variable_t("species", "radius_distribution", "text", 1, "optional", "'normal'", &
+      "of radii that differ; follows from radius_spread: uniform", choices="uniform normal lognormal"), &
+    variable_t("species", "radius_spread", "real", 1, "required", "0.2", &
+      "standard deviation of the radii over their mean, which is then radius", spread_of_radii, &
+      goes_with="radius_distribution uniform normal lognormal"), &
+    variable_t("species", "mass_by", "text", 1, "fallback", "'number'", &
+      "all disks have one mass, or by area, and mass is that of the mean radius", choices="number area", &
+      goes_with="radius_distribution uniform normal lognormal"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "another species; mass and radius are then multiples of its own (radius: 1)"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &

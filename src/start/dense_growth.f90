@@ -5,7 +5,7 @@
 module dense_growth
   use kinds, only: int32, int64, never, pi, real64
   use box_geometry, only: box_t, obstacle_gap
-  use disks, only: disks_before, species_t
+  use disks, only: disks_before, species_by_id, species_t
   use errors, only: error_t, exit_usage, fail
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
@@ -37,7 +37,7 @@ contains
   subroutine grow_disks(box, species, full, stream, line, x, error)
     type(box_t), intent(in) :: box                      !! with its obstacles; gravity is not felt
     type(species_t), intent(in) :: species(:)
-    real(real64), intent(in) :: full(:)                 !! (n) radii to reach, one for a species if x is empty [length]
+    real(real64), intent(in) :: full(:)                 !! (n) radii to reach, species by species [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line         !! shows how far it is
     real(real64), allocatable, intent(inout) :: x(:, :) !! (2,n) species by species; in: where to start, or none [length]
@@ -123,7 +123,13 @@ contains
       logical :: complete
       integer :: k
 
-      wanted = pi*sum(species%count*full([(1 + disks_before(species, k), k=1, size(species))])**2)/product(sim%box%edges())
+      wanted = 0
+      do k = 1, size(species)
+        associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
+          wanted = wanted + own(1)**2*sum((own/own(1))**2)
+        end associate
+      end do
+      wanted = pi*wanted/product(sim%box%edges())
       scale = sqrt(min(1.0_real64, loose/wanted))
       do
         call fill(packing, scale*full, complete)
@@ -147,19 +153,20 @@ contains
       real(real64), intent(in) :: radius(:)             !! (n) of each disk [length]
       logical, intent(out) :: complete
       logical :: waiting(size(species))
-      real(real64) :: inset(2)
-      integer(int32) :: first(size(species)), s, placed
+      real(real64) :: inset(2), largest(size(species))
+      integer(int32) :: s, placed
       integer :: k
 
       packing = packing_t(sim%box, size(sim%disk), size(species))
       waiting = .true.
-      first = [(1 + disks_before(species, k), k=1, size(species))]
+      largest = [(maxval(radius, mask=species_by_id(species) == k), k=1, size(species))]
       do k = 1, size(species)
-        s = maxloc(radius(first), dim=1, mask=waiting)
+        s = maxloc(largest, dim=1, mask=waiting)
         waiting(s) = .false.
-        inset = merge(0.0_real64, radius(first(s)), sim%box%periodic)
-        call packing%open_species(s, radius(first(s)), species(s)%count, sim%box%lower + inset, sim%box%upper - inset)
-        call insert_at_random(packing, s, first(s), stream, line, placed)
+        inset = merge(0.0_real64, largest(s), sim%box%periodic)
+        call packing%open_species(s, largest(s), species(s)%count, sim%box%lower + inset, sim%box%upper - inset)
+        call insert_at_random(packing, s, disks_before(species, s) + 1, &
+          radius(disks_before(species, s) + 1:disks_before(species, s + 1)), stream, line, placed)
         complete = placed == species(s)%count
         if (.not. complete) return
       end do

@@ -1,7 +1,7 @@
 !> Whether the system of an input fits together: obstacles and regions in the box, and disks in their regions. What is wrong
 !> is reported with the line of the input.
 module input_fit
-  use kinds, only: pi, real64
+  use kinds, only: int64, pi, real64
   use box_geometry, only: box_t
   use box_sides, only: bounds
   use errors, only: exit_files
@@ -10,6 +10,7 @@ module input_fit
   use memory, only: check_memory
   use partners, only: n_sides
   use position_file, only: angle_row, radius_row, spin_row
+  use radii, only: drawn_radii
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use starting_disks, only: read_disks, resolution
@@ -56,6 +57,7 @@ contains
       call check_memory(settings, problems)
       if (problems%count > k) return
       do k = 1, size(species)
+        call survey_spread(species(k), k, settings%run%seed, groups(s(1) + k - 1))
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
     end associate
@@ -97,6 +99,21 @@ contains
     end associate
   end subroutine survey_file
 
+  !> Finds the largest of the radii that will be drawn, and how much room they fill.
+  subroutine survey_spread(s, k, seed, group)
+    type(species_settings_t), intent(inout) :: s
+    integer, intent(in) :: k                                  !! its number
+    integer(int64), intent(in) :: seed                        !! of the run
+    type(group_t), intent(inout) :: group
+    real(real64), allocatable :: radius(:)                    ! [length]
+
+    if (.not. (s%radius_spread > 0 .and. s%count > 0)) return
+    radius = drawn_radii(s, k, seed)
+    s%radius = maxval(radius)
+    if (all(s%region([1, 3]) < s%region([2, 4])) .and. .not. group%given("packing_fraction")) &
+      call group%put_reals("packing_fraction", [pi*sum(radius**2)/product(s%region([2, 4]) - s%region([1, 3]))])
+  end subroutine survey_spread
+
   !> Reports why the disks of a file cannot be had.
   subroutine complain_of_file(s, group, problems)
     type(species_settings_t), intent(in) :: s
@@ -122,7 +139,7 @@ contains
       call check_axis()
       if (.not. sound) return
     end do
-    if (.not. s%radius_in_file) call check_fraction()
+    if (.not. (s%radius_in_file .or. s%radius_spread > 0)) call check_fraction()
     do k = n_sides + 1, size(box%surface)
       associate (shape => box%surface(k)%shape)
         if (shape%encloses .and. any(shape%extent <= s%radius)) call group%complain("radius", "a disk of radius "// &

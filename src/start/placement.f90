@@ -19,7 +19,8 @@ module placement
   use packing, only: packing_t
   use partners, only: n_sides
   use position_file, only: angle_row, mass_row, radius_row, spin_row
-  use random_insertion, only: insert_at_random
+  use radii, only: drawn_radii
+  use random_insertion, only: insert_at_random, largest_first
   use random_stream, only: random_stream_t
   use regular_places, only: centre_range, grid_positions, lattice_positions, spans
   use settings, only: species_settings_t
@@ -82,6 +83,12 @@ contains
       sim%disk(k)%x = packing%disk(k)%x
       sim%disk(k)%radius = packing%disk(k)%radius
     end do
+    do s = 1, size(species)
+      if (.not. species(s)%mass_by_area) cycle
+      associate (me => species(s), first => disks_before(species, s) + 1, last => disks_before(species, s + 1))
+        sim%extra(sim%row(mass_column), first:last) = me%mass*(sim%disk(first:last)%radius/me%mean_radius)**2
+      end associate
+    end do
     if (sim%with%own_sizes) call sim%settle_masses()
 
   contains
@@ -94,7 +101,7 @@ contains
 
       first = disks_before(species, s) + 1
       last = first + species(s)%count - 1
-      radius = spread(species(s)%radius, 1, species(s)%count)
+      radius = drawn_radii(species(s), s, seed)
       associate (file => species(s)%in_file)
         select case (species(s)%placement)
         case ("explicit")
@@ -109,7 +116,7 @@ contains
             return
           end if
           x = file%table(1:2, :)
-          radius = file%table(radius_row, :)
+          if (.not. species(s)%radius_spread > 0) radius = file%table(radius_row, :)
           if (species(s)%velocities == "file") then
             do k = first, last
               sim%disk(k)%v = file%table(3:4, k - first + 1)
@@ -186,26 +193,28 @@ contains
     !> Places a species by random sequential insertion.
     subroutine place_at_random(s)
       integer, intent(in) :: s
-      real(real64) :: lower(2), upper(2), disk_packing
+      real(real64) :: lower(2), upper(2)
+      real(real64), allocatable :: part(:)                  ! of the region that disks fill, in the order of their placement
       character(len=:), allocatable :: advice
       integer(int32) :: placed, trial
 
+      radius = drawn_radii(species(s), s, seed)
       associate (me => species(s))
         call stream%seed(seed, [s, purpose])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
         ! The fewer the disks, the more the number that fits varies from trial to trial.
-        do trial = 1, max(1, many_trials/me%count)
+        do trial = 1, merge(1, max(1, many_trials/me%count), me%radius_spread > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
-          call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), stream, line, placed)
+          call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
           if (placed == me%count) return
           if (placed == 0 .or. me%count > nearly*placed + few) exit  ! without room for one, no trial has any
         end do
-        disk_packing = pi*me%radius**2/product(me%region([2, 4]) - me%region([1, 3]))
+        part = pi*radius(largest_first(radius))**2/product(me%region([2, 4]) - me%region([1, 3]))
         advice = "use fewer or smaller disks"
-        if (me%count < denser*placed) advice = "use placement = 'dense'"
+        if (sum(part) < denser*sum(part(:placed))) advice = "use placement = 'dense'"
         call groups(s)%complain("placement", "no more room after "//written(placed)//" of "//written(me%count) &
-          //" random disks: reached "//written(placed*disk_packing)//" of the wanted packing " &
-          //written(me%count*disk_packing)//"; "//advice, problems)
+          //" random disks: reached "//written(sum(part(:placed)))//" of the wanted packing " &
+          //written(sum(part))//"; "//advice, problems)
       end associate
     end subroutine place_at_random
 
@@ -223,7 +232,7 @@ contains
       allocate (places(2, 0), full(0))
       do k = 1, size(members)
         associate (s => members(k))
-          radius = spread(species(s)%radius, 1, species(s)%count)
+          radius = drawn_radii(species(s), s, seed)
           if (grown) then
             call find_places(s)
             if (problems%count == 0) call add_known(small, s, x, smallest_scale*radius)

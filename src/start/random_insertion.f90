@@ -3,16 +3,20 @@
 !> that no single disk covers, and voxels are halved when attempts fail too often; the points that
 !> are left out would be rejected anyway, so the distribution is that of plain insertion, up to
 !> saturation (Zhang and Torquato, Phys. Rev. E 88, 053312 (2013)).
+!> Where radii differ, the largest come first, and what has no room for one may have it for the next:
+!> no point is left out, and a disk that finds none in many attempts has no room.
 module random_insertion
   use kinds, only: int32, real64
   use packing, only: packing_t
   use random_stream, only: random_stream_t
+  use sorting, only: sort_by_count
   use status_line, only: status_line_t
   implicit none
   private
-  public :: insert_at_random
+  public :: insert_at_random, largest_first
 
   integer(int32), parameter :: disks_per_look = 1024    !! at the clock
+  integer(int32), parameter :: most_attempts = 300000   !! for one disk, where radii differ
 
   !> Where a centre may still fit.
   type :: voxels_t
@@ -25,18 +29,21 @@ module random_insertion
 contains
 
   !> Inserts the disks of a species, numbered from `first`, until all are placed or no room is left.
-  subroutine insert_at_random(packing, s, first, stream, line, placed)
+  subroutine insert_at_random(packing, s, first, size_of, stream, line, placed)
     type(packing_t), intent(inout) :: packing
     integer(int32), intent(in) :: s                 !! a species that is open
     integer(int32), intent(in) :: first
+    real(real64), intent(in) :: size_of(:)          !! (count) radii of the disks [length]
     type(random_stream_t), intent(inout) :: stream
     class(status_line_t), intent(inout) :: line     !! shows how far it is
     integer(int32), intent(out) :: placed           !! how many
     type(voxels_t) :: voxels
-    integer(int32) :: i, j, k, n(2), blocker, failures, count
+    integer(int32) :: i, j, k, n(2), blocker, failures, count, order(size(size_of))
     real(real64) :: p(2), radius, lower(2), upper(2)
+    logical :: equal
 
-    radius = packing%layer(s)%radius
+    equal = .not. minval(size_of) < maxval(size_of)
+    order = largest_first(size_of)
     count = packing%layer(s)%count
     lower = packing%layer(s)%lower
     upper = packing%layer(s)%upper
@@ -53,19 +60,23 @@ contains
     placed = 0
     failures = 0
     do while (placed < count .and. voxels%n > 0)
+      radius = size_of(order(placed + 1))
       call stream%draw_index(voxels%n, k)
       call stream%draw_uniform(p(1))
       call stream%draw_uniform(p(2))
       p = min(max(voxels%origin + (voxels%column_row(:, k) + p)*voxels%side, lower), upper)
       call packing%find_blocker(p, [0.0_real64, 0.0_real64], radius, blocker)
       if (blocker == 0) then
-        blocker = first + placed
+        blocker = first - 1 + order(placed + 1)
         call packing%add(blocker, s, p, radius)
         placed = placed + 1
+        if (.not. equal) failures = 0
         if (modulo(placed, disks_per_look) == 0) call line%show_share("placing disks", real(placed, real64)/count)
       else
         failures = failures + 1
       end if
+      if (failures == most_attempts .and. .not. equal) exit
+      if (.not. equal) cycle
       if (packing%covers(blocker, middle(voxels, k), 0.5_real64*voxels%side, radius)) then
         voxels%column_row(:, k) = voxels%column_row(:, voxels%n)       ! the last one takes its number
         voxels%n = voxels%n - 1
@@ -78,6 +89,18 @@ contains
       end if
     end do
   end subroutine insert_at_random
+
+  !> The order of disks by their radius, to a thousandth of how much they differ; where they do not, as it is.
+  pure function largest_first(radius) result(order)
+    real(real64), intent(in) :: radius(:)           !! [length]
+    integer(int32), parameter :: classes = 1000
+    integer(int32) :: order(size(radius)), place(size(radius)), k
+    integer(int32), allocatable :: first(:)
+
+    call sort_by_count(1 + int(classes*(maxval(radius) - radius)/max(maxval(radius) - minval(radius), tiny(radius)), int32), &
+      classes + 1, first, place)
+    order(place) = [(k, k=1, size(radius, kind=int32))]
+  end function largest_first
 
   !> The centre of voxel k.
   pure function middle(voxels, k) result(p)

@@ -6,7 +6,7 @@ import pytest
 from ricochet import hard_disks as hd
 from ricochet import theory
 from ricochet.theory import path_density
-from validation.laws import cooling_ratio, mixture_rates, mixture_z
+from validation.laws import cooling_ratio, mixture_contact, mixture_rates
 
 
 def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
@@ -40,7 +40,16 @@ def test_rates_of_a_mixture_of_equals_are_those_of_one_gas():
     np.testing.assert_allclose(w[:, 1] / w[:, 0], 7 / 3)
     unequal = mixture_rates([0.02, 0.04], [300, 200], [1.0, 4.0])
     assert 300 * unequal[0, 1] == pytest.approx(200 * unequal[1, 0])
-    assert mixture_z([diameter, diameter], [300, 700]) == pytest.approx(hd.simulated(eta))
+
+
+def test_the_pressure_of_many_sizes_is_that_of_their_contacts():
+    """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and equal disks are themselves."""
+    s, n = np.array([0.01, 0.02, 0.04]), np.array([300, 200, 50])
+    eta, pair = np.pi / 4 * n @ s**2, (s[:, None] + s) / 2
+    z = 1 + np.pi / 2 * n @ (pair**2 * mixture_contact(s, n)) @ n / n.sum()
+    alike = (n @ s) ** 2 / (n @ s**2) / n.sum()
+    assert z == pytest.approx(hd.of_sizes(hd.simulated(eta), eta, alike))
+    assert hd.of_sizes(hd.simulated(eta), eta, 1) == hd.simulated(eta)
 
 
 def test_laws_of_cooling_agree_at_first_and_equal_masses_cool_alike():

@@ -340,7 +340,7 @@ def test_completion_knows_ensembles(program, tmp_path):
     ensemble.symlink_to(ROOT / "runs" / "ensemble.sh")
     assert completed(ensemble, "--se") == ["--seeds", "--set"]
     assert completed(ensemble, "input/gas") == ["input/gas.nml"]
-    assert completed(ensemble, "--scan", "species.mass") == ["species.mass="]
+    assert completed(ensemble, "--scan", "species.gr") == ["species.grid="]
     assert completed(ensemble, "--scan", "run.queue", "=", "he") == ["heap"]
     assert completed("runs/ensemble.sh", "--sc") == ["--scan"]
     known = 'source "$1"; complete -p ricochet ricochet-ensemble runs/ensemble.sh'

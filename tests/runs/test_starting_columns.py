@@ -117,6 +117,54 @@ def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):
     assert (np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(COUNT)).min() > -1e-13
 
 
+@pytest.mark.parametrize(
+    ("law", "spread", "placement", "packing"),
+    [
+        ("uniform", 0.47, "random", 0.6),
+        ("normal", 0.1, "lattice", 0.3),
+        ("normal", 0.27, "dense", 0.75),
+        ("lognormal", 0.39, "random", 0.5),
+        ("lognormal", 0.2, "grown", 0.7),
+    ],
+)
+def test_radii_that_are_drawn_fill_what_was_asked_and_go_on(
+    ricochet, tmp_path, law, spread, placement, packing
+):
+    """Within a ratio of ten, masses as their areas, and neither places nor stops change them."""
+    grown = "file = 'start.txt' velocities = 'rest' placement = 'grown'"
+    where = grown if placement == "grown" else f"temperature = 1 placement = '{placement}'"
+    site = np.stack(np.divmod(np.arange(400), 20), axis=1)
+    write_start(tmp_path / "start.txt", (site + 0.5) / 20)
+    write_input(
+        tmp_path,
+        f"""&box boundary = 'periodic', 'wall' /
+        &species count = 400 packing_fraction = {packing} mass = 2 mass_by = 'area' {where}
+        radius_spread = {spread} radius_distribution = '{law}' /
+        &species name = 'other' count = 9 relative_to = 'species1' radius = 0.5 radius_spread = 0.2
+        temperature = 1 region = 0, 1, 0, 1 placement = 'dense' /
+        &stop events = 3000 /""",
+    )
+    finished(ricochet, "whole.h5")
+    assert ricochet("gas.nml", "-o", "gas.h5", "--set=stop.wall_clock=1e-9").returncode == STOPPED
+    finished(ricochet, "gas.h5", "--resume")
+    assert differences(tmp_path / "whole.h5", tmp_path / "gas.h5") == []
+    run = read_run(tmp_path / "gas.h5")
+    radius, mean = run.by_species[0].radii, run.parameters["species"]["species1"]["radius"]
+    assert np.pi * np.sum(radius**2) == pytest.approx(packing)
+    assert 1 < radius.max() / radius.min() < 10 and np.sum(radius == radius[0]) == 1
+    assert radius.mean() == pytest.approx(mean, rel=4 * spread / 20)
+    assert radius.std() == pytest.approx(mean * spread, rel=0.2)
+    assert run.by_species[0].masses == pytest.approx(2 * (radius / mean) ** 2)
+    assert (run.by_species[1].masses == 2).all()
+    assert run.by_species[1].radius == pytest.approx(mean / 2, rel=0.3)
+    apart = run.position[0][:, None] - run.position[0]
+    apart[..., 0] -= np.round(apart[..., 0])
+    gaps = np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(run.count)
+    assert gaps.min() > -1e-13
+    finished(ricochet, "new.h5", "--set=run.seed=2")
+    assert (read_run(tmp_path / "new.h5").radius != run.radius).all()
+
+
 def test_maxwell_velocities_belong_to_the_mass_of_each_disk(ricochet, tmp_path):
     """The light and the heavy half have one kT, and it is exact where it is wanted."""
     x, y = np.divmod(np.arange(10000), 100)
@@ -170,7 +218,7 @@ def test_scripts_see_each_disk_and_refuse_laws_of_equal_ones(ricochet, tmp_path,
     run = read_run(tmp_path / "gas.h5")
     radii, own = player.radii_of(run)
     assert (radii[own] == by_species(bed)["radius"]).all()
-    assert run_script("mixture", run.path, "-o", tmp_path / "mixture.png") == 2
+    assert run_script("mixture", run.path, "-o", tmp_path / "mixture.png") == 1
     message = capsys.readouterr().err
     assert "the disks of 'bed' are not of one mass and radius" in message
     mass = run.mass[:108]

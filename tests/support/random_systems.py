@@ -248,6 +248,12 @@ class Draw:
                 rows, radius = max(count // columns, 1), radius / 2
                 count, placement = columns * rows, f" grid = {columns}, {rows}"
                 radius = min(radius, 0.4 * min(wide / columns, high / rows))
+            spread = ""
+            if self.chance(0.25):
+                law, most = rng.choice([("uniform", 0.47), ("normal", 0.27), ("lognormal", 0.39)])
+                spread = f" radius_spread = {most * rng.random()!r} radius_distribution = '{law}'"
+                spread += self.maybe(0.5, "mass_by = 'area'")
+                radius /= 2  # the largest may be thrice as large
             size = f"radius = {radius!r} mass = {mass!r}"
             if k == 0 and "grid" not in placement and self.chance(0.1):
                 share = count * math.pi * radius**2 / (wide * high)
@@ -255,7 +261,7 @@ class Draw:
             elif k > 0 and self.chance(0.3):
                 size = f"relative_to = 's0' radius = {rng.uniform(0.1, 1)!r} mass = {mass!r}"
             groups.append(
-                f"&species name = 's{k}' count = {count} {size}"
+                f"&species name = 's{k}' count = {count} {size}{spread}"
                 f"{placement}{self.where}{self.motion(count)} /"
             )
         self.kinds = len(groups)
@@ -344,7 +350,7 @@ class Draw:
         words = rng.choice(
             [
                 f"kind = 'noise' strength = {energy / flight!r}"
-                + self.maybe(0.7, "keep_momentum = .true."),
+                + self.maybe(0.8, "keep_momentum = .true."),
                 f"kind = 'andersen' temperature = {energy!r}"
                 f" fraction = {rng.choice([1, 0.1, 1e-3])}",
                 f"kind = 'brownian' temperature = {energy!r}",

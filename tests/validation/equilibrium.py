@@ -7,12 +7,12 @@ import numpy as np
 from ricochet import Run
 from ricochet import hard_disks as hd
 from ricochet.statistics import SeriesMean
-from ricochet.thermodynamics import collision_rate, z_rate, z_virial, z_wall
+from ricochet.thermodynamics import collision_rate, packing, z_rate, z_virial, z_wall
 
 from .case import Case, Member, relative, sigmas, within
 from .estimators import each, force, hit_rate, over, pooled, several
 from .inputs import PERIODIC, ROOT_2, ensemble, gases
-from .laws import mixture_rates, mixture_z
+from .laws import mixture_rates
 
 N = 1000
 
@@ -206,14 +206,35 @@ def species_rates(run: Run) -> np.ndarray:
     return (per_disk / sqrt(kt)).ravel()
 
 
+def over_equation_of_state(run: Run) -> SeriesMean:
+    """Z by the virial over that of a fluid of the radii of the run."""
+    eta, alike = packing(run), np.mean(run.radius) ** 2 / np.mean(run.radius**2)
+    return z_virial(run).scaled(1 / float(hd.of_sizes(hd.simulated_finite(eta, N), eta, alike)))
+
+
+def polydisperse(eta: float, law: str, spread: float) -> tuple[Member, ...]:
+    """Periodic, masses as areas."""
+    size = {"radius_spread": spread, "radius_distribution": law, "mass_by": "area"}
+    return long_gases(2, N, 2000, packing_fraction=eta, periodic=True, **size)
+
+
 MIXTURES = [
     *[
         Case(
             "P8-02", f"radii 1 : 1.4, packing {eta}: Z",
             mixtures(3, radii_for(eta, 1.4), (1, 1), observables_every_collisions=500),
-            pooled(z_virial), mixture_z(2 * np.array(radii_for(eta, 1.4)), [N / 2, N / 2]),
-            relative(0.004), "Santos, Yuste and Lopez de Haro 2002",
+            pooled(over_equation_of_state), 1,
+            relative(0.004), "Santos, Yuste and Lopez de Haro 1999",
         )
+        for eta in (0.3, 0.5)
+    ],
+    *[
+        Case(
+            "P8-02", f"{law} radii, spread {spread}, packing {eta}: Z over the equation of state",
+            polydisperse(eta, law, spread), pooled(over_equation_of_state),
+            1, relative(0.005), "Santos, Yuste and Lopez de Haro 1999",
+        )
+        for law, spread in (("uniform", 0.47), ("lognormal", 0.39))
         for eta in (0.3, 0.5)
     ],
     Case(

@@ -30,13 +30,6 @@ def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
     return n * pair * mixture_contact(s, n) * np.sqrt(reduced)
 
 
-def mixture_z(diameters, density) -> float:
-    """Z of a mixture with the contact values above."""
-    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
-    pair, share = (s[:, None] + s) / 2, n / np.sum(n)
-    return float(1 + math.pi / 2 * np.sum(n) * share @ (pair**2 * mixture_contact(s, n)) @ share)
-
-
 def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:
     """T_heavy / T_light of a dilute cooling mixture of disks of equal size.
 

@@ -1,0 +1,58 @@
+!> The radii of the disks of a species: one for all, or drawn from a distribution. The largest that can come is ten times the
+!> smallest: what a distribution has beyond is drawn again, and one that has much there is too wide.
+module radii
+  use kinds, only: int64, real64
+  use random_stream, only: random_stream_t
+  use settings, only: species_settings_t
+  implicit none
+  private
+  public :: drawn_radii, widest_spread
+
+  integer, parameter :: purpose = 7                         !! of this module's random streams
+  real(real64), parameter :: part = 9.0_real64/11           !! of the mean, by which radii differ from it at most
+  real(real64), parameter :: powers = 0.5_real64*log(10.0_real64)   !! the same of logarithms
+  real(real64), parameter :: deviations = 3                 !! of a normal law that lie within, at least
+
+contains
+
+  !> The radius of each disk. Logarithms of a lognormal law have the variance ln(1 + spread**2); last bits of that law and of
+  !> the normal one may depend on the mathematical library.
+  pure function drawn_radii(species, s, seed) result(radius)
+    class(species_settings_t), intent(in) :: species
+    integer, intent(in) :: s                                !! its number
+    integer(int64), intent(in) :: seed                      !! of the run
+    real(real64) :: radius(species%count)                   !! [length]
+    type(random_stream_t) :: stream
+    real(real64) :: z(2), difference, deviation
+    integer :: k
+
+    radius = species%mean_radius
+    if (.not. species%radius_spread > 0) return
+    call stream%seed(seed, [s, purpose])
+    deviation = species%radius_spread
+    if (species%distribution == "lognormal") deviation = sqrt(log(1 + deviation**2))
+    k = 1
+    do while (k <= size(radius))
+      call stream%draw_normals(z)
+      difference = deviation*z(1)
+      if (species%distribution == "uniform") then
+        call stream%draw_uniform(z(1))
+        difference = deviation*sqrt(3.0_real64)*(2*z(1) - 1)
+      end if
+      if (abs(difference) > merge(powers, part, species%distribution == "lognormal")) cycle
+      radius(k) = species%mean_radius*(1 + difference)
+      if (species%distribution == "lognormal") radius(k) = species%mean_radius*exp(difference - 0.5_real64*deviation**2)
+      k = k + 1
+    end do
+  end function drawn_radii
+
+  !> The largest spread of a distribution.
+  pure function widest_spread(distribution) result(spread)
+    character(len=*), intent(in) :: distribution            !! 'uniform', 'normal' or 'lognormal'
+    real(real64) :: spread
+
+    spread = part/merge(sqrt(3.0_real64), deviations, distribution == "uniform")
+    if (distribution == "lognormal") spread = sqrt(exp((powers/deviations)**2) - 1)
+  end function widest_spread
+
+end module radii
