@@ -500,14 +500,18 @@ def run_of(path: Path, file: h5py.File) -> Run:
 
 def amplitude(side: Mapping) -> float:
     """How far a side goes from its place, which one that strikes without moving does not leave."""
-    swings = side.get("motion", "still") in ("sine", "parabolic")
-    return float(side["amplitude"]) if swings else 0.0
+    motion = side.get("motion", "still")
+    if motion == "steady":
+        return abs(float(side["velocity"])) * float(side["end"] - side["begin"])
+    return float(side["amplitude"]) if motion in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
     """How far inwards of its place a side is at these times: see docs/theory.md."""
     if amplitude(side) == 0:
         return np.zeros(np.shape(time))
+    if side["motion"] == "steady":
+        return side["velocity"] * (np.clip(time, side["begin"], side["end"]) - side["begin"])
     s = (time / side["period"] + side["phase"]) % 1
     if side["motion"] == "sine":
         return side["amplitude"] * np.sin(2 * np.pi * s)
