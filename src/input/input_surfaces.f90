@@ -137,7 +137,8 @@ contains
         motion%begin = group%real_of("begin", 0.0_real64)
         motion%end = group%real_of("end", 0.0_real64)
         motion%amplitude = abs(motion%strike)*(motion%end - motion%begin)
-        if (motion%end <= motion%begin) call group%complain("end", "is not after begin, "//written(motion%begin), problems)
+        if (group%given("end") .and. motion%end <= motion%begin) call group%complain( &
+          "end", "is not after begin, "//written(motion%begin), problems)
         if (motion%amplitude > largest) call group%complain("end", "the side moves as far as "//written(motion%amplitude) &
           //"; allowed: up to "//written(largest), problems)
       else if (motion%top_speed() > largest) then
