@@ -6,8 +6,8 @@
 --show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  Dashed, for equal disks
 that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998);
 for equal elastic disks in a box with one side that moves steadily: the adiabat from the equation of
-state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several runs,
-for one has no error of its own once the side stands.
+state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several
+runs, for one has no error of its own once the side stands.
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.

@@ -86,7 +86,8 @@ def adiabat(
 
     `walled`: the other two sides are walls, too.  d ln T = -F dw / (N kT), where the side feels
     F = P h less the tension of two walls along its way.  A wall has the tension kT n r / (1 - eta),
-    and lacks n r (1 - eta) / (1 + eta) disks per length, by scaled particle theory: Helfand, Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
+    and lacks n r (1 - eta) / (1 + eta) disks per length, by scaled particle theory:
+    Helfand, Frisch and Lebowitz, J. Chem. Phys. 34, 1037 (1961).  P as `simulated`.
     """
     area = count * math.pi * radius**2
     eta = np.geomspace(1e-12, FLUID[-1, 0], 50001)  # far from the walls
