@@ -131,8 +131,7 @@ contains
     logical :: yes
 
     associate (box => sim%box)
-      yes = any(box%surface%motion%strokes()) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0 &
-        .or. any(box%periodic .and. abs(box%gravity) > 0))
+      yes = any(box%surface%motion%strokes()) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
       if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
         + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
     end associate
