@@ -39,7 +39,7 @@ def digest(path: Path, at: float) -> str:
 def picture(path: Path, at: float) -> bytes:
     """The disks at a time, as PNG."""
     from ricochet import Simulation
-    from ricochet.reader import obstacles_of, walls_of
+    from ricochet.reader import SIDES, obstacles_of, walls_of
 
     figure = Figure(figsize=(1.6, 1.6), dpi=2 * PIXELS / 1.6, layout="none")
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
@@ -49,7 +49,12 @@ def picture(path: Path, at: float) -> bytes:
         for time in np.linspace(0, at, 401 if run.count <= FEW else 2)[1:]:
             way.append(run.advance(time=time).position)
         lower, upper = (np.asarray(box[end], float) for end in ("lower", "upper"))
-        axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.3", lw=0.8))
+        room = np.array([lower, upper])
+        for k, side in enumerate(SIDES):
+            if (place := f"sides/{side}/place") in run.observables:
+                room[k % 2, k // 2] = run.observable(place)
+        axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
+        axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))
         for one in obstacles_of({k: np.asarray(v) for k, v in groups.get("obstacle", {}).items()}):
             colour = "none" if one.inside else "0.8"
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))

@@ -4,7 +4,10 @@
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
 
 --show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  Dashed, for equal disks
-that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998).
+that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998);
+for equal elastic disks in a box with one side that moves steadily: the adiabat from the equation of
+state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several
+runs, for one has no error of its own once the side stands.
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.
@@ -52,6 +55,20 @@ def noise_law(run: Run) -> float | None:
         return None
     gas = packing(run), 2 * run.radius[0], run.mass[0]
     return hard_disks.noise_temperature(float(drive["strength"]), run.restitution, *gas)
+
+
+def temperature_law(run: Run) -> np.ndarray | float | None:
+    """What lasts under noise, or the adiabat at the observables."""
+    moves = [side.get("motion", "still") != "still" for side in run.sides]
+    steady = [k for k, side in enumerate(run.sides) if side.get("motion") == "steady"]
+    if not run.nature <= {"moving", "walled", "turning"} or len(steady) != 1 or sum(moves) > 1:
+        return noise_law(run)
+    time, kt = run.observable("all/temperature")
+    axis, (lower, upper) = steady[0] // 2, run.sides_at(time)
+    widths, height = (upper - lower)[:, axis], float(run.edges[1 - axis])
+    walled = not run.periodic[1 - axis]
+    factor = hard_disks.adiabat(widths, height, run.count, float(run.radius[0]), walled)
+    return kt[0] * run.count / (run.count - 1) * factor
 
 
 def share(run: Run) -> Curves:
@@ -109,7 +126,7 @@ def cluster(run: Run) -> Curves:
 
 #: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
-    "temperature": ("kT (reduced units)", temperature, noise_law, np.asarray),
+    "temperature": ("kT (reduced units)", temperature, temperature_law, np.asarray),
     "share": ("share of the disks in the left half", share, demon_law, fuller),
     "height": ("mean height (reduced units)", height, lambda run: None, np.asarray),
     "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, np.asarray),
@@ -136,7 +153,8 @@ def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict)
             style = {"label": label * (k == 0)} | drawing.lone(means[0])
             axes.plot(*means, color=colour, lw=1, **style)
         for level in laws[key[0]]:
-            axes.axhline(level, color=colour, ls="--", lw=1.6)
+            over = curves[0][0] if np.ndim(level) else np.array([0, curves[0][0][-1]])
+            axes.plot(over, np.broadcast_to(level, over.shape), color=colour, ls="--", lw=1.6)
     if any(laws.values()):
         axes.plot([], [], color="black", ls="--", label="theory")
     top = 1.06 * axes.dataLim.y1
@@ -197,10 +215,13 @@ def main() -> None:
             map(grows, late)
         )
         law, mean, error = expected[name], row["late"], row["late_error"]
+        if np.ndim(law):
+            time = curves[0][0]
+            law = float(np.mean(law[time >= (time[0] + time[-1]) / 2]))
         row |= {"theory": law} | measured("ratio", law and Estimate(mean / law, error / law))
         rows.append(row)
     laws = {
-        name: set() if law is None else {law, 1 - law} if compared is fuller else {law}
+        name: [] if law is None else [law, 1 - law] if compared is fuller else [law]
         for name, law in expected.items()
     }
     report(args, draw(groups, tracks, laws, label), rows, notes=notes)

@@ -44,7 +44,8 @@ from tqdm import tqdm
 PAGE = Path(__file__).with_name("page")  # what the page is made of
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
-LAWS = ("motion", "amplitude", "period", "phase", "temperature", "speed")  # of a side
+SWING, STROKE = ("amplitude", "period", "phase"), ("velocity", "begin", "end")  # of a side
+LAWS = ("motion", *SWING, *STROKE, "temperature", "speed")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
 TURN = (16 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, and of its time

@@ -150,6 +150,11 @@ def shift_of(found: Found, side: str, time: float) -> float:
         found.get(f"/parameters/side/{side}@{name}", 0)
         for name in ("motion", "amplitude", "period", "phase")
     )
+    if kind == b"steady":
+        speed, begin, end = (
+            found[f"/parameters/side/{side}@{name}"] for name in ("velocity", "begin", "end")
+        )
+        return speed * (min(max(time, begin), end) - begin)
     if kind == b"sine":
         return amplitude * np.sin(2 * np.pi * (time / period + phase))
     if kind == b"parabolic":

@@ -109,7 +109,8 @@ function move(time) {
 
 // Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
 function sidesAt(time) {
-  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase }, k) => {
+  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, begin, end }, k) => {
+    if (motion === 'steady') return place + (k % 2 ? -1 : 1) * velocity * (Math.min(Math.max(time, begin), end) - begin);
     if (!period) return place;
     const s = time / period + phase, part = s - Math.floor(s);
     const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));

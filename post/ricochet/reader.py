@@ -230,8 +230,8 @@ class Run:
 
     @cached_property
     def room(self) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) corners of what sides that move never leave: the box with their amplitudes."""
-        swings = [amplitude(side) for side in self.sides]
+        """(2,) corners of what sides that move never leave: the box, and how far they go beyond."""
+        swings = [outmost(side) for side in self.sides]
         return self.lower - swings[::2], self.upper + swings[1::2]
 
     @cached_property
@@ -502,15 +502,18 @@ def run_of(path: Path, file: h5py.File) -> Run:
     )
 
 
-def amplitude(side: Mapping) -> float:
-    """How far a side goes from its place, which one that strikes without moving does not leave."""
-    swings = side.get("motion", "still") in ("sine", "parabolic")
-    return float(side["amplitude"]) if swings else 0.0
+def outmost(side: Mapping) -> float:
+    """How far outwards of its place a side ever is; one that only strikes does not leave it."""
+    if side.get("motion") == "steady":
+        return max(0.0, -float(side["velocity"]) * float(side["end"] - side["begin"]))
+    return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
     """How far inwards of its place a side is at these times: see docs/theory.md."""
-    if amplitude(side) == 0:
+    if side.get("motion") == "steady":
+        return side["velocity"] * (np.clip(time, side["begin"], side["end"]) - side["begin"])
+    if outmost(side) == 0:
         return np.zeros(np.shape(time))
     s = (time / side["period"] + side["phase"]) % 1
     if side["motion"] == "sine":

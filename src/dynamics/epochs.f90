@@ -9,7 +9,7 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: begin_first_epoch, last_time, most_events, move_epoch, stands_still
+  public :: are_crushed, begin_first_epoch, last_time, most_events, move_epoch, stands_still
 
   !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 24
@@ -18,6 +18,7 @@ module epochs
   integer(int64), parameter :: collapse_length = 20000, collapse_length_per_disk = 20
   real(real64), parameter :: shortest = 2.0_real64**(-20)  !! epoch, in blinks
   real(real64), parameter :: last_time = 0.5_real64*never
+  real(real64), parameter :: crushing = 1.0e6_real64 !! growth of the energy that no gas survives
   real(real64), parameter :: densest = 0.9_real64  !! packing fraction
 
 contains
@@ -122,6 +123,19 @@ contains
 
     n = sim%epoch_events + 2*events_per_epoch(sim)
   end function most_events
+
+  !> Whether sides press the disks together where there is no room: their energy grows without limit, ever faster. What
+  !> else heats them, or lets them fall, is not meant. Asked at the end of an epoch.
+  pure function are_crushed(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    associate (box => sim%box)
+      yes = any(box%surface%motion%strokes()) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
+      if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
+        + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
+    end associate
+  end function are_crushed
 
   !> Whether a long series of events has not advanced the clock, as in a collapse; asked at the end of an epoch.
   pure function stands_still(sim) result(yes)

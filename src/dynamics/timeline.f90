@@ -2,7 +2,7 @@
 !> does, samples or the end of the run. In between the origin of time moves.
 module timeline
   use encounters, only: encounter_text
-  use epochs, only: last_time, most_events, move_epoch, stands_still
+  use epochs, only: are_crushed, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
@@ -86,9 +86,12 @@ contains
       end if
     end subroutine wait
 
-    !> Begins the next epoch, unless time stands still.
+    !> Begins the next epoch, unless time stands still, or soon will.
     subroutine end_epoch()
-      if (stands_still(sim)) then
+      if (are_crushed(sim)) then
+        call fail(error, exit_broken, "a side crushes the disks, whose energy has grown a million times: let it end " &
+          //"before the time "//about(sim%time())//" (side.end)")
+      else if (stands_still(sim)) then
         associate (i => evolution%last_event(1), code => evolution%last_event(2))
           call fail(error, exit_broken, "inelastic collapse, time no longer advances: "//encounter_text(sim, i, code) &
             //remedy(sim, i, code))

@@ -8,11 +8,11 @@ module side_motion
   use kinds, only: never, pi, real64
   implicit none
   private
-  public :: motions, side_motion_t
+  public :: motions, sawtooth, side_motion_t
 
   !> The motions by their names in the input; a motion is its number in this list.
-  character(len=*), parameter :: motions = "still sine parabolic sawtooth"
-  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4
+  character(len=*), parameter :: motions = "still sine parabolic sawtooth steady"
+  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5
   real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
   !> A part of a period: what bends the gap for so short a time does not change it by a bit.
   real(real64), parameter :: negligible = 1.0e-10_real64
@@ -20,13 +20,17 @@ module side_motion
 
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
-    real(real64) :: amplitude = 0.0_real64           !! [length]
+    real(real64) :: amplitude = 0.0_real64           !! the way that a steady one goes, inwards or outwards [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
-    real(real64) :: strike = 0.0_real64              !! velocity with which a sawtooth hits [length/time]
+    real(real64) :: strike = 0.0_real64              !! velocity of a sawtooth or a steady side inwards [length/time]
+    real(real64) :: begin = 0.0_real64               !! of a steady one [time]
+    real(real64) :: end = 0.0_real64                 !! likewise
   contains
     procedure :: is_on
     procedure :: travels
+    procedure :: strokes
+    procedure :: inmost
     procedure :: top_speed
     procedure :: moment
     procedure :: place
@@ -50,27 +54,48 @@ contains
     class(side_motion_t), intent(in) :: self
     logical :: yes
 
-    yes = self%kind == sine .or. self%kind == parabolic
+    yes = self%kind == sine .or. self%kind == parabolic .or. self%kind == steady
   end function travels
+
+  !> Whether it goes somewhere, once.
+  elemental function strokes(self) result(yes)
+    class(side_motion_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind == steady
+  end function strokes
+
+  !> How far inwards of its own place it ever is.
+  elemental function inmost(self) result(x)
+    class(side_motion_t), intent(in) :: self
+    real(real64) :: x                                !! [length]
+
+    x = self%amplitude
+    if (self%kind == steady .and. self%strike < 0) x = 0
+  end function inmost
 
   !> The highest speed of the side.
   elemental function top_speed(self) result(speed)
     class(side_motion_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
 
-    speed = self%strike
+    speed = abs(self%strike)
     if (self%kind == sine) speed = 2*pi*self%amplitude/self%period
     if (self%kind == parabolic) speed = 8*self%amplitude/self%period
   end function top_speed
 
-  !> Time since a period began, at the time epoch + t of the run. The remainders are exact, so that a late time is as
+  !> Time since a period or a stroke began, at the time epoch + t of the run. The remainders are exact, so that a late time is as
   !> sharp as an early one.
   elemental function moment(self, epoch, t) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
     real(real64) :: tau                              !! [time]
 
-    tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
+    if (self%kind == steady) then
+      tau = (epoch - self%begin) + t
+    else
+      tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
+    end if
   end function moment
 
   !> How far the side is inwards of its own place.
@@ -86,6 +111,8 @@ contains
       x = self%amplitude*sin(2*pi*s)
     else if (self%kind == parabolic) then
       x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
+    else if (self%kind == steady) then
+      x = self%strike*min(max(tau, 0.0_real64), self%end - self%begin)
     end if
   end function place
 
@@ -102,6 +129,8 @@ contains
       v = self%top_speed()*cos(2*pi*s)
     else if (self%kind == parabolic) then
       v = self%top_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
+    else if (self%kind == steady .and. (tau < 0 .or. tau >= self%end - self%begin)) then
+      v = 0
     end if
   end function velocity
 
@@ -211,6 +240,10 @@ contains
     real(real64) :: s, from, to, above, entry
     integer :: pieces
 
+    if (self%kind == steady) then
+      s = time_in_stroke(self, tau, gap, v, g)
+      return
+    end if
     above = gap + self%place(tau) - self%amplitude   ! beyond the reach of the side
     entry = time_to_line(above, -v, -g)              ! comes into it, the last time
     s = never
@@ -234,6 +267,25 @@ contains
       if (modulo(pieces, pieces_in_reach) == 0) from = scale(to, 1) + self%period
     end do
   end function contact_time
+
+  !> The contact with a side that stands, moves steadily, and stands again.
+  pure function time_in_stroke(motion, tau, gap, v, g) result(s)
+    class(side_motion_t), intent(in) :: motion
+    real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
+    real(real64) :: s, from, to(3), apart
+    integer :: k
+
+    to = [-tau, (motion%end - motion%begin) - tau, never]
+    from = 0
+    do k = 1, 3
+      if (.not. to(k) > from) cycle
+      apart = gap + (flight(0.0_real64, v, g, from) - (motion%place(tau + from) - motion%place(tau)))
+      s = from + time_to_line(max(apart, 0.0_real64), merge(motion%strike, 0.0_real64, k == 2) - (v + g*from), -g)
+      if (s <= to(k)) return
+      from = to(k)
+    end do
+    s = never
+  end function time_in_stroke
 
   !> The contact within a piece of the flight in which the gap is convex or concave; `never` if there is none.
   pure function strike_between(motion, tau, gap, v, g, from, to) result(s)

@@ -10,7 +10,7 @@ module input_surfaces
   use variables, only: largest, table, words_of
   use partners, only: n_sides, side_name
   use segments, only: new_segment
-  use side_motion, only: motions, side_motion_t
+  use side_motion, only: motions, sawtooth, side_motion_t
   use texts, only: place_of, written
   implicit none
   private
@@ -84,8 +84,9 @@ contains
         if (.not. box%surface(side)%motion%travels()) cycle
         axis = (side + 1)/2                               ! sides must not meet, whenever each is how far inwards
         width = box%upper(axis) - box%lower(axis)
-        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%amplitude) >= width) call sides(k)%complain( &
-          "amplitude", "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
+        if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
+          trim(merge("end      ", "amplitude", box%surface(side)%motion%strokes())), "leaves no room between the sides, " &
+          //"which are "//written(width)//" apart (box.upper)", problems)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
@@ -130,8 +131,20 @@ contains
       motion%period = group%real_of("period", 1.0_real64)
       motion%phase = group%real_of("phase", 0.0_real64)
       motion%strike = group%real_of("velocity", 0.0_real64)
-      if (motion%top_speed() > largest) call group%complain("period", "the side moves at up to "// &
-        written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
+      if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
+        "velocity", "must be > 0 with motion = 'sawtooth': it strikes inwards", problems)
+      if (motion%strokes()) then
+        motion%begin = group%real_of("begin", 0.0_real64)
+        motion%end = group%real_of("end", 0.0_real64)
+        motion%amplitude = abs(motion%strike)*(motion%end - motion%begin)
+        if (group%given("end") .and. motion%end <= motion%begin) call group%complain( &
+          "end", "is not after begin, "//written(motion%begin), problems)
+        if (motion%amplitude > largest) call group%complain("end", "the side moves as far as "//written(motion%amplitude) &
+          //"; allowed: up to "//written(largest), problems)
+      else if (motion%top_speed() > largest) then
+        call group%complain("period", "the side moves at up to "// &
+          written(motion%top_speed())//"; allowed: up to "//written(largest), problems)
+      end if
     end subroutine take_motion
   end subroutine take_wall_laws
 

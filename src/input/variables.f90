@@ -95,15 +95,19 @@ module variables
     variable_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
       choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
-      "how it moves about its place in time; sawtooth: it stays and strikes", choices=motions), &
+      "how it moves in time; sawtooth: it stays and strikes; steady: from begin to end", choices=motions), &
     variable_t("side", "amplitude", "real", 1, "required", "0.05", "how far it moves from its place", positive, &
       "length", goes_with="motion sine parabolic"), &
     variable_t("side", "period", "real", 1, "required", "1", "of the motion", positive, "time", &
       goes_with="motion sine parabolic"), &
     variable_t("side", "phase", "real", 1, "fallback", "0", &
       "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
-    variable_t("side", "velocity", "real", 1, "required", "1", "with which it strikes, inwards", positive, &
-      "length/time", goes_with="motion sawtooth")]
+    variable_t("side", "velocity", "real", 1, "required", "1", "inwards: with which it strikes (> 0), or moves (< 0: outwards)", &
+      unit="length/time", goes_with="motion sawtooth steady"), &
+    variable_t("side", "begin", "real", 1, "fallback", "0", "when it starts to move; before, it is at its place", &
+      not_negative, "time", goes_with="motion steady"), &
+    variable_t("side", "end", "real", 1, "required", "1", "when it stops; it stays where it is then", positive, "time", &
+      goes_with="motion steady")]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
     variable_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &

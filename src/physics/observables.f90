@@ -3,6 +3,7 @@
 module observables
   use kinds, only: int32, real64
   use box_geometry, only: box_t, free_area
+  use box_sides, only: bounds
   use drive, only: noise
   use partners, only: n_sides
   use simulation_state, only: simulation_t
@@ -47,6 +48,7 @@ contains
     real(real64) :: sums(lost, 0:size(sim%species))   ! by species; 0: all
     character(len=:), allocatable :: path
     real(real64) :: flown(5)                          ! [energy time], [energy length]
+    real(real64) :: at(2, 2)                          ! lower and upper sides [length]
     integer :: s, k
 
     call add_up(sim, sums)
@@ -84,6 +86,12 @@ contains
       call list%add(path//"/impulse", sim%tally%at_surface(impulse:impulse + 1, k)%value())
       call list%add(path//"/energy", [sim%tally%at_surface(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
+      if (.not. sim%box%surface(k)%motion%strokes()) cycle
+      call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
+      call list%add(path//"/place", [at((k + 1)/2, 2 - modulo(k, 2))])
+      associate (motion => sim%box%surface(k)%motion)
+        call list%add(path//"/velocity", [motion%velocity(motion%moment(sim%box%epoch, sim%now))])
+      end associate
     end do
   end function observed
 
@@ -261,16 +269,19 @@ contains
     end do
   end subroutine add_up
 
-  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t): K now, W the sum of impulse times
+  !> Pressure in two dimensions by the virial theorem, P A = K + W/(2t): K and A now, W the sum of impulse times
   !> distance over the pair collisions since the start.
   pure function pressure(sim, kinetic)
     type(simulation_t), intent(in) :: sim
     real(real64), intent(in) :: kinetic           !! of all disks, relative to the profile of a sheared box [energy]
     real(real64) :: pressure
+    type(box_t) :: box
 
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
-    pressure = pressure/free_area(sim%box)
+    box = sim%box
+    if (any(box%surface%motion%strokes())) call bounds(sim%box, sim%now, box%lower, box%upper)
+    pressure = pressure/free_area(box)
   end function pressure
 
 end module observables

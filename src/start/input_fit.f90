@@ -8,13 +8,13 @@ module input_fit
   use input_groups, only: group_t, range_of
   use input_problems, only: problem_list_t
   use memory, only: check_memory
-  use partners, only: n_sides
+  use partners, only: n_sides, side_name
   use position_file, only: angle_row, radius_row, spin_row
   use radii, only: drawn_radii
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
   use starting_disks, only: read_disks, resolution
-  use texts, only: written
+  use texts, only: place_of, written
   use variables, only: most_disks, obstacle_groups
   implicit none
   private
@@ -60,8 +60,33 @@ contains
         call survey_spread(species(k), k, settings%run%seed, groups(s(1) + k - 1))
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
+      if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
     end associate
   end subroutine fit_together
+
+  !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end.
+  subroutine check_strokes(box, disks, groups, problems)
+    type(box_t), intent(in) :: box
+    real(real64), intent(in) :: disks                         !! their area [length**2]
+    type(group_t), intent(in) :: groups(:)
+    type(problem_list_t), intent(inout) :: problems
+    real(real64) :: low(2), high(2), last
+    integer :: o(2), k, side, axis
+
+    o = range_of(groups, ["side"])
+    do k = o(1), o(2)
+      side = place_of(trim(groups(k)%instance), side_name)
+      axis = (side + 1)/2
+      associate (motion => box%surface(side)%motion)
+        if (.not. motion%strokes() .or. motion%strike < 0) cycle
+        call bounds(box, motion%end, low, high)
+        if (product(high - low) > disks) cycle
+        last = motion%end - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
+        call groups(k)%complain("end", "the side would crush the disks, which need at least their own area, "// &
+          written(disks)//"; possible: before "//written(last), problems)
+      end associate
+    end do
+  end subroutine check_strokes
 
   !> Takes from its file whether disks turn, how many disks a species has, and how large they are, where the input leaves
   !> that to the file. Of a file from which neither number nor sizes are taken it is told later that it cannot be read, when

@@ -20,7 +20,7 @@ import fields as fields_script
 import melting
 import rates
 import trajectory
-from driven import demon_law, fuller, noise_law
+from driven import demon_law, fuller, noise_law, temperature_law
 from ricochet import Events, fields, read_run, statistics, theory, write_start
 from ricochet import cooling as cool
 from ricochet import hard_disks as hd
@@ -452,6 +452,19 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
     assert demon_law(runs[0]) is None, "noise takes part"
     quiet = "\n".join(line for line in text.splitlines() if "drive" not in line)
     assert demon_law(simulated(quiet + "&stop time = 1 /")) == pytest.approx(expected)
+
+
+def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
+    text = """&side name = 'top' motion = 'steady' velocity = 0.02 begin = 1 end = 16 /
+    &species count = 100 packing_fraction = 0.3 temperature = 1 / &stop time = 17 /
+    &output observables_every_time = 1 /"""
+    run = simulated(text)
+    (_, kt), law = driven.temperature(run)[""], temperature_law(run)
+    assert law[0] == law[1] == kt[0] and law[-1] == law[-2] > 1.6 * kt[0]
+    assert kt == pytest.approx(law, rel=0.05)
+    for change in ("contact.restitution=0.9", "box.gravity=0,-1", "side.top.motion=still"):
+        words = ["velocity", "begin", "end"] if "still" in change else []
+        assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None
 
 
 def test_energy_is_kept_as_its_balance_says(simulated, tmp_path):

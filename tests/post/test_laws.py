@@ -22,6 +22,18 @@ def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_poin
     assert np.isnan(hd.simulated(0.7)) and hd.simulated_finite(0.1, 100) < hd.simulated(0.1)
 
 
+def test_adiabats_are_those_of_the_room_for_centres_and_of_the_equation_of_state():
+    widths, thin = np.array([2, 1.3, 0.9]), 1e-3  # disks, as if there were a gas of them
+    room = (widths[0] - 0.1) / (widths - 0.1)
+    for walled in (False, True):
+        assert hd.adiabat(widths, 1.0, thin, 0.05, walled) == pytest.approx(room, rel=1e-4)
+    dense, radius = hd.adiabat(widths, 1.0, 10**8, 4e-5, True), 4e-5
+    eta = 10**8 * np.pi * radius**2 / widths
+    rate = np.diff(np.log(dense)) / np.diff(np.log(widths))
+    assert np.all(-rate > hd.simulated(eta[:-1])) and np.all(-rate < hd.simulated(eta[1:]))
+    assert np.isnan(hd.adiabat(np.array([1, 0.5]), 1.0, 10**8, 4e-5, True)[1])
+
+
 def test_published_pressures_near_melting_have_a_loop_that_flattens():
     depth = {}
     for name, points in hd.MELTING.items():

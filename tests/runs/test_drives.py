@@ -260,6 +260,30 @@ def test_a_side_shakes_a_bed_at_rest(observed, dynamics):
     assert found["/observables/work/value"][-1] > 0
 
 
+def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
+    """Between the packing at which they jam and 1, which is refused at once."""
+    write_input(
+        tmp_path,
+        """&side name = 'right' motion = 'steady' velocity = 0.5 end = 1 / &stop time = 3 /
+        &species count = 40 packing_fraction = 0.45 temperature = 1 /""",
+    )
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == BROKEN and "a side crushes the disks" in one_line(run)
+
+
+def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
+    """A disk hits it before the stroke, and in flight; the side takes all its speed, and leaves."""
+    found = observed(
+        """&side name = 'right' motion = 'steady' velocity = -0.5 begin = 1 end = 4 /
+        &species radius = 0.1 position = 0.5, 0.5 velocity = 1, 0 / &stop time = 12 /
+        &output frames_every_events = 1 observables_every_time = 2 /"""
+    )
+    assert found["/observables/sides/right/place/value"].tolist()[:3] == [1, 1.5, 2.5]
+    assert found["/observables/sides/right/velocity/value"].tolist()[:3] == [0, -0.5, 0]
+    v = found["/particles/disks/velocity/value"][:, 0, 0]
+    assert v[:4].tolist() == [1, -1, 1, 0]
+
+
 def test_time_steps_come_close_to_events(observed):
     """The moments of some bounces of a disk on a floor that moves, at a fine step."""
     times = [

@@ -151,10 +151,15 @@ class Draw:
             words = self.law()
             if "temperature" not in words and "speed" not in words and self.chance(0.6):
                 self.worked = True
-                kind = rng.choice(["sine", "parabolic", "sawtooth"])
+                kind = rng.choice(["sine", "parabolic", "sawtooth", "steady"])
                 words += f" motion = '{kind}'"
                 if kind == "sawtooth":
                     words += f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
+                elif kind == "steady":
+                    speed = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-2, 0.5)
+                    begin = rng.choice([0, rng.random()]) * min(self.edges) / self.speed
+                    end = begin + rng.uniform(0, 0.1) * min(self.edges) / abs(speed)
+                    words += f" velocity = {speed!r} begin = {begin!r} end = {end!r}"
                 else:
                     period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
                     words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"

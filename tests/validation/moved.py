@@ -6,9 +6,10 @@ import numpy as np
 
 from driven import fuller, share
 from ricochet import Run
+from ricochet.hard_disks import adiabat
 from ricochet.theory import demon_share
 
-from .case import AT_LEAST, AT_MOST, Case, Member, relative, sigmas, within
+from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative, sigmas, within
 from .estimators import each, over
 from .inputs import ensemble, namelist
 
@@ -81,6 +82,34 @@ def adiabats(run: Run) -> list[float]:
     return list((kt * area / (kt[0] * area[0]))[1:])
 
 
+# --- a dense gas that a side presses together, to half its width: `piston.nml`, but slowly ---
+
+SLOW, PRESSED_DISKS = 0.0125, 500
+PRESSED = ensemble(
+    16,
+    box={"upper": (2, 1)},
+    side={"name": "right", "motion": "steady", "velocity": SLOW, "end": 80.0},
+    species={"name": "gas", "count": PRESSED_DISKS, "packing_fraction": 0.2, "temperature": 1.0,
+             "exact_temperature": 1.0},
+    stop={"time": 80},
+    output={"observables_every_time": 20},
+)  # fmt: skip
+#: The side starts at once: sound, and the flow, have up to m u^2 / kT of the energy.
+SOUND = Tolerance("4 sigma + m u² / kT", lambda _, error: 4 * error + SLOW**2)
+
+
+def heated(run: Run) -> np.ndarray:
+    """The logarithm of T over its start at four places."""
+    kt = run.observable("all/temperature").value
+    return np.log(kt[1:] / kt[0])
+
+
+def pressed() -> np.ndarray:
+    """What it is on the adiabat; without layers at the walls 1.413 at the end, not 1.462."""
+    radius, widths = sqrt(0.4 / PRESSED_DISKS / pi), np.array([2, 1.75, 1.5, 1.25, 1])
+    return np.log(adiabat(widths, 1.0, PRESSED_DISKS, radius, walled=True))[1:]
+
+
 # --- Maxwell's demon: two chambers, a sawtooth floor, a hole above it ---
 
 GRAINS, DIAMETER, WIDTH, HOLE, XI = 120, 0.5, 19.5, 8.0, 0.9
@@ -136,6 +165,10 @@ CASES = [
     Case(
         "P15-12", "slow piston on a dilute gas: T x area over its start at three places",
         PISTON, over(adiabats), 1, sigmas(4, 0.02), "D",
+    ),
+    Case(
+        "P15-14", "slow steady side on a dense gas, packing 0.2 to 0.4: ln of T over its start",
+        PRESSED, over(heated), pressed(), SOUND, "Kolafa 2006, D",
     ),
     *[
         Case(
