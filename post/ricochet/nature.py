@@ -170,4 +170,4 @@ def allow(run, law: str, *traits: str) -> None:
     """Refuse a run that has any trait but these; `law` says in words what is not for it."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:
-            raise Refused(f"{run.path}: {reason}; {law}")
+            raise Refused(f"{getattr(run, 'path', 'the simulation')}: {reason}; {law}")

@@ -81,6 +81,7 @@ OPTIONS = {
     "count": (positive, "N", "at most this many of the frames, evenly spread"),
     "skip": (not_negative, "X", "leave out the first X collisions per disk [until nothing drifts]"),
     "apart": (float, "X", "take frames at least X collisions per disk apart"),
+    "wave": (not_negative, "K", "wave number of F_s(k, t), times the mean diameter"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
     "colour": (str, "WHAT", f"species, {', '.join(LABELS)} [species; speed if there is one]"),
 }

@@ -3,11 +3,14 @@
 A handful of lines of scipy each, and no library: those know periodic boxes, but not walls.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 
 from .nature import TRAITS, allow
 from .reader import Run
+from .statistics import Curve, estimate, series_mean
 
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
@@ -18,28 +21,43 @@ def refuse_shear(run: Run) -> None:
     allow(run, "structure is found in boxes at rest", *TRAITS.keys() - {"sheared"})
 
 
-def pair_correlation(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them."""
+def pair_correlation(
+    run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
+) -> np.ndarray:
+    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them.
+
+    Of a `pair` of species: of disks of the second about those of the first.
+    """
     refuse_shear(run)
     r = edges * 2 * run.radius.mean()
     size = np.where(run.periodic, run.edges, 0.0)
+    one, *others = masks(run, pair)
+    other = others[0] if others else one
     sums = np.zeros(len(edges) - 1)
     centres = 0
     for k in frames:
         x = run.position[k] - run.lower
         margin = np.where(run.periodic, -np.inf, r[-1])
-        inner = np.all((x > margin) & (x < run.edges - margin), axis=1)
-        tree, part = (scipy.spatial.cKDTree(p, boxsize=size) for p in (x, x[inner]))
+        inner = one & np.all((x > margin) & (x < run.edges - margin), axis=1)
+        tree, part = (scipy.spatial.cKDTree(x[some], boxsize=size) for some in (other, inner))
         sums += np.diff(part.count_neighbors(tree, r))
         centres += inner.sum()
-    density = (run.count - 1) / np.prod(run.edges)
+    density = (other.sum() - (not others)) / np.prod(run.edges)
     return sums / np.maximum(centres, 1) / (density * np.pi * np.diff(r**2))
 
 
-def structure_factor(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarray:
+def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
+    """(N,) which disks are of one and of the other species, once if it is the same; or all."""
+    return [run.of_species(name) for name in dict.fromkeys(pair)] if pair else [run.species > 0]
+
+
+def structure_factor(
+    run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
+) -> np.ndarray:
     """S(k) = <|sum of exp(ikx)|^2> / N in bins, `edges` of k in 1 / mean diameters; NaN without k.
 
-    Periodic boxes.  Of many disks only every so many wave vector along x and y is taken.
+    Of a `pair` of species: the product of their two sums, over the root of their numbers.  Periodic
+    boxes.  Of many disks only every so many wave vector along x and y is taken.
     """
     refuse_shear(run)
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
@@ -49,15 +67,47 @@ def structure_factor(run: Run, frames: list[int], edges: np.ndarray) -> np.ndarr
     along_y = step * np.arange(-(most[1] // step), most[1] // step + 1)
     k = np.hypot(*np.meshgrid(along_x * unit[0], along_y * unit[1], indexing="ij"))
     k *= 2 * run.radius.mean()
+    both = masks(run, pair)
     sums = np.zeros(k.shape)
     for frame in frames:
         x, y = (run.position[frame] * unit).T
-        sums += np.abs(np.exp(1j * np.outer(along_x, x)) @ np.exp(1j * np.outer(y, along_y))) ** 2
+        waves = [
+            np.exp(1j * np.outer(along_x, x[some])) @ np.exp(1j * np.outer(y[some], along_y))
+            for some in both
+        ]
+        sums += (waves[0] * waves[-1].conj()).real
+    sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(frames)
     sums[k == 0] = np.nan
     known = np.isfinite(sums)
-    total, _ = np.histogram(k[known], edges, weights=sums[known] / (run.count * len(frames)))
+    total, _ = np.histogram(k[known], edges, weights=sums[known])
     number, _ = np.histogram(k[known], edges)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def evenly(run: Run, frames: slice = slice(None), most: int = 50) -> list[int]:
+    """At most so many of the frames [all], those next to even steps of time."""
+    which = np.arange(run.frames)[frames]
+    time = run.time[which]
+    at = np.interp(np.linspace(time[0], time[-1], most), time, np.arange(len(time)))
+    return which[np.unique(at.round().astype(int))].tolist()
+
+
+def averaged(
+    of: Callable, runs: list[Run], frames: list[list[int]], edges: np.ndarray, *more: object
+) -> Curve:
+    """The means of of(run, frames, edges, *more), and their errors, in the bins that have any.
+
+    Errors are over the runs, or over the frames of a single one, which remember each other.
+    """
+    middle, alone = (edges[1:] + edges[:-1]) / 2, len(runs) == 1
+    parts = [(runs[0], [k]) for k in frames[0]] if alone else zip(runs, frames, strict=True)
+    values = np.array([of(run, part, edges, *more) for run, part in parts])
+    known = np.isfinite(values).all(axis=0)
+    columns = values[:, known]
+    if not alone:
+        return Curve(middle[known], *estimate(columns))
+    each = [series_mean(one)[:2] for one in columns.T]
+    return Curve(middle[known], *np.reshape(each, (-1, 2)).T)
 
 
 def largest_cluster(run: Run, frame: int, gap: float) -> int:

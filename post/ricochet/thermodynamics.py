@@ -18,6 +18,7 @@ from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
+ALONG_WALLS = {"thermal", "rough", "turning", "lossy"}  # walls may change what is along them
 MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
 #: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
 FLUID = ("walled", "thermal", "bathed", "rough", "turning", "mixture")
@@ -121,13 +122,22 @@ def later(run: Run, skip: float | None = None) -> slice:
 # --- temperature ---
 
 
+def unmoved(source: Run) -> np.ndarray:
+    """(2,) along which axes nothing changes the total momentum, of a run or a simulation.
+
+    But for walls along the axis, and these only with `ALONG_WALLS`.
+    """
+    box, drive = source.parameters.get("box", {}), source.parameters.get("drive", {})
+    kicked = source.nature & KICKED and not drive.get("keep_momentum", False)
+    if kicked or source.nature & {"obstructed", "sheared", "changed"}:
+        return np.zeros(2, dtype=bool)
+    return (np.array(box["boundary"]) == "periodic") & (np.array(box.get("gravity", 0.0)) == 0)
+
+
 def conserved(run: Run) -> np.ndarray:
     """(2,) along which axes nothing ever changes the total momentum."""
-    kicked = run.nature & KICKED and not run.parameter("drive", "keep_momentum", False)
-    if kicked or run.nature & {"obstructed", "sheared", "changed"}:
-        return np.zeros(2, dtype=bool)
-    kept = run.periodic & (run.gravity == 0)
-    if run.nature & {"thermal", "rough", "turning", "lossy"}:  # walls may change what is along
+    kept = unmoved(run)
+    if run.nature & ALONG_WALLS:
         carried = run.mass[:, None] * run.velocity[[0, -1]]
         kept &= np.abs(np.ptp(carried.sum(axis=1), axis=0)) < ROUNDING * np.abs(carried).sum()
     return kept

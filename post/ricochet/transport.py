@@ -2,7 +2,7 @@
 
 Diffusion: lags are numbers of frames, which must be equally far apart; `frames` are those in
 equilibrium.  The integral of <v(0) v(t)> needs no sum over frames: that of v is the way x(t) -
-x(0), which the run knows exactly, however far apart its frames are.
+x(0), which the run knows exactly, however far apart its frames are (`correlations`).
 
 Viscosities and conductivity by Einstein and Helfand: a Helfand moment is what momentum or energy
 has been carried, times the way: disks carry m v_a v_b and (m v^2 / 2) v while they fly, and a
@@ -19,6 +19,7 @@ import numpy as np
 
 from . import hard_disks
 from . import thermodynamics as td
+from .correlations import Correlator
 from .nature import allow
 from .reader import Run, RunError
 from .statistics import Curve, SeriesMean, estimate, series_mean
@@ -43,12 +44,6 @@ def lags(frames: int, per_decade: int = 12) -> np.ndarray:
     return np.unique(np.geomspace(1, last, count).round().astype(int))
 
 
-def velocity_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
-    """Normalised velocity autocorrelation at lags in frames."""
-    v = run.velocity[frames]
-    return np.array([np.mean(v[k:] * v[: len(v) - k]) for k in at]) / np.mean(v**2)
-
-
 def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
     """(T, N, 2) positions, continuous in time, and velocities.
 
@@ -59,18 +54,6 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
         values - kept * np.average(values, axis=1, weights=run.mass, keepdims=True)
         for values in (run.unwrapped(frames), run.velocity[frames])
     )
-
-
-def displacement(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
-    """Mean square displacement at lags in frames."""
-    x, _ = motion(run, frames)
-    return np.array([2 * np.mean((x[k:] - x[: len(x) - k]) ** 2) for k in at])
-
-
-def integrated_memory(run: Run, frames: slice, at: np.ndarray) -> np.ndarray:
-    """D(t) at lags in frames: half the integral of <v(0) v(s)> from 0 to t."""
-    x, v = motion(run, frames)
-    return np.array([np.mean(v[: len(v) - k] * (x[k:] - x[: len(x) - k])) for k in at])
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
@@ -229,7 +212,11 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
     units = [1 / enskog_of(run)["D"] for run in runs]
     members = [diffusion(*one, lag)[1].scaled(unit) for one, unit in zip(pairs, units, strict=True)]
-    slopes = [integrated_memory(*one, at) * unit for one, unit in zip(pairs, units, strict=True)]
+    slopes = []
+    for (run, own), unit in zip(pairs, units, strict=True):
+        time = run.time[own]
+        known = Correlator(run, time, lags=at * (time[1] - time[0])).follow(run)
+        slopes.append(known.means("diffusion") * unit)
     step = np.mean([(run.time[1] - run.time[0]) / td.mean_free_time(run) for run in runs])
     return Found(members, Curve(at * step, *estimate(slopes)), lag * step)
 

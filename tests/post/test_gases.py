@@ -315,7 +315,9 @@ def test_diffusion_of_a_gas_is_found_twice_and_near_that_of_enskog(bulk, tmp_pat
     for name in ("vacf", "msd", "a2", "g", "S", "D_velocities(t)", "D_displacement(t)"):
         assert np.all(twice.curves[name].error == 0), name
     alone = correlations.analysed([run], None)
-    assert np.isnan(alone.curves["vacf"].error).all()
+    lag, _, error = alone.curves["vacf"]
+    known = lag < 0.1 * lag[-1]
+    assert np.all(error[known] > 0) and np.isnan(error[-1]), "up to an eighth of the run"
 
 
 def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
@@ -338,7 +340,7 @@ def test_rates_of_a_gas_agree_with_each_other(bulk, tmp_path):
 def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp_path, capsys):
     """And no diffusion, no pressure, no equation of state."""
     rows = drawn(tmp_path, "correlations", bulk[2])
-    assert "no equilibrium: no memory" in capsys.readouterr().err
+    assert "no steady state without flow: no memory" in capsys.readouterr().err
     assert {row["what"] for row in rows} == {"psi6_local", "psi6_global", "a2", "g", "g6", "S"}
     run = read_run(bulk[2])
     assert run.collisions_per_disk_at(run.time[td.later(run).start]) > 14
@@ -659,8 +661,8 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
         (SOFT, {"rough": "depends on the speed", "melting": "not elastic"}),
         (SOFT | MIXED, {"haff": "is a mixture of soft disks"}),
         (
-            {"seed": 2, "cadence": "frames_every_time = 0.05 frames_at = 0.07"},
-            {"correlations": "_time alone"},
+            {"seed": 2, "cadence": "frames_every_collisions = 64"},
+            {"correlations": "set output.frames_every_time"},
         ),
         (ROUND | MIXED, {"mixture": "keeps its angular momentum"}),
         (APART, {"mixture": "have not met"}),

@@ -1,13 +1,18 @@
 """How disks are arranged and how they move: made runs against closed formulas."""
 
+import pickle
+
 import numpy as np
 import pytest
+import scipy
 
 import correlations
 import snapshot
-from ricochet import structure, transport
+from ricochet import Simulation, statistics, structure, transport
+from ricochet import correlations as pairs
 from ricochet import hard_disks as hd
 from ricochet.drawing import values_of
+from ricochet.nature import Refused
 from ricochet.structure import largest_cluster
 from synthetic_run import run_script, written
 
@@ -41,6 +46,27 @@ def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, 
     edges = first + np.array([-0.3, -0.01, 0.01])
     between, peak = structure.structure_factor(lattice, [0], edges)
     assert between == pytest.approx(0, abs=1e-9) and peak == pytest.approx(len(x))
+
+
+def test_partial_structures_are_those_of_each_pair_of_species_and_add_up(tmp_path, rng):
+    x = rng.uniform(size=(60, 500, 2))
+    mixed = {"species": np.arange(500) % 3 // 2 + 1, "names": ("a", "b"), "periodic": PERIODIC}
+    run, frames = written(tmp_path / "run.h5", x, x, **mixed), list(range(60))
+    share = np.array([run.of_species(name).mean() for name in run.names])
+    couples = [(one, other) for one in run.names for other in run.names]
+    for of, edges in (
+        (structure.pair_correlation, np.array([1.0, 3.0, 6.0])),
+        (structure.structure_factor, np.array([0.5, 1])),
+    ):
+        part = np.array([of(run, frames, edges, pair) for pair in couples]).reshape(2, 2, -1)
+        ideal = 1.0 if of is structure.pair_correlation else np.eye(2)[..., None]
+        np.testing.assert_allclose(part - ideal, 0, atol=0.1)
+        weight = np.sqrt(np.outer(share, share))[..., None]
+        if of is structure.pair_correlation:  # N N' - N pairs, where N (N' - 1) were counted
+            counts = 500 * share
+            weight = np.outer(counts, counts) - np.diag(counts)
+            weight = weight[..., None] / (500 * 499)
+        np.testing.assert_allclose(np.sum(weight * part, axis=(0, 1)), of(run, frames, edges))
 
 
 def test_the_structure_of_one_run_knows_that_its_frames_remember(tmp_path, rng):
@@ -132,13 +158,159 @@ def test_memory_and_diffusion_are_right_however_far_apart_frames_are(tmp_path, r
     for found in transport.diffusion(run, slice(None), lag):
         assert found.mean == pytest.approx(expected * (1 - 1 / count), abs=4 * found.error)
         assert found.error < 0.006
-    at = np.array([1, 2, 4])
-    in_time = transport.integrated_memory(run, slice(None), at)
-    np.testing.assert_allclose(in_time, 1 - np.exp(-step * at), atol=0.015)
-    memory = transport.velocity_memory(run, slice(1200), at)
-    np.testing.assert_allclose(memory, np.exp(-step * at), atol=0.015)
-    far = 4 * (step * at - 1 + np.exp(-step * at))
-    np.testing.assert_allclose(transport.displacement(run, slice(1200), at), far, rtol=0.015)
+    at = step * np.array([0, 1, 2, 4])
+    found = pairs.curves([pairs.Correlator(run, run.time, lags=at).follow(run)])["all"]
+    np.testing.assert_allclose(found["diffusion"].y, 1 - np.exp(-at), atol=0.015)
+    np.testing.assert_allclose(found["vacf"].y / found["vacf"].y[0], np.exp(-at), atol=0.015)
+    far = 4 * (at - 1 + np.exp(-at))
+    np.testing.assert_allclose(found["msd"].y, far, rtol=0.015)
+
+
+DECADES = np.append(0, np.geomspace(1e-3, 1e3, 61))
+TIMES = {
+    "equal steps": 0.1 * np.arange(400),
+    "decades": DECADES,
+    "both": np.unique(np.append(DECADES[:30], np.arange(1, 200.0))),
+    "bursts": pairs.bursts(0.01, 100, 30, 400),
+}
+
+
+@pytest.mark.parametrize("times", TIMES.values(), ids=TIMES)
+def test_each_lag_is_exact_whenever_frames_are(tmp_path, rng, times):
+    """Disks of two species that fly freely across the sides."""
+    species, reach, wave = np.arange(300) % 2 + 1, 0.7, 3.0
+    v = rng.normal(size=(300, 2)) * np.sqrt(species)[:, None]
+    v -= v.mean(axis=0)
+    x = 0.3 + times[:, None, None] * v + 0.4 * times[:, None, None]  # the drift does not count
+    image, still = np.floor(x).astype(int), np.zeros_like(x) + v
+    parts = {"image": image, "time": times, "periodic": PERIODIC}
+    run = written(tmp_path / "a.h5", x - image, still, species=species, names=("a", "b"), **parts)
+    known = pairs.Correlator(run, times, [wave], reach).follow(run)
+    lags, speed = known.lags, np.linalg.norm(v, axis=1)
+    assert np.all(known.pairs.sum(axis=1) > 0) and lags[-1] > times[-1] / 2
+    assert np.max(np.diff(np.log10(lags[2:]))) < 0.5
+    assert len(known.held) == 0 and known.lags[0] == 0
+    for name, curves in pairs.curves([known]).items():
+        own = speed[species == "ab".index(name) + 1] if name != "all" else speed
+        square = np.mean(own**2)
+        way = np.outer(lags, own)
+        law = {
+            "msd": square * lags**2,
+            "vacf": np.full(len(lags), square),
+            "diffusion": square * lags / 2,
+            "alpha2": np.full(len(lags) - 1, np.mean(own**4) / (2 * square**2) - 1),
+            "overlap": np.mean(way < reach, axis=1),
+            "F_s(3)": np.mean(scipy.special.j0(wave * way), axis=1),
+        }
+        for what, expected in law.items():
+            found = curves[what].y[-len(expected) :]
+            np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8, err_msg=what)
+
+
+def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng):
+    """And finds all lags of very many times by trying some of them."""
+    x = rng.uniform(size=(4000, 3, 2))
+    run = written(tmp_path / "run.h5", x, x, time=np.arange(4000.0))
+    known, most = pairs.Correlator(run, run.time), 0
+    for place, velocity in zip(x, x, strict=True):
+        known.add(place, velocity)
+        most = max(most, len(known.held))
+    assert most < 400 and known.lags[-1] > 3000
+    np.testing.assert_array_equal(known.pairs.sum(axis=1)[:4], 4000 - known.lags[:4])
+    lags = pairs.lags_of(0.5 * np.arange(10.0**5))
+    assert lags[1] == 0.5 and np.allclose(2 * lags % 1, 0) and len(lags) > 40
+
+
+MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
+&species name = 'a' count = 150 packing_fraction = {packing} temperature = 2 mass = 3 /
+&species name = 'b' count = 150 packing_fraction = {packing} temperature = 2 /
+&stop time = {until} / &output frames_every_time = 0.02 frames_from = 0.001 frames_per_decade = 5 /
+"""
+
+
+def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path):
+    """To the last bit: in one go, of a file that grows, and through stop and resume."""
+    texts = [MIXED.format(seed=1, packing=0.2, until=until) for until in (0.5, 1.01)]
+    short, run = (simulated(text, name=f"{k}") for k, text in enumerate(texts))
+    times = run.time[:-1]
+    whole = pairs.Correlator(run, times, [30.0]).follow(run)
+    grown = pairs.Correlator(short, times, [30.0]).follow(short)
+    assert 20 < grown.done < len(times)
+    with Simulation(texts[1]) as gas:
+        flown = pairs.Correlator(gas, times, [30.0])
+        for time in times[:20]:
+            flown.add(*next(pairs.samples(gas, [time])))
+        state, kept = gas.save(tmp_path / "gas.h5"), pickle.dumps(flown)
+    with Simulation.load(state) as gas:
+        resumed = pickle.loads(kept).follow(gas)
+    for other in (grown.follow(run), resumed):
+        assert other.done == len(times)
+        np.testing.assert_array_equal(other.sums, whole.sums)
+        np.testing.assert_array_equal(other.pairs, whole.pairs)
+
+
+def test_disks_that_differ_by_their_mass_alone_have_the_structure_of_equal_ones(simulated):
+    """At contact g is that of the pressure, S of small k the compressibility: 1 / (eta Z)'."""
+    run = simulated(MIXED.format(seed=1, packing=0.1, until=10))
+    eta, near, far = 0.2, np.array([1, 1.02]), np.array([0.01, 0.5])
+    frames = [structure.evenly(run, most=200)]
+    chi = hd.contact_value(hd.simulated(eta), eta)
+    total = 2e-3 / np.diff([x * hd.simulated(x) for x in (eta - 1e-3, eta + 1e-3)])[0]
+    for pair in (None, ("a", "a"), ("a", "b"), ("b", "b")):
+        g, s = (
+            structure.averaged(of, [run], frames, edges, pair)
+            for of, edges in ((structure.pair_correlation, near), (structure.structure_factor, far))
+        )
+        assert g.y[0] == pytest.approx(chi, abs=4 * g.error[0]) and g.error[0] < 0.12 * chi
+        own = 0.0 if pair == ("a", "b") else 1.0
+        law = total if pair is None else own + (total - 1) / 2
+        assert s.y[0] == pytest.approx(law, abs=4 * s.error[0]) and s.error[0] < 0.1
+
+
+def test_a_dilute_mixture_flies_as_maxwells_law_has_it(simulated):
+    """F_s = exp(-k^2 kT t^2 / 2 m), <r^2> = 2 kT t^2 / m: eight seeds, within four errors."""
+    runs = [
+        simulated(MIXED.format(seed=seed, packing=1e-5, until=0.1), name=f"{seed}")
+        for seed in range(8)
+    ]
+    found = pairs.measured(runs, waves=[20.0], skip=0)
+    for name, mass in (("a", 3.0), ("b", 1.0)):
+        lag, *f_s = (part[1:] for part in found[name]["F_s(20)"])
+        msd, laws = found[name]["msd"], (np.exp(-400 * lag**2 / mass), 4 * lag**2 / mass)
+        for (mean, error), law in ((f_s, laws[0]), ((msd.y[1:], msd.error[1:]), laws[1])):
+            assert np.all(np.abs(mean - law) < 4 * error)
+            assert np.all(error < 0.03 * np.maximum(law, law.max()))
+
+
+def test_errors_of_one_run_hold_the_truth_as_often_as_they_say(tmp_path, rng):
+    """At lags below an eighth of it; longer ones have none."""
+    time, held, lag = 0.5 * np.arange(400), [], np.array([0.5, 4.0, 20.0, 50.0])
+    for k in range(50):
+        x, v = flights(rng, 8, time)
+        run = written(tmp_path / f"{k}.h5", x, v, time=time)
+        msd = pairs.curves([pairs.Correlator(run, time, lags=lag).follow(run)])["all"]["msd"]
+        truth = 4 * (lag - 1 + np.exp(-lag))
+        assert np.isnan(msd.error[-1])
+        held.append(np.abs(msd.y - truth)[:-1] < msd.error[:-1])
+    share = np.mean(held, axis=0)
+    np.testing.assert_allclose(share, 2 * statistics.ONE_SIGMA - 1, atol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("unusual", "said"),
+    [
+        ("&contact restitution = 0.9 /", "is not elastic"),
+        ("&box boundary = 'periodic', 'periodic' shear_rate = 1 /", "is sheared"),
+        (
+            "&box boundary = 'periodic', 'wall' / &side name = 'top' temperature = 1 speed = 1 /",
+            "slide",
+        ),
+    ],
+)
+def test_what_has_no_steady_state_or_flows_has_no_memory(unusual, said):
+    species = "&species count = 9 radius = 0.01 temperature = 1 / "
+    with Simulation(species + unusual) as gas, pytest.raises(Refused, match=said):
+        pairs.Correlator(gas, [0, 1])
 
 
 # --- formulas ---

@@ -7,8 +7,8 @@ import numpy as np
 
 from ricochet import Run
 from ricochet import hard_disks as hd
+from ricochet.correlations import Correlator, curves
 from ricochet.thermodynamics import later
-from ricochet.transport import velocity_memory
 
 from .case import Case, Member, within
 from .estimators import over
@@ -39,24 +39,28 @@ def mean_free_time(run: Run) -> float:
     return run.count * run.time[-1] / (2 * run.observable("collisions").value[-1])
 
 
+def found(run: Run, free_times: np.ndarray) -> dict:
+    """The curves of a run without its start, at these lags."""
+    time, unit = run.time[later(run)], mean_free_time(run)
+    step = time[1] - time[0]
+    lags = step * np.round(free_times * unit / step)
+    return curves([Correlator(run, time, lags=lags).follow(run)])["all"]
+
+
 def half_and_one(run: Run) -> list[float]:
     """The psi at w t = 1/2 and 1, interpolated between frames."""
-    lags = np.arange(1, 6)
-    t = lags * (run.time[1] - run.time[0]) / mean_free_time(run)
-    psi = velocity_memory(run, later(run), lags)
-    return list(np.exp(np.interp((0.5, 1.0), t, np.log(psi))))
+    t, vacf, _ = found(run, np.arange(6) / 4)["vacf"]
+    psi = vacf[1:] / vacf[0]
+    return list(np.exp(np.interp((0.5, 1.0), t[1:] / mean_free_time(run), np.log(psi))))
 
 
 def enskog_ratio(run: Run) -> float:
     """Slope of <dx^2> / 4 between w t = 8 and 28, over the Enskog value."""
-    unwrapped = run.unwrapped(slice(None))
-    unwrapped -= unwrapped.mean(axis=1, keepdims=True)
-    low, high = (np.mean((unwrapped[k:] - unwrapped[:-k]) ** 2) * 2 for k in (8, 28))
-    step = run.time[1] - run.time[0]
+    t, msd, _ = found(run, np.array([8, 28]))["msd"]
     kt = np.sum(run.kinetic_energy(0)) / (run.count - 1)
     eta = 0.05
     expected = hd.enskog(float(hd.simulated(eta)), eta, 2 * run.radius[0], kt)["D"]
-    return (high - low) / (4 * 20 * step) / expected
+    return (msd[1] - msd[0]) / (4 * (t[1] - t[0])) / expected
 
 
 CASES = [

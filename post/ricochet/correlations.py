@@ -1,0 +1,253 @@
+"""What disks remember of where they were and how fast: means over pairs of moments (t0, t).
+
+    from ricochet import correlations, read_run
+    found = correlations.measured([read_run("runs/glass.h5")], waves=[5.2], skip=0)
+    found["small"]["msd"]                # a Curve: lags x, means y, errors
+
+By species, and of "all" disks, against the lag t - t0; r is the way of a disk from t0 to t:
+
+    msd        <r^2>
+    vacf       <v(t0) v(t)>, at the lag 0 the mean square speed
+    diffusion  <v(t0) r> / 2, half the integral of vacf; not where kicks change velocities meanwhile
+    alpha2     <r^4> / (2 <r^2>^2) - 1: 0 where r is normal (non-Gaussian parameter)
+    overlap    share of the disks with r < `reach` [0.3 mean diameters]
+    F_s(k)     <J0(k r)>, the mean of exp(i k r) over all directions, for each k of `waves`
+
+Ways are relative to the centre of mass along axes where nothing changes its motion.
+
+Pairs: in each twelfth of a power of ten that lag counts which most pairs of samples have, of equals
+the first; so frames at equal steps, in decades, in bursts, or a mixture of these each give what
+they can. Of each sixteenth of a lag the first sample that has a partner is its origin: as many as
+make a difference.  That is the multiple-tau correlator of Ramirez et al., J. Chem. Phys. 133,
+154103 (2010), without its means over neighbouring samples, so that each lag is exact.
+
+Errors are those over the runs; of a single run over sixteenths of its time, for lags up to an
+eighth of it, and none (NaN) for longer ones.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Self
+
+import numpy as np
+import scipy
+
+from .nature import KICKED, TRAITS, allow
+from .reader import Run, RunError
+from .simulation import Simulation
+from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
+from .thermodynamics import ALONG_WALLS, later, unmoved
+
+PER_DECADE = 12
+ORIGINS = 16  # in a lag
+BLOCKS = 16  # of the time, for errors
+REACH = 0.3  # mean diameters
+CLOSE = 1e-9  # of a lag: times that differ by less are one
+MOST_PAIRS = 2 * 10**6  # whose lags are looked at
+CHUNK = 10**6  # disks in the frames that are read together
+FLOWING = {"sheared", "sliding", "changed"}
+FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
+
+
+def lags_of(times: np.ndarray) -> np.ndarray:
+    """(L,) lags that samples at these times (T,) have, and 0; of very many times some are tried."""
+    origins = np.arange(len(times))
+    most = max(16, MOST_PAIRS // len(times))
+    if len(times) > most:
+        origins = np.sort(np.random.default_rng(1).choice(origins, most, replace=False))
+    apart = np.concatenate([times[k + 1 :] - times[k] for k in origins])
+    if len(apart) == 0:
+        raise ValueError("lags take two times and more")
+    _, first, pairs = np.unique(np.round(np.log(apart) / CLOSE), True, return_counts=True)
+    part = np.floor(PER_DECADE * np.log10(apart[first] / apart.min()) + CLOSE)
+    order = np.lexsort((first, -pairs, part))
+    _, best = np.unique(part[order], return_index=True)
+    return np.append(0, apart[first[order[best]]])
+
+
+def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
+    """Times for samples: from 0 on, each `apart` from the other, in decades `first` to `last`.
+
+    Ten in each power of ten, none later than `until`: samples for all lags between, with many
+    origins, where equal steps would be too many.
+    """
+    steps = np.geomspace(first, last, 1 + round(10 * np.log10(last / first)))
+    starts = np.arange(0, until - last * (1 - CLOSE), apart)
+    times = np.sort(np.add.outer(starts, np.append(0, steps)), axis=None)
+    return times[np.append(True, np.diff(times) > CLOSE * first)]
+
+
+class Correlator:
+    """Sums over pairs of samples of a run or a simulation, which come one after the other.
+
+    Its memory does not grow: it keeps the samples that are still to be met again, some 16 for each
+    lag.  `pickle` keeps all of it, so that what is stopped goes on exactly.
+    """
+
+    def __init__(
+        self,
+        source: Run | Simulation,
+        times: Sequence[float],
+        waves: Iterable[float] = (),
+        reach: float | None = None,
+        lags: np.ndarray | None = None,
+    ):
+        """For samples at these times, wave numbers [1/length] and lags [of the times]."""
+        cools = {"lossy"} if source.nature.cooling else set()
+        what = "ways and memory are those of a steady state without flow"
+        allow(source, what, *TRAITS.keys() - FLOWING - cools)
+        self.times, self.waves = np.asarray(times, dtype=float), tuple(waves)
+        self.lags = lags_of(self.times) if lags is None else np.asarray(lags, dtype=float)
+        self.reach = REACH * 2 * float(source.radius.mean()) if reach is None else float(reach)
+        self.kicked = bool(source.nature & KICKED)
+        walls = "walled" in source.nature and source.nature & ALONG_WALLS
+        self.kept = unmoved(source) & (not walls)
+        self.mass, self.names = source.mass, ("all", *names_of(source))
+        species = np.arange(len(self.names))
+        self.shares = (species == 0) | (species == source.species[:, None])
+        self.shares = self.shares / self.shares.sum(axis=0)  # (N, 1 + S)
+        size = len(self.lags), BLOCKS
+        self.pairs = np.zeros(size)
+        self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
+        self.done = 0  # samples
+        self.held: dict[int, tuple] = {}  # by number: place, velocity, the last partner
+        self.due: dict[int, list] = {}  # by number: its (origin, lag)
+        self.last = np.full(len(self.lags), -1.0)  # where in the time of a lag its last origin was
+
+    def follow(self, source: Run | Simulation) -> Self:
+        """Take the samples that are to come: a simulation is advanced, a run may still grow."""
+        for place, velocity in samples(source, self.times[self.done :]):
+            self.add(place, velocity)
+        return self
+
+    def add(self, place: np.ndarray, velocity: np.ndarray) -> None:
+        """The next sample: places (N, 2), continuous in time, and velocities."""
+        place, velocity = (
+            values - self.kept * np.average(values, axis=0, weights=self.mass)
+            for values in (place, velocity)
+        )
+        now, time = self.done, self.times[self.done]
+        close = CLOSE * self.lags + 4 * np.spacing(self.times[-1]) * (self.lags > 0)
+        partner = np.searchsorted(self.times, time + self.lags - close)
+        there = np.append(self.times, np.inf)[partner] <= time + self.lags + close
+        since = (time - self.times[0]) * ORIGINS / np.where(self.lags > 0, self.lags, np.inf)
+        part = np.where(self.lags > 0, np.floor(since + 1e-6), now)
+        fresh = np.flatnonzero(there & (part > self.last))
+        self.last[fresh] = part[fresh]
+        for lag in fresh:
+            self.due.setdefault(int(partner[lag]), []).append((now, lag))
+        if len(fresh):
+            self.held[now] = place, velocity, partner[fresh].max()
+        if now in self.due:
+            self.count(*np.transpose(self.due.pop(now)), place, velocity)
+        self.held = {k: one for k, one in self.held.items() if one[2] > now}
+        self.done += 1
+
+    def count(self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray):
+        """Pairs of this sample with the origins (P,), at these lags."""
+        before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
+        way = place - before
+        square, half = np.einsum("pna,pna->pn", way, way), np.einsum("pna,pna->pn", v0, way) / 2
+        memory = np.einsum("pna,na->pn", v0, v)
+        values = [square, square**2, memory, half, square < self.reach**2]
+        values += [scipy.special.j0(k * np.sqrt(square)) for k in self.waves]
+        span = self.times[-1] - self.times[0]
+        share = (self.times[origins] - self.times[0]) / span
+        where = lags, np.minimum((BLOCKS * share).astype(int), BLOCKS - 1)
+        np.add.at(self.pairs, where, 1)
+        np.add.at(self.sums, where, np.moveaxis(np.array(values) @ self.shares, 0, 2))
+
+    def amounts(self, name: str, species: int) -> np.ndarray:
+        """(L, B) sums over the pairs that begin in a block; over their numbers they are means."""
+        names = (*FIXED, *(f"F_s({k:g})" for k in self.waves))
+        if name != "alpha2":
+            return self.sums[:, :, species, names.index(name)]
+        square, fourth = np.moveaxis(self.sums[:, :, species, :2], 2, 0)
+        number = np.maximum(self.pairs.sum(axis=1, keepdims=True), 1)
+        m2, m4 = (part.sum(axis=1, keepdims=True) / number for part in (square, fourth))
+        m2 = np.where(m2 > 0, m2, np.nan)  # to first order in what blocks have beside the mean:
+        return fourth / (2 * m2**2) - m4 / m2**3 * square + (m4 / m2**2 - 1) * self.pairs
+
+    def means(self, name: str, species: int = 0) -> np.ndarray:
+        """(L,) over all pairs; NaN where there are none."""
+        number = self.pairs.sum(axis=1)
+        return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
+
+
+def names_of(source: Run | Simulation) -> tuple[str, ...]:
+    """The names of the species."""
+    return source.names if isinstance(source, Run) else tuple(source.parameters["species"])
+
+
+def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:
+    """Places, continuous in time, and velocities at these times, as far as there are any."""
+    if isinstance(source, Simulation):
+        box = source.parameters["box"]
+        edges = np.subtract(box["upper"], box["lower"])
+        for time in times:
+            source.advance(time=time)
+            yield source.position + source.image * edges, source.velocity
+        return
+    frames = np.searchsorted(source.time, times * (1 - 1e-12))
+    frames = frames[frames < source.frames]
+    off = np.abs(source.time[frames] - times[: len(frames)]) > 1e-9 * np.abs(times[: len(frames)])
+    if off.any():
+        raise RunError(f"{source.path}: has no frame at t = {times[np.argmax(off)]:.9g}")
+    for some in np.array_split(frames, len(frames) * source.count // CHUNK + 1):
+        yield from zip(source.unwrapped(some), source.velocity[some], strict=True)
+
+
+def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.ndarray) -> Estimate:
+    """The mean at these lags (by number), with its error."""
+    means = [one.means(name, species)[lags] for one in members]
+    if len(means) > 1:
+        return estimate(means)
+    error, (one,) = np.full(len(lags), np.nan), members
+    amounts, span = one.amounts(name, species), one.times[-1] - one.times[0]
+    for k, lag in enumerate(lags):
+        some = one.pairs[lag] > 0
+        if one.lags[lag] * FEWEST <= span * (1 + CLOSE) and np.isfinite(means[0][k]):
+            error[k] = series_mean(amounts[lag, some], one.pairs[lag, some]).error
+    return Estimate(means[0], error)
+
+
+def curves(members: Sequence[Correlator]) -> dict[str, dict[str, Curve]]:
+    """By species and "all", then by name: of the correlators of runs that differ by their seed."""
+    first = members[0]
+    pairs = np.array([one.pairs.sum(axis=1) for one in members])
+    lags = np.flatnonzero(pairs.all(axis=0))
+    names = ["msd", "vacf", "alpha2", "overlap", *(f"F_s({k:g})" for k in first.waves)]
+    names += [] if first.kicked else ["diffusion"]
+    return {
+        species: {name: Curve(first.lags[lags], *mean_of(members, name, k, lags)) for name in names}
+        for k, species in enumerate(first.names)
+    }
+
+
+def correlators(
+    runs: Sequence[Run],
+    waves: Iterable[float] = (),
+    reach: float | None = None,
+    skip: float | None = None,
+) -> list[Correlator]:
+    """Of each run, in its steady state, at lags of the first.
+
+    `skip` collisions per disk are left out at the start [until nothing drifts], and the last frame,
+    which may be out of step.
+    """
+    times = [run.time[later(run, skip)] for run in runs]
+    lags, found = lags_of(times[0]), []
+    shared = lags > 0
+    for run, own in zip(runs, times, strict=True):
+        found.append(Correlator(run, own, waves, reach, lags).follow(run))
+        shared &= found[-1].pairs.any(axis=1)
+        if not shared.any():
+            raise RunError(
+                f"{run.path}: no two frames are as far apart as in the others, set "
+                "output.frames_every_time or frames_per_decade"
+            )
+    return found
+
+
+def measured(runs: Sequence[Run], **options) -> dict[str, dict[str, Curve]]:
+    """The curves of runs that differ by their seed; options as of `correlators`."""
+    return curves(correlators(runs, **options))
