@@ -4,8 +4,8 @@
     python post/lab.py my.nml          and one of your own
 
 Choose an input, move sliders, and the disks follow at once; speeds, energies and pressure stand
-beside them.  Runs can be kept side by side, and taken along: as input file, command line, script,
-and as a file that the program goes on from.  The page is at an address that is printed, until
+beside them.  Runs can be kept side by side, and taken along: as input file, script, and as a file
+that the program goes on from.  The page is at an address that is printed, until
 Ctrl-C; everything ends with it.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from player import INPUTS, chooser, lab_page, view
 from ricochet import RunError
-from ricochet.lab import Lab, form, path_of
+from ricochet.lab import Lab, form
 from ricochet.live import application, page_of, serving
 from ricochet.script import Parser, launch
 
@@ -29,19 +29,11 @@ WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
 from ricochet.worker import work
 work(scene)"""
-ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 
 
 def routes(lab: Lab) -> dict:
     """What answers at each address."""
-    inputs = chooser([*lab.inputs.values()])
-
-    async def page(_: web.Request) -> web.Response:
-        data = {"page": lab.new_page(), "table": lab.table, "inputs": inputs}
-        return web.Response(text=lab_page(data), content_type="text/html")
-
-    async def picture(request: web.Request) -> web.FileResponse:
-        return web.FileResponse(path_of(INPUTS / "pictures", request.match_info["name"]))
+    data = {"table": lab.table, "inputs": chooser([*lab.inputs.values()])}
 
     async def formed(request: web.Request) -> web.Response:
         path = lab.inputs.get(request.query_string)
@@ -49,21 +41,11 @@ def routes(lab: Lab) -> dict:
             raise RunError("no such input")
         return web.json_response(await asyncio.to_thread(form, path))
 
-    async def kept(request: web.Request) -> web.Response:
-        number, run, part = (request.match_info[name] for name in ("page", "run", "part"))
-        if part not in ENDINGS:
-            raise web.HTTPNotFound(text="no such file\n")
-        name, body = await lab.kept(number, run, part)
-        head = {"Content-Disposition": f'attachment; filename="{name}{ENDINGS[part]}"'}
-        return web.Response(body=body, content_type="application/octet-stream", headers=head)
-
     return {
-        "/": page,
+        "/": page_of(lab_page(data)),
         "/view": page_of(view()),
-        "/pictures/{name}": picture,
         "/form": formed,
         "/ws": lab.socket,
-        "/keep/{page}/{run}/{part}": kept,
     }
 
 

@@ -339,7 +339,7 @@ def paged(film: dict | None, words: dict[str, str]) -> str:
 def lab_page(data: dict) -> str:
     """The laboratory: `data` has the number of the page, the table of variables, the inputs."""
     style, script = text_of("style.css") + text_of("lab.css"), text_of("lab.js")
-    more = "connect-src 'self'", "img-src 'self'", "frame-src 'self'"
+    more = "connect-src 'self'", "img-src data:", "frame-src 'self'"
     fillings = {"policy": policy(style, script, *more), "style": style, "script": script}
     return filled("lab.html", fillings | {"data": enclosed(data)})
 
@@ -354,9 +354,15 @@ def chooser(paths: list[Path]) -> list[dict]:
             words = {"title": path.stem, "subject": "Your own", "sentence": ""}
             found.append({"name": path.stem, **words, "sliders": [], "picture": None})
         else:
-            found.append({"name": path.stem, **own, "picture": f"pictures/{path.stem}.png"})
+            found.append({"name": path.stem, **own, "picture": picture_of(path)})
     order = [*known]
     return sorted(found, key=lambda one: order.index(one["name"]) if one["picture"] else -1)
+
+
+def picture_of(path: Path) -> str:
+    """The picture of an input, as a page can hold it."""
+    drawn = (INPUTS / "pictures" / f"{path.stem}.png").read_bytes()
+    return f"data:image/png;base64,{base64.b64encode(drawn).decode()}"
 
 
 def filled(name: str, fillings: dict[str, str]) -> str:

@@ -3,11 +3,12 @@
 // ---------- the laboratory: a form, and runs in films, each of them with a worker of its own ----------
 
 const $ = id => document.getElementById(id);
-const lab = JSON.parse($('data').textContent);  // page: its number; table: group -> variable; inputs: what there is to choose
+const lab = JSON.parse($('data').textContent);  // table: group -> variable; inputs: what there is to choose
 const state = {
   input: null, groups: [],   // the input: name, title, sliders, ...; kind, place, given values of each group of its file
   settings: {}, added: [],   // what the form changes: variable -> text; groups that are not in the file: [kind, name]
   waiting: {},               // variables whose values cannot be: what is said about them
+  runs: 0,                   // so far
   boxes: [],                 // runs: { figure, frame, letter, words, run, shown }, the newest last; the others are kept
   paused: false,
 };
@@ -216,20 +217,22 @@ function newBox() {
 }
 
 // One start at a time; values that change meanwhile are the next one's.
-let busy = false, again = false, timer, latest = {};
+const PLACING = 2000;  // ms, after which placing the disks keeps no other wish waiting
+let busy = 0, again = false, timer, latest = {};
 function run() {
   clearTimeout(timer);
   latest = {};
-  const box = current() ?? newBox();
-  if (busy) { again = true; return; }
-  busy = true;
+  const box = current(), now = performance.now();
+  if (busy && now < busy + PLACING) { again = true; return; }
+  if (busy && isThere(box)) filmOf(box).leave();
+  busy = now;
   tell('starting …');
   state.paused = false;
-  const address = new URL(`ws?page=${lab.page}`, location.href.replace(/^http/, 'ws')), begin = () => {
+  const begin = () => {
     filmOf(box).theme(isDark());
     if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
     box.wished = { wish: wish(), words: changesInWords() };
-    filmOf(box).start(wish(), address);
+    filmOf(box).start({ ...wish(), run: ++state.runs });
   };
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
@@ -249,7 +252,7 @@ function hear(source, news) {
   const box = state.boxes.find(one => one.frame.contentWindow === source);
   if (!box) return;
   if (news.is === 'scene' && !news.changed) {
-    Object.assign(box, { run: news.run, command: news.command, words: box.wished.words, changes: [] });
+    Object.assign(box, { run: news.run, words: box.wished.words, changes: [] });
     ready();
     for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
     tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
@@ -262,12 +265,15 @@ function hear(source, news) {
     box.changes = news.changes;
     if (news.reason) tell(news.reason, true);
     tellShelf();
-  } else if (news.is === 'scan') addToScan(news);
-  else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
+  } else if (news.is === 'file') {
+    const href = URL.createObjectURL(new Blob([filmOf(box).bytes(news.body)]));
+    make('a', { href, download: news.name }).click();
+    URL.revokeObjectURL(href);
+  } else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
 }
 
 function ready() {
-  busy = false;
+  busy = 0;
   if (again) { again = false; run(); }
 }
 
@@ -303,9 +309,7 @@ const whatIs = ({ words: text, changes }) => text + (changes.length ? `, then ${
 
 function tellShelf() {
   $('shelf').replaceChildren(...state.boxes.filter(({ run: number }) => number).map(box => {
-    const base = `keep/${lab.page}/${box.run}/`, link = part => make('a', { textContent: part, href: base + part, download: '' });
-    const copy = make('button', { type: 'button', textContent: 'command', title: box.command });
-    copy.addEventListener('click', () => navigator.clipboard.writeText(box.command).then(() => tell('copied: ' + box.command), () => prompt('The command:', box.command)));
+    const file = part => make('button', { type: 'button', textContent: part, onclick: () => filmOf(box).send({ do: 'keep', part }) });
     const seen = make('input', { type: 'checkbox', checked: box.shown, ariaLabel: `run ${box.letter} is seen` });
     seen.addEventListener('change', () => {
       box.shown = seen.checked;
@@ -315,7 +319,7 @@ function tellShelf() {
     const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
     away.addEventListener('click', () => remove(box));
     const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
-    return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, link('input'), copy, ...(box.changes.length ? [link('script')] : []), link('output'), ...(own ? [] : [away])));
+    return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, ...['input', ...(box.changes.length ? ['script'] : []), 'output'].map(file), ...(own ? [] : [away])));
   }));
   const changes = current()?.changes ?? [];
   $('changes').replaceChildren(...changes.slice(-6).map(([time, name, value]) => make('li', { textContent: `t = ${short(time)}: ${name} = ${value}` })));
@@ -364,21 +368,24 @@ function paced(source) {
 
 // ---------- a scan: one variable, five values, one curve that grows ----------
 
-let scan;
+let scan, scanner;  // what is measured; where from
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, at, from, log } = spec, to = mostOf(spec), integer = variableOf(key).type === 'integer';
   const values = [0, 1, 2, 3, 4].map(k => log ? from * (to / from) ** (k / 4) : from + k / 4 * (to - from)).map(value => integer ? Math.round(value) : +value.toPrecision(3));
   const texts = values.map(value => at < 0 ? String(value) : split(valueOf(key)).map((one, k) => k === at ? value : one).join(','));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values };
   filmOf(current()).showScan(scan);
-  filmOf(current()).send({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value });
+  scanner?.close();
+  scanner = filmOf(current()).talk({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value }, addToScan);
   tell('scanning …');
 }
 
-function addToScan({ index, mean, error, text }) {
-  if (text) tell(text, true); else scan.points.push([scan.values[index], mean, error]);
+function addToScan({ is, index, mean, error, problems }) {
+  if (is === 'scan') scan.points.push([scan.values[index], mean, error]);
   filmOf(current()).showScan(scan);
-  if (scan.points.length === 5) tell('');
+  if (scan.points.length < scan.values.length && !problems) return;
+  tell(problems ? problems[0].text : '', !!problems);
+  scanner.close();
 }
 
 // ---------- what acts ----------

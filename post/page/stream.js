@@ -7,25 +7,32 @@ const stream = { socket: null, scene: null, live: true, fresh: 0, asked: false, 
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
+// A worker of its own for a wish; what it says.
+function talk(wish, heard) {
+  const socket = Object.assign(new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws'))), { binaryType: 'arraybuffer' });
+  socket.onopen = () => socket.send(JSON.stringify(wish));
+  socket.onmessage = ({ data }) => { if (typeof data === 'string') heard(JSON.parse(data)); else take(data); };
+  return socket;
+}
+
 // The run that the laboratory wishes, on the same line for all runs of this film.
-function start(wish, address) {
-  const same = stream.wish?.input === wish.input, begin = () => {
-    send({ do: 'start', ...wish, pace: same ? stream.sent : null, playing: !parent.isPaused() });
-    if (!same) stream.sent = 0;
-  };
-  stream.wish = wish;
+function start(run) {
+  const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
+  if (!same) stream.sent = 0;
+  stream.wish = run;
   document.documentElement.classList.add('starting');
-  if (stream.socket?.readyState < 2) { begin(); return; }
-  stream.socket = new WebSocket(address);
-  stream.socket.binaryType = 'arraybuffer';
-  stream.socket.onopen = begin;
-  stream.socket.onmessage = ({ data }) => {
-    if (typeof data !== 'string') { take(data); return; }
-    const news = JSON.parse(data);
+  if (stream.socket?.readyState === 1) { send(wish); return; }
+  stream.socket = talk(wish, news => {
     hear[news.is]?.(news);
     parent.hear?.(window, news);
-  };
+  });
   stream.socket.onclose = () => parent.hear?.(window, { is: 'gone' });  // none: the page goes as well
+}
+
+// The next run has another worker: this one finds no place for its disks, or not soon.
+function leave() {
+  stream.socket.onclose = null;
+  stream.socket.close();
 }
 
 const hear = {

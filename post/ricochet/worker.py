@@ -1,9 +1,9 @@
 """The process behind a page of the laboratory: one simulation, and frames of it as they are made.
 
 It is told what to do by lines of JSON on its input, and answers on its output: a letter, the length
-as four bytes, and a text in JSON (t), a frame (b), a file (f), or why there is no file (e).  Texts
-are named by `is`: starting, scene (what stays as it is in a picture), numbers, events (to come),
-state, problems, scan.  A page has two frames that it has not drawn (`got`) at most.
+as four bytes, and a text in JSON (t) or a frame (b).  Texts are named by `is`: scene (what stays
+as it is in a picture), numbers, events (to come), state, problems, file, scan.  A page has two
+frames that it has not drawn (`got`) at most.
 
 A frame has, in this order and in the byte order of the machine: time, collisions per disk and the
 places of the left, right, bottom and top side as 8-byte floats; then as 4-byte floats x and y of
@@ -49,6 +49,7 @@ FEWEST = 40  # samples of a mean with an error
 MOST = 4000  # samples that are kept
 LOOK = 1.0  # s that a value of a scan takes
 TURNS = "angular_velocity"
+ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # of a line that has not come to its end
 DEATH = 1  # prctl's PR_SET_PDEATHSIG
 
@@ -73,14 +74,13 @@ class Bench:
 
     def start(self, wish: dict) -> None:
         """Another simulation in the place of this one, if it can be."""
-        tell({"is": "starting"})
         pace = max(0.0, float(wish["pace"] or 0.0))
         try:
             other = Simulation._of(wish["text"], told(wish["settings"]))
             if other.count > DISKS:
                 raise ProgramError(f"{other.count} disks; here a run may have {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
-            tell({"is": "problems", "change": False, "problems": problems(str(problem))})
+            refuse(problem)
             return
         if self.simulation:
             self.simulation.close()
@@ -104,8 +104,8 @@ class Bench:
             "turning": TURNS in run.elements,
             "stepped": bool(run.time_step),
         }
-        scene = {"is": "scene", "changed": changed, "run": self.wish["run"]}
-        tell(scene | {"facts": facts, "blocks": letters, "command": self.wish["command"]})
+        scene = {"is": "scene", "changed": changed, "run": self.wish.get("run")}
+        tell(scene | {"facts": facts, "blocks": letters})
         self.show()
         self.speak()
         self.tell_state()
@@ -129,7 +129,7 @@ class Bench:
             self.simulation.advance(time=now)
             change()
         except (ProgramError, ValueError) as problem:
-            tell({"is": "problems", "change": True, "problems": problems(str(problem))})
+            refuse(problem, change=True)
             return
         self.actions.append((now, *action))
         self.renew(changed=True)
@@ -170,21 +170,21 @@ class Bench:
 
     def keep(self, wish: dict) -> None:
         """What the run was, as a file: `input`, `script` or `output`."""
-        if self.simulation is None or self.wish["run"] != wish["run"]:
-            send(b"e", b"this run is not there any more")
-            return
-        name = self.wish["input"]
+        name, part = self.wish["input"], wish["part"]
         try:
-            if wish["part"] == "output":
+            if part == "output":
                 body = self.saved(f"{name}.h5")
-            elif wish["part"] == "script":
+            elif part == "script":
                 body = script(name, self.initial, self.actions, self.simulation.time)
             else:
                 body = self.simulation.input if self.actions else self.initial
         except (OSError, ProgramError) as problem:
-            send(b"e", str(problem).encode())
+            refuse(problem)
             return
-        send(b"f", body if isinstance(body, bytes) else body.encode(errors="surrogateescape"))
+        if isinstance(body, str):
+            body = body.encode(errors="surrogateescape")
+        letters = base64.b64encode(body).decode()
+        tell({"is": "file", "name": name + ENDINGS[part], "body": letters})
 
     def saved(self, name: str) -> bytes:
         """The output file; a signal that ends this process waits until its folder is gone."""
@@ -372,13 +372,13 @@ def told(settings: dict[str, str]) -> list[str]:
     return lines
 
 
-def problems(message: str) -> list[dict]:
-    """The program's lines, each with the variable that it is about, as --set names it."""
+def refuse(problem: Exception, change: bool = False) -> None:
+    """Answer with the program's lines, each with the variable it is about, as --set names it."""
     found = []
-    for line in message.splitlines():
+    for line in str(problem).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
         found.append({"place": place, "text": line.split(": ", 2)[-1], "limit": None})
-    return found
+    tell({"is": "problems", "change": change, "problems": found})
 
 
 def value_of(text: str) -> object:
@@ -448,11 +448,11 @@ def wishes(wait: float | None) -> list[dict]:
 def scan(wish: dict) -> None:
     """Runs with one variable at some values, and what was measured in each."""
     for index, value in enumerate(wish["values"]):
-        lines = told(wish["settings"] | {wish["variable"]: value})
         try:
+            lines = told(wish["settings"] | {wish["variable"]: value})
             found = measured(wish["text"], lines, wish["of"])
         except (ProgramError, ValueError) as problem:
-            tell({"is": "scan", "index": index, "text": str(problem).splitlines()[0]})
+            refuse(problem)
             return
         tell({"is": "scan", "index": index, "mean": found[0], "error": found[1]})
 
@@ -485,19 +485,17 @@ def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:
         ctypes.CDLL(None).prctl(DEATH, signal.SIGTERM)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     bench = Bench(pictured)
-    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace, "keep": bench.keep}
-    runs = ("change", "heat", "play", "pause", "got", "step", "event")
+    does = {"start": bench.start, "scan": scan, "pace": bench.set_pace}
+    own = ("change", "heat", "play", "pause", "got", "step", "event", "keep")
+    does |= {name: getattr(bench, name) for name in own}
     while True:
         wait = None
         if bench.moves():
             wait = max(0.0, bench.due + INTERVAL - time.perf_counter())
         for wish in wishes(wait):
-            action = wish.get("do")
             try:
-                if action in does:
-                    does[action](wish)
-                elif action in runs and bench.simulation:
-                    getattr(bench, action)(wish)
+                if wish["do"] in ("start", "scan") or bench.simulation:
+                    does[wish["do"]](wish)
             except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as problem:
                 tell({"is": "state", "reason": f"not understood: {problem}"})
         if bench.moves() and time.perf_counter() >= bench.due + INTERVAL:
