@@ -406,7 +406,7 @@ def called(function, *arguments: object) -> bool:
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)
     if code > 1:
-        raise ProgramError(named(message.value.decode(errors="replace"), ""), code)
+        raise ProgramError(message.value.decode(errors="replace"), code)
     return code == 1
 
 
