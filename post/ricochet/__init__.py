@@ -8,7 +8,8 @@
 writes what they start from; `reader` opens files,
 `bridges` hands them to other programs; `nature` says what kind of run one is, and so which laws
 are for it; `statistics` finds means and errors, `theory` and `hard_disks` have the laws;
-`thermodynamics`, `transport`, `structure`, `fields`, `speeds`, `cooling` and `crater` measure;
+`thermodynamics`, `correlations`, `transport`, `structure`, `fields`, `speeds`, `cooling` and
+`crater` measure;
 `drawing` draws disks and walls, `film` moves them; `paths` knows where disks are between frames;
 `live` shows a run that goes on, `lab` starts the runs of its pages; `script` is what the
 command-line scripts share, `files` what opens files.

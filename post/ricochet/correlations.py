@@ -101,7 +101,8 @@ class Correlator:
         self.kicked = bool(source.nature & KICKED)
         walls = "walled" in source.nature and source.nature & ALONG_WALLS
         self.kept = unmoved(source) & (not walls)
-        self.mass, self.names = source.mass, ("all", *names_of(source))
+        names = source.names if isinstance(source, Run) else source.parameters["species"]
+        self.mass, self.names = source.mass, ("all", *names)
         species = np.arange(len(self.names))
         self.shares = (species == 0) | (species == source.species[:, None])
         self.shares = self.shares / self.shares.sum(axis=0)  # (N, 1 + S)
@@ -171,11 +172,6 @@ class Correlator:
         """(L,) over all pairs; NaN where there are none."""
         number = self.pairs.sum(axis=1)
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
-
-
-def names_of(source: Run | Simulation) -> tuple[str, ...]:
-    """The names of the species."""
-    return source.names if isinstance(source, Run) else tuple(source.parameters["species"])
 
 
 def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:

@@ -290,6 +290,30 @@ def test_the_code_that_the_page_on_output_shows_runs_the_program(program, tmp_pa
     ran(program, *again.split(), cwd=tmp_path, check=True)
 
 
+def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tmp_path):
+    """Of a tenth of the disks, in a box as dense, for a twentieth of the time."""
+    page = section("output", "## How disks move and are arranged")
+    blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
+    assert len(blocks) == 3
+    text = (ROOT / "input" / "glass.nml").read_text()
+    for old, new in (("38.603", "12.2075"), ("count = 500", "count = 50"), ("1001", "50.5")):
+        assert old in text
+        text = text.replace(old, new)
+    for folder in ("input", "runs", "build"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "input" / "glass.nml").write_text(text)
+    (tmp_path / "build" / "ricochet").symlink_to(program)
+    (tmp_path / "post").symlink_to(ROOT / "post")
+    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
+    shell = blocks[0].replace("python ", f"{sys.executable} ")
+    ran("bash", "-ec", shell, cwd=tmp_path, env=own, check=True)
+    assert "F_s_small,0.78" in (tmp_path / "runs" / "glass.csv").read_text()
+    code = "\n".join(blocks[1:]).replace("1000", "50").replace("100, apart", "10, apart")
+    code += "assert msd[0] == 0 and error[5] > 0 and g.y.max() > 3 and memory.done == len(times)"
+    said = ran(sys.executable, "-c", code.replace("until=400", "until=30"), cwd=tmp_path, env=own)
+    assert (said.returncode, said.stderr) == (0, "")
+
+
 def test_there_is_one_version(program):
     """That of the program; the newest section of the changes and its date are those to cite."""
     said = ran(program, "--version", check=True).stdout
