@@ -358,6 +358,11 @@ contains
     call record%exchange(sim%kicks)
     call record%exchange(sim%changes)
     call exchange_tally()
+    if (any(sim%box%surface%motion%is_free())) then
+      call record%exchange(sim%box%surface%motion%clock)
+      call record%exchange(sim%box%surface%motion%at)
+      call record%exchange(sim%box%surface%motion%v)
+    end if
     call exchange_disks()
     do k = 1, size(progress%cadence)
       associate (cadence => progress%cadence(k))      ! its steps are part of the input; when it is due follows from them

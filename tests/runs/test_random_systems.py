@@ -365,6 +365,7 @@ APART = [
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
     ("output.helfand", r"box\.(gravity|shear)"),
+    (r"side\.(mass|force|motion = free)", r"run\.d"),
     ("drive", "drive"),
     (r"obstacle\.(name|side)|wall (x|y)", "periodic"),
     ("output.frames_every", "output.frames_every"),
