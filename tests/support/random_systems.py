@@ -151,7 +151,7 @@ class Draw:
             words = self.law()
             if "temperature" not in words and "speed" not in words and self.chance(0.6):
                 self.worked = True
-                kinds = ["sine", "parabolic", "sawtooth", "steady", *["free"] * (not self.steps)]
+                kinds = ["steady", "parabolic", "sawtooth", "sine", *["free"] * (not self.steps)]
                 kind = rng.choice(kinds)
                 words += f" motion = '{kind}'"
                 if kind == "sawtooth":
