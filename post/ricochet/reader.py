@@ -224,14 +224,30 @@ class Run:
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
     def sides_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(..., 2) lower left and upper right corner of the box at a time; its sides may move."""
+        """(..., 2) lower left and upper right corner of the box at a time; its sides may move.
+
+        One that disks push is between its places at the observables.
+        """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
+        for k, place in self.pushed.items():
+            end = (self.lower, self.upper)[k % 2][k // 2]
+            at = np.interp(time, place.time, np.ravel(place.value))
+            inwards[..., k] = (-1) ** k * (at - end)
         return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
+
+    @cached_property
+    def pushed(self) -> dict:
+        """Places of the sides that disks push, by their numbers in `sides`."""
+        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "free"]
+        return {k: self.observable(f"sides/{SIDES[k]}/place") for k in free}
 
     @cached_property
     def room(self) -> tuple[np.ndarray, np.ndarray]:
         """(2,) corners of what sides that move never leave: the box, and how far they go beyond."""
-        swings = [outmost(side) for side in self.sides]
+        swings = np.array([outmost(side) for side in self.sides])
+        for k, place in self.pushed.items():
+            beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
+            swings[k] = max(0.0, np.max(beyond))
         return self.lower - swings[::2], self.upper + swings[1::2]
 
     @cached_property

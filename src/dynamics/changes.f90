@@ -4,6 +4,7 @@ module changes
   use box_sides, only: bounds
   use disks, only: land, mass_column
   use kinds, only: int32, int64, real64
+  use partners, only: n_sides
   use observables, only: total_energy
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
@@ -19,7 +20,8 @@ contains
     type(system_t), intent(in) :: system
     character(len=:), allocatable, intent(out) :: problem    !! why it cannot; empty if it could
     type(simulation_t) :: other
-    real(real64) :: before, here(2, 2), there(2, 2)          ! [energy], lower and upper sides [length]
+    real(real64) :: before, here(2, 2), there(2, 2), tau     ! [energy], lower and upper sides [length], [time]
+    integer :: k
 
     problem = ""
     other%given_t = sim%given_t
@@ -28,6 +30,15 @@ contains
     call other%make_room(0_int32)
     other%row(mass_column) = sim%row(mass_column)
     other%box%epoch = sim%epoch
+    do k = 1, n_sides                                        ! of one that is free still, its mass and force may be others
+      associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
+        if (.not. (old%is_free() .and. new%is_free())) cycle
+        tau = old%moment(sim%epoch, sim%now)
+        new%at = old%place(tau)
+        new%v = old%velocity(tau)
+        new%clock = sim%now
+      end associate
+    end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
     if (any((other%row > 0) .neqv. (sim%row > 0))) then

@@ -109,6 +109,7 @@ contains
       sim%epoch = sim%epoch + shift
       sim%last_advance = sim%last_advance - shift
       sim%box%epoch = sim%epoch
+      sim%box%surface%motion%clock = sim%box%surface%motion%clock - shift
       if (.not. sim%box%has_moving_sides()) return
       do i = 1, sim%n_disks()
         call keep_off_sides(sim%box, sim%disk(i), sim%now)

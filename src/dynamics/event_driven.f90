@@ -5,6 +5,7 @@
 !> partner's stamp reveals them when they come up, and the disk only predicts again.
 module event_driven
   use kinds, only: int32, int64, real64
+  use box_sides, only: side_time
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
   use encounters, only: collide, collide_pair, encounter_text, pass_side, passes
@@ -51,7 +52,6 @@ contains
     integer(int32) :: i
 
     self%idle = .false.
-    if (.not. self%is_part) sim%box%epoch = sim%epoch    ! later `move_epoch` sees to it
     call sim%start_sums()
     if (.not. sim%epoch_end > 0) call begin_first_epoch(sim)
     call self%search%build(sim)
@@ -206,6 +206,7 @@ contains
       else
         call collide_wall(sim, i, code, t, counts)
       end if
+      if (sim%box%surface(1 - code)%motion%is_free()) call follow_side(self, sim, code)
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)
@@ -215,6 +216,20 @@ contains
     end if
     call predict(self, sim, i)
   end subroutine execute
+
+  !> Predicts the disks anew that expected to hit a free side, which now flies otherwise, and those that hit it sooner.
+  subroutine follow_side(self, sim, side)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: side             !! its code
+    integer(int32) :: i
+
+    self%search%faces%box%surface(1 - side)%motion = sim%box%surface(1 - side)%motion
+    do i = 1, sim%n_disks()
+      if (sim%disk(i)%partner == side .or. side_time(sim%box, sim%disk(i), side) < sim%disk(i)%event_time) &
+        call predict(self, sim, i)
+    end do
+  end subroutine follow_side
 
   !> Predicts disk i and files its event.
   subroutine predict(self, sim, i)

@@ -11,8 +11,8 @@ module side_motion
   public :: motions, sawtooth, side_motion_t
 
   !> The motions by their names in the input; a motion is its number in this list.
-  character(len=*), parameter :: motions = "still sine parabolic sawtooth steady"
-  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5
+  character(len=*), parameter :: motions = "still sine parabolic sawtooth steady free"
+  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5, free = 6
   real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
   !> A part of a period: what bends the gap for so short a time does not change it by a bit.
   real(real64), parameter :: negligible = 1.0e-10_real64
@@ -20,16 +20,24 @@ module side_motion
 
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
-    real(real64) :: amplitude = 0.0_real64           !! the way that a steady one goes, inwards or outwards [length]
+    real(real64) :: amplitude = 0.0_real64           !! of a steady one its way, of a free one the width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
     real(real64) :: strike = 0.0_real64              !! velocity of a sawtooth or a steady side inwards [length/time]
     real(real64) :: begin = 0.0_real64               !! of a steady one [time]
     real(real64) :: end = 0.0_real64                 !! likewise
+    ! Of a free one, on which disks and a force act:
+    real(real64) :: mass = 1.0_real64                !! [mass]
+    real(real64) :: pull = 0.0_real64                !! acceleration inwards by the force [length/time**2]
+    real(real64) :: clock = 0.0_real64               !! of its last hit, since the epoch [time]
+    real(real64) :: at = 0.0_real64                  !! how far inwards it was then [length]
+    real(real64) :: v = 0.0_real64                   !! its velocity inwards then, after the hit [length/time]
   contains
     procedure :: is_on
     procedure :: travels
     procedure :: strokes
+    procedure :: is_free
+    procedure :: drifts
     procedure :: inmost
     procedure :: top_speed
     procedure :: moment
@@ -54,7 +62,7 @@ contains
     class(side_motion_t), intent(in) :: self
     logical :: yes
 
-    yes = self%kind == sine .or. self%kind == parabolic .or. self%kind == steady
+    yes = self%kind == sine .or. self%kind == parabolic .or. self%drifts()
   end function travels
 
   !> Whether it goes somewhere, once.
@@ -65,16 +73,32 @@ contains
     yes = self%kind == steady
   end function strokes
 
-  !> How far inwards of its own place it ever is.
+  !> Whether disks push it.
+  elemental function is_free(self) result(yes)
+    class(side_motion_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind == free
+  end function is_free
+
+  !> Whether the room that it leaves to the disks changes for good.
+  elemental function drifts(self) result(yes)
+    class(side_motion_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%kind == steady .or. self%kind == free
+  end function drifts
+
+  !> How far inwards of its own place it ever is; a free one yields.
   elemental function inmost(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]
 
     x = self%amplitude
-    if (self%kind == steady .and. self%strike < 0) x = 0
+    if (self%is_free() .or. (self%kind == steady .and. self%strike < 0)) x = 0
   end function inmost
 
-  !> The highest speed of the side.
+  !> The highest speed of the side; of a free one, that of a fall through the box.
   elemental function top_speed(self) result(speed)
     class(side_motion_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
@@ -82,16 +106,19 @@ contains
     speed = abs(self%strike)
     if (self%kind == sine) speed = 2*pi*self%amplitude/self%period
     if (self%kind == parabolic) speed = 8*self%amplitude/self%period
+    if (self%kind == free) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function top_speed
 
-  !> Time since a period or a stroke began, at the time epoch + t of the run. The remainders are exact, so that a late time is as
-  !> sharp as an early one.
+  !> Time since a period, a stroke or a free flight began, at the time epoch + t of the run. The remainders are exact, so
+  !> that a late time is as sharp as an early one.
   elemental function moment(self, epoch, t) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
     real(real64) :: tau                              !! [time]
 
-    if (self%kind == steady) then
+    if (self%kind == free) then
+      tau = t - self%clock
+    else if (self%kind == steady) then
       tau = (epoch - self%begin) + t
     else
       tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
@@ -113,6 +140,8 @@ contains
       x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
     else if (self%kind == steady) then
       x = self%strike*min(max(tau, 0.0_real64), self%end - self%begin)
+    else if (self%kind == free) then
+      x = flight(self%at, self%v, self%pull, tau)
     end if
   end function place
 
@@ -131,6 +160,8 @@ contains
       v = self%top_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
     else if (self%kind == steady .and. (tau < 0 .or. tau >= self%end - self%begin)) then
       v = 0
+    else if (self%kind == free) then
+      v = flight_velocity(self%v, self%pull, tau)
     end if
   end function velocity
 
@@ -242,6 +273,9 @@ contains
 
     if (self%kind == steady) then
       s = time_in_stroke(self, tau, gap, v, g)
+      return
+    else if (self%kind == free) then
+      s = time_to_line(gap, self%velocity(tau) - v, self%pull - g)
       return
     end if
     above = gap + self%place(tau) - self%amplitude   ! beyond the reach of the side

@@ -230,6 +230,7 @@ contains
       call refuse(shear .and. any(groups%name == "obstacle"), "box.shear_rate", "&obstacle")
       call refuse(shear .and. any(groups%name == "wall"), "box.shear_rate", "&wall")
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
+      call refuse(any(box%surface%motion%is_free()) .and. settings%run%dynamics == "steps", "run.dynamics", "side.motion = 'free'")
       call refuse(settings%output%helfand .and. box%falling(), "output.helfand", "box.gravity: velocities change all the time")
       call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)

@@ -80,10 +80,11 @@ contains
       else
         line_of(side) = sides(k)%line
         call take_law(sides(k), box%surface(side)%law)
+        axis = (side + 1)/2
+        width = box%upper(axis) - box%lower(axis)
         call take_motion(sides(k), box%surface(side)%motion)
         if (.not. box%surface(side)%motion%travels()) cycle
-        axis = (side + 1)/2                               ! sides must not meet, whenever each is how far inwards
-        width = box%upper(axis) - box%lower(axis)
+        ! Sides must not meet, whenever each is how far inwards.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
           trim(merge("end      ", "amplitude", box%surface(side)%motion%strokes())), "leaves no room between the sides, " &
           //"which are "//written(width)//" apart (box.upper)", problems)
@@ -141,6 +142,10 @@ contains
           "end", "is not after begin, "//written(motion%begin), problems)
         if (motion%amplitude > largest) call group%complain("end", "the side moves as far as "//written(motion%amplitude) &
           //"; allowed: up to "//written(largest), problems)
+      else if (motion%is_free()) then
+        motion%mass = group%real_of("mass", 1.0_real64)
+        motion%pull = group%real_of("force", 0.0_real64)/motion%mass
+        motion%amplitude = width
       else if (motion%top_speed() > largest) then
         call group%complain("period", "the side moves at up to "// &
           written(motion%top_speed())//"; allowed: up to "//written(largest), problems)

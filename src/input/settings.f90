@@ -123,7 +123,8 @@ contains
     logical :: yes
 
     yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
-      .and. .not. self%box%is_sheared() .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
+      .and. .not. (self%box%is_sheared() .or. any(self%box%surface%motion%is_free())) &
+      .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
   end function wants_domains
 
 end module settings

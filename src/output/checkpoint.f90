@@ -343,6 +343,7 @@ contains
     integer :: k
 
     call record%exchange(sim%epoch)
+    sim%box%epoch = sim%epoch
     call record%exchange(sim%now)
     settled = merge(1, 0, sim%settled)
     call record%exchange(settled)
@@ -358,6 +359,11 @@ contains
     call record%exchange(sim%kicks)
     call record%exchange(sim%changes)
     call exchange_tally()
+    if (any(sim%box%surface%motion%is_free())) then
+      call record%exchange(sim%box%surface%motion%clock)
+      call record%exchange(sim%box%surface%motion%at)
+      call record%exchange(sim%box%surface%motion%v)
+    end if
     call exchange_disks()
     do k = 1, size(progress%cadence)
       associate (cadence => progress%cadence(k))      ! its steps are part of the input; when it is due follows from them

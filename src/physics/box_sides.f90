@@ -3,7 +3,7 @@
 module box_sides
   use box_geometry, only: box_t
   use disks, only: disk_t
-  use free_flight, only: time_to_line
+  use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: int32, never, real64
   use partners, only: axis_of, n_sides, sense_of
   use side_motion, only: side_motion_t
@@ -40,7 +40,7 @@ contains
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: side          !! 0, -1, -2, -3: left, right, bottom, top
-    real(real64) :: t, gap, inset, tau
+    real(real64) :: t, gap, inset, tau, v, since, after
     integer :: axis, sense
 
     axis = axis_of(side)
@@ -53,10 +53,18 @@ contains
     end if
     associate (motion => box%surface(1 - side)%motion)
       if (motion%travels()) then
-        tau = motion%moment(box%epoch, disk%clock)
+        since = disk%clock
+        v = -sense*disk%v(axis)
+        if (motion%is_free()) then              ! what flies was not hit before both clocks
+          since = max(since, motion%clock)
+          after = since - disk%clock
+          gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)
+          v = flight_velocity(v, -sense*box%gravity(axis), after)
+        end if
+        tau = motion%moment(box%epoch, since)
         gap = gap - motion%place(tau)
         if (gap < no_gap(disk, axis, motion)) gap = 0
-        t = disk%clock + motion%contact_time(tau, gap, -sense*disk%v(axis), -sense*box%gravity(axis))
+        t = since + motion%contact_time(tau, gap, v, -sense*box%gravity(axis))
       else
         t = disk%clock + time_to_line(max(gap, 0.0_real64), sense*disk%v(axis), sense*box%gravity(axis))
       end if

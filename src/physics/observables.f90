@@ -86,7 +86,7 @@ contains
       call list%add(path//"/impulse", sim%tally%at_surface(impulse:impulse + 1, k)%value())
       call list%add(path//"/energy", [sim%tally%at_surface(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
-      if (.not. sim%box%surface(k)%motion%strokes()) cycle
+      if (.not. sim%box%surface(k)%motion%drifts()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
       call list%add(path//"/place", [at((k + 1)/2, 2 - modulo(k, 2))])
       associate (motion => sim%box%surface(k)%motion)
@@ -280,7 +280,7 @@ contains
     pressure = kinetic
     if (sim%time() > 0) pressure = pressure + 0.5_real64*sim%tally%total(virial)/sim%time()
     box = sim%box
-    if (any(box%surface%motion%strokes())) call bounds(sim%box, sim%now, box%lower, box%upper)
+    if (any(box%surface%motion%drifts())) call bounds(sim%box, sim%now, box%lower, box%upper)
     pressure = pressure/free_area(box)
   end function pressure
 

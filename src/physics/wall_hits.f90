@@ -4,8 +4,9 @@ module wall_hits
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
   use box_sides, only: side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
-  use disks, only: land, spin_column
+  use disks, only: disk_t, land, spin_column
   use partners, only: is_side
+  use side_motion, only: side_motion_t
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, gain, heat, impulse, work
@@ -44,10 +45,34 @@ contains
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
+    associate (motion => sim%box%surface(1 - code)%motion)
+      if (motion%is_free()) call push(motion, sim%disk(i), sim%mass_of(i), normal, v, u, t)
+    end associate
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
     if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
+
+  !> Lets a disk push a free side that it has hit as if it were of infinite mass. Both get the share of that impulse which
+  !> their masses allow; for sums u becomes the mean of the velocities of the side, whose work the energy is.
+  pure subroutine push(motion, disk, mass, normal, before, u, t)
+    type(side_motion_t), intent(inout) :: motion
+    type(disk_t), intent(inout) :: disk
+    real(real64), intent(in) :: mass             !! of the disk [mass]
+    real(real64), intent(in) :: normal(2)        !! inwards
+    real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
+    real(real64), intent(inout) :: u(2)          !! of the surface [length/time]
+    real(real64), intent(in) :: t                !! since the epoch [time]
+    real(real64) :: change, v
+
+    v = motion%velocity(motion%moment(0.0_real64, t))
+    change = dot_product(disk%v - before, normal)
+    disk%v = disk%v - (change*mass/(mass + motion%mass))*normal
+    motion%at = motion%place(motion%moment(0.0_real64, t))
+    motion%v = min(v - change*mass/(mass + motion%mass), dot_product(disk%v, normal))    ! never ahead of it by rounding
+    motion%clock = t
+    u = u + (0.5_real64*(motion%v - v))*normal
+  end subroutine push
 
   !> Gives disk i, at a thermal wall, a velocity as if it came out of a gas of that temperature: along the normal with the
   !> density (m v/kT) exp(-m v**2/2kT), along the wall, and in rotation, with Maxwell's.

@@ -284,6 +284,30 @@ def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
     assert v[:4].tolist() == [1, -1, 1, 0]
 
 
+def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
+    """Its own, that of the force, and what is lost, added to those of the disks."""
+    found = observed(
+        """&box upper = 2, 1 / &side name = 'right' motion = 'free' mass = 20 force = 300 /
+        &species count = 200 packing_fraction = 0.2 temperature = 1 / &stop time = 4 /
+        &contact restitution = 0.99 wall_restitution = 1 /
+        &output observables_every_time = 0.02 /"""
+    )
+    names = ("place", "velocity", "impulse")
+    place, v, impulse = (found[f"/observables/sides/right/{name}/value"] for name in names)
+    time = found["/observables/total_energy/time"]
+    energy, lost, work = (
+        found[f"/observables/{name}/value"]
+        for name in ("total_energy", "dissipated_energy", "work")
+    )
+    v, place = np.ravel(v), np.ravel(place)
+    whole = energy + lost + 10 * v**2 + 300 * place
+    assert whole == pytest.approx(whole[0], rel=1e-12)
+    assert energy + lost - work == pytest.approx(energy[0], rel=1e-12)
+    pushed = 300 * time - impulse[:, 0]
+    assert 20 * v == pytest.approx(pushed, abs=1e-12 * impulse[-1, 0])
+    assert np.ptp(place) > 0.1 and lost[-1] > 0.01 * energy[0]
+
+
 def test_time_steps_come_close_to_events(observed):
     """The moments of some bounces of a disk on a floor that moves, at a fine step."""
     times = [

@@ -360,11 +360,12 @@ NOT_DRAWN |= {"species.scale_positions"}
 #: Features that are refused together, or of which a system has only one.
 APART = [
     ("box.shear_rate", r"obstacle|wall|side|box\.gravity|run\.d|stop\.energy"),
-    (r"stop\.energy", r"drive|box\.shear|(side|wall|obstacle)\.(temp|speed)|side\.[mapv]"),
+    (r"stop\.energy", r"drive|box\.shear|(side|wall|obstacle)\.(temp|speed)|side\.[abefmpv]"),
     (r"obstacle|wall\.", r"species\.(file|position|grid|placement = (lattice|dense))"),
     (r"species\.(file|position)", r"species|contact\.pair|many"),
     (r"species\.(grid|placement = |packing)", r"species\.(grid|placement = |packing)|many"),
     ("output.helfand", r"box\.(gravity|shear)"),
+    (r"side\.(mass|force|motion = free)", r"run\.d"),
     ("drive", "drive"),
     (r"obstacle\.(name|side)|wall (x|y)", "periodic"),
     ("output.frames_every", "output.frames_every"),

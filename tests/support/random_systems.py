@@ -151,7 +151,8 @@ class Draw:
             words = self.law()
             if "temperature" not in words and "speed" not in words and self.chance(0.6):
                 self.worked = True
-                kind = rng.choice(["sine", "parabolic", "sawtooth", "steady"])
+                kinds = ["steady", "parabolic", "sawtooth", "sine", *["free"] * (not self.steps)]
+                kind = rng.choice(kinds)
                 words += f" motion = '{kind}'"
                 if kind == "sawtooth":
                     words += f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
@@ -160,6 +161,10 @@ class Draw:
                     begin = rng.choice([0, rng.random()]) * min(self.edges) / self.speed
                     end = begin + rng.uniform(0, 0.1) * min(self.edges) / abs(speed)
                     words += f" velocity = {speed!r} begin = {begin!r} end = {end!r}"
+                elif kind == "free":
+                    mass = 10.0 ** rng.uniform(-1, 3)
+                    force = mass * self.speed**2 / min(self.edges)
+                    words += f" mass = {mass!r} force = {force * 10.0 ** rng.uniform(-2, 1)!r}"
                 else:
                     period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
                     words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"

@@ -6,11 +6,12 @@ import numpy as np
 
 from driven import fuller, share
 from ricochet import Run
+from ricochet.statistics import Estimate, combined, series_mean
 from ricochet.hard_disks import adiabat
 from ricochet.theory import demon_share
 
 from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative, sigmas, within
-from .estimators import each, over
+from .estimators import each, over, several
 from .inputs import ensemble, namelist
 
 # --- one disk that bounces on the floor, g = 1 ---
@@ -110,6 +111,63 @@ def pressed() -> np.ndarray:
     return np.log(adiabat(widths, 1.0, PRESSED_DISKS, radius, walled=True))[1:]
 
 
+# --- a side that disks push: constant force, constant enthalpy ---
+
+FORCE, PUSHING, WIDE = 130.0, 100, 1.5
+PUSHED = ensemble(
+    4,
+    box={"upper": (WIDE, 1)},
+    side={"name": "right", "motion": "free", "mass": 20.0, "force": FORCE},
+    species={"name": "gas", "count": PUSHING, "packing_fraction": 0.3, "temperature": 1.0,
+             "exact_temperature": 1.0},
+    stop={"time": 1000},
+    output={"observables_every_time": 0.1},
+)  # fmt: skip
+ROD = 0.05  # radius of disks of masses 1, 2, 3 on a line
+RODS = Member(
+    namelist(
+        box={"upper": (2, 1)},
+        side={"name": "right", "motion": "free", "mass": 1.5, "force": 1.0},
+        species=[
+            {"name": f"m{k}", "mass": float(k), "radius": ROD, "position": (0.4 * k, 0.5),
+             "velocity": ((-1.0) ** k, 0.0)} for k in (1, 2, 3)
+        ],
+        stop={"time": 200000},
+        output={"observables_every_time": 2},
+    )
+)  # fmt: skip
+
+
+def room(*runs: Run) -> Estimate:
+    """Mean width and its variance, when the start is over."""
+    tracks = [run.observable("sides/right/place") for run in runs]
+    widths = [np.ravel(place)[time > time[-1] / 20] for time, place in tracks]
+    squares = [(x - x.mean()) ** 2 for x in widths]
+    return several([combined([series_mean(one) for one in own]) for own in (widths, squares)])
+
+
+def room_law(widths: np.ndarray, factor: np.ndarray, freedom: float, energy: float) -> list[float]:
+    """The same of the density Q(w) (H - F w)^(f / 2 - 1), given T on the adiabat as Q^(-2 / f)."""
+    log = np.log(factor) + (freedom / 2 - 1) * np.log(energy)
+    density = np.exp(log - log.max())
+    mean = np.average(widths, weights=density)
+    return [float(mean), float(np.average((widths - mean) ** 2, weights=density))]
+
+
+def room_of_gas() -> list[float]:
+    """Of the gas: Q is what its adiabat says."""
+    radius, widths = sqrt(0.3 * WIDE / PUSHING / pi), np.linspace(1, 2.2, 20001)
+    q = adiabat(widths, 1.0, PUSHING, radius, walled=True) ** -float(PUSHING)
+    return room_law(widths, q, 2 * PUSHING + 1, PUSHING + FORCE * (WIDE - widths))
+
+
+def room_of_rods() -> list[float]:
+    """Of rods: Q is the third power of the free length."""
+    energy = 3 + 2.0
+    widths = np.linspace(6 * ROD, energy, 200002)[1:-1]
+    return room_law(widths, (widths - 6 * ROD) ** 3, 4, energy - widths)
+
+
 # --- Maxwell's demon: two chambers, a sawtooth floor, a hole above it ---
 
 GRAINS, DIAMETER, WIDTH, HOLE, XI = 120, 0.5, 19.5, 8.0, 0.9
@@ -169,6 +227,14 @@ CASES = [
     Case(
         "P15-14", "slow steady side on a dense gas, packing 0.2 to 0.4: ln of T over its start",
         PRESSED, over(heated), pressed(), SOUND, "Kolafa 2006, D",
+    ),
+    Case(
+        "P15-15", "three rods push a side: mean width and its variance",
+        (RODS,), room, room_of_rods(), sigmas(4), "Tonks 1936, D",
+    ),
+    Case(
+        "P15-16", "a dense gas pushes a side: mean width and its variance",
+        PUSHED, room, room_of_gas(), sigmas(4), "Kolafa 2006, D",
     ),
     *[
         Case(
