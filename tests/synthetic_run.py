@@ -63,6 +63,8 @@ def write_run(
         box["edges"], box["lower"] = np.asarray(edges, float), np.asarray(lower, float)
         add_element(disks, "position", time, position)
         shared = disks["position"]
+        if image is None and any(periodic):
+            image = np.zeros(position.shape, np.int32)
         for name, values in (("velocity", velocity), ("image", image), ("collisions", collisions)):
             if values is not None:
                 group = disks.create_group(name)

@@ -122,15 +122,15 @@ def test_the_memory_of_a_run_does_not_grow(memory_of):
 
 
 def test_the_size_of_the_output_is_told_before_it_is_written(ricochet, tmp_path):
-    """Two frames of 40 bytes per disk, and 24 bytes and two checkpoints of 72."""
+    """Two frames of 36 bytes per disk, and 24 bytes and two checkpoints of 72."""
     (tmp_path / "gas.nml").write_text(GAS.format(count=1_000_000, collisions=1))
     grid = ["--set", "species.gas.count=", "--set", "species.gas.grid=1000,1000"]
     run = ricochet("gas.nml", "--check", *grid)
-    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 248 MB\n"
+    assert run.stdout == "gas.nml: valid; 1000000 disks; the output needs at least 240 MB\n"
     assert run.stderr == ""
     many = ["--set", "output.frames_every_collisions=50000", "--set", "stop.collisions=500000"]
     run = ricochet("gas.nml", *grid, *many, "--set", "stop.wall_clock=1e-9")
-    assert run.stderr.splitlines()[0] == "note: the output needs at least 608 MB"
+    assert run.stderr.splitlines()[0] == "note: the output needs at least 564 MB"
     assert abs((tmp_path / "runs/gas.h5.part").stat().st_size / 608e6 - 1) < 1e-3
 
 

@@ -75,6 +75,18 @@ def test_the_threads_are_those_of_the_last_part(ricochet, gas):
         assert threads_of(gas / "many.h5") == threads
 
 
+def test_moments_of_a_run_that_goes_on_on_several_cores_count_from_its_start(ricochet, tmp_path):
+    """The kicks, too, in a later epoch than the first, where nothing has happened before."""
+    helfand = (
+        "&drive kind = 'brownian' interval = 0.1 temperature = 1 / &output helfand = .true. /\n"
+    )
+    write_input(tmp_path, GAS.replace("10000", "5000") + helfand + "&stop time = 0.35 /\n")
+    ricochet("gas.nml", "-o", "one.h5")
+    ricochet("gas.nml", "-o", "two.h5", "--set=stop.time=0.25")
+    ricochet("gas.nml", "-o", "two.h5", "--set=run.threads=2", "--resume")
+    assert differences(tmp_path / "one.h5", tmp_path / "two.h5") == []
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_says_what_it_did_on_one_core_though_it_had_two(ricochet, gas, threads):
     """In the summary and in the file; a spell of so few events is not worth two."""

@@ -334,6 +334,7 @@ class Draw:
         if min(restitution, on_walls) < 1 and (any(self.periodic) or on_walls == 0):
             self.drifts = True  # or comes to rest: without a time the run ends at some sample
         if self.least or self.chance(0.2):
+            self.drifts = True  # slower and slower: the last of the events may be a long time away
             words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"
             words += f" restitution_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
         if self.turns or self.chance(0.5):
@@ -360,7 +361,7 @@ class Draw:
         words = rng.choice(
             [
                 f"kind = 'noise' strength = {energy / flight!r}"
-                + self.maybe(0.8, "keep_momentum = .true."),
+                + self.maybe(0.7, "keep_momentum = .true."),
                 f"kind = 'andersen' temperature = {energy!r}"
                 f" fraction = {rng.choice([1, 0.1, 1e-3])}",
                 f"kind = 'brownian' temperature = {energy!r}",
@@ -398,6 +399,7 @@ class Draw:
             words += self.maybe(0.3, f"{track}_per_decade = {rng.randint(1, 9)}")
         if "per_decade" in words:
             words += f" frames_from = {self.cadence('time') / 100!r}"
+        words += self.maybe(0.2, "frame_columns = 'velocity', 'image', 'orientation'")
         return words + " /"
 
     def cadence(self, kind: str) -> float:
