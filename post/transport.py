@@ -4,7 +4,7 @@
 
 Equal elastic disks in a periodic box.  Runs are combined by packing fraction; they take the Helfand
 moments of momentum and energy (output.helfand), as observables some four times in a mean free time
-(output.observables_every_time), and for D frames that are equally far apart in time.
+(output.observables_every_time), and for D, if it is wanted, frames equally far apart in time.
 
 Small panels: half of the slope of the mean square of a moment between neighbouring lags, over
 Enskog's coefficient; bands are errors over the runs.  For D half the integral of
@@ -38,7 +38,8 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
     """A row per packing fraction and coefficient, in units of m, the diameter and kT; doubts."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
-        for name, theory in enskog(henderson(eta), eta, 1.0).items():
+        theories = enskog(henderson(eta), eta, 1.0)
+        for name, theory in ((name, theories[name]) for name in LABELS if name in found):
             members, about = found[name].members, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
             row |= measured("value", combined(members).scaled(theory)) | {"enskog": float(theory)}
@@ -53,14 +54,19 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
 
 def draw(results: Results, rows: list[dict]) -> plt.Figure:
     """All coefficients over Enskog's, against the lag and against packing."""
-    layout = [["viscosity", "conductivity", "all"], ["bulk_viscosity", "D", "all"]]
-    figure, panels = plt.subplot_mosaic(layout, figsize=(13, 7), width_ratios=(1, 1, 1.3))
+    layout, height = [["viscosity", "conductivity", "bulk_viscosity", "all"]], 4.5
+    if any("D" in found for _, found in results):
+        layout, height = [["viscosity", "conductivity", "all"], ["bulk_viscosity", "D", "all"]], 7
+    widths = [1] * (len(layout[0]) - 1) + [1.3]
+    figure, panels = plt.subplot_mosaic(layout, figsize=(13, height), width_ratios=widths)
     scale = colours(len(results), len(COLOURS))  # packing; at the right colours are coefficients
     for (eta, found), colour in zip(results, scale, strict=True):
         line = {"color": colour, "lw": 1, "marker": ".", "ms": 3, "label": f"η = {eta:.3g}"}
         for name, one in found.items():
             band(panels[name], *one.curve, **line)
     for (name, label), marker in zip(LABELS.items(), "osv^", strict=True):
+        if name not in panels:
+            continue
         panels[name].set(xlabel="$w\\,t$", xscale="log", xlim=(0.03, 100))
         panels[name].set(ylabel=f"{label} / Enskog's", ylim=(0, 1.6))
         own = [row for row in rows if row["what"] == name]

@@ -221,9 +221,15 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
     return Found(members, Curve(at * step, *estimate(slopes)), lag * step)
 
 
-def coefficients(runs: list[Run], skip: float | None) -> dict[str, Found]:
-    """All coefficients at one packing fraction."""
+def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
+    """All coefficients at one packing fraction, from `skip` collisions per disk on.
+
+    "D" only where runs have more frames than the first and the last.  Raises RunError.
+    """
     for run in runs:
         allow(run, TAKES)
     starts = [td.start_of_equilibrium(run, skip) for run in runs]
-    return of_moments(runs, starts) | {"D": of_displacements(runs, starts)}
+    found = of_moments(runs, starts)
+    if any(run.frames > 2 for run in runs):
+        found["D"] = of_displacements(runs, starts)
+    return found

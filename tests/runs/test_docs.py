@@ -314,6 +314,24 @@ def test_the_code_that_the_page_on_output_shows_finds_how_disks_move(program, tm
     assert (said.returncode, said.stderr) == (0, "")
 
 
+def test_the_code_that_the_page_on_output_shows_finds_what_disks_carry(program, tmp_path):
+    """Of two seeds, for a thousandth of the time."""
+    page = section("output", "## What disks carry")
+    blocks = [textwrap.dedent(one) for one in re.findall(r"(?:^    .*\n)+", page, re.M)]
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    own = environment(PYTHONPATH=ROOT / "post", RICOCHET=program)
+    shell = blocks[0].replace("runs/ensemble.sh", str(ROOT / "runs" / "ensemble.sh"))
+    shell = shell.replace("python post", f"{sys.executable} {ROOT}/post")
+    shell = shell.replace("1-4", "1-2").replace("100000", "100")
+    ran("bash", "-ec", shell, cwd=tmp_path, env=own, check=True)
+    assert (tmp_path / "runs" / "carried.csv").read_text().count("conductivity") > 3
+    code = "".join(blocks[1:]).replace(", 3, 4)", ")").replace("2000", "200")
+    code += "assert temperature.shape == (8,)\n"
+    said = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
+    assert said.returncode == 0 and "mean=" in said.stdout, said.stderr
+
+
 def test_there_is_one_version(program):
     """That of the program; the newest section of the changes and its date are those to cite."""
     said = ran(program, "--version", check=True).stdout
