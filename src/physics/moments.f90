@@ -42,20 +42,20 @@ contains
     integer(int64), intent(in) :: step            !! number of the frame, from 0
     type(frame_column_t), intent(in) :: list(:)   !! the columns
     real(real64), allocatable :: sample(:, :)     !! (width,1)
-    logical :: shared, there(4)
+    logical :: shared
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
-    integer :: c, at(4), column, first
+    integer :: c, column, first
+    integer :: at(4)                              ! where those of `common` begin; 0: they are not wanted
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
     sample(:2, 1) = [real(step, real64), sim%time()]
     first = 3
-    there = .false.
+    at = 0
     do c = 1, size(list)
       column = findloc(common%name, list(c)%name, dim=1)
       if (column > 0) then
-        there(column) = .true.
         at(column) = first
       else
         sample(first - 1 + sim%tag%id, 1) = sim%values_now(findloc(columns%name, list(c)%name, dim=1))
@@ -73,10 +73,10 @@ contains
         image = sim%image(i)
         call wrap(sim, x, v, image)
       end if
-      if (there(1)) sample(at(1) + 2*k:at(1) + 2*k + 1, 1) = x
-      if (there(2)) sample(at(2) + 2*k:at(2) + 2*k + 1, 1) = v
-      if (there(3)) sample(at(3) + k, 1) = sim%tag(i)%collisions
-      if (there(4)) sample(at(4) + 2*k:at(4) + 2*k + 1, 1) = image
+      if (at(1) > 0) sample(at(1) + 2*k:at(1) + 2*k + 1, 1) = x
+      if (at(2) > 0) sample(at(2) + 2*k:at(2) + 2*k + 1, 1) = v
+      if (at(3) > 0) sample(at(3) + k, 1) = sim%tag(i)%collisions
+      if (at(4) > 0) sample(at(4) + 2*k:at(4) + 2*k + 1, 1) = image
     end do
     !$omp end parallel do
   end function frame_sample

@@ -63,13 +63,14 @@ contains
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
     real(real64), intent(inout) :: u(2)          !! of the surface [length/time]
     real(real64), intent(in) :: t                !! since the epoch [time]
-    real(real64) :: change, v
+    real(real64) :: tau, v, given
 
-    v = motion%velocity(motion%moment(0.0_real64, t))
-    change = dot_product(disk%v - before, normal)
-    disk%v = disk%v - (change*mass/(mass + motion%mass))*normal
-    motion%at = motion%place(motion%moment(0.0_real64, t))
-    motion%v = min(v - change*mass/(mass + motion%mass), dot_product(disk%v, normal))    ! never ahead of it by rounding
+    tau = motion%moment(0.0_real64, t)
+    v = motion%velocity(tau)
+    given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
+    disk%v = disk%v - given*normal
+    motion%at = motion%place(tau)
+    motion%v = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
     motion%clock = t
     u = u + (0.5_real64*(motion%v - v))*normal
   end subroutine push

@@ -126,7 +126,7 @@ contains
       wanted = 0
       do k = 1, size(species)
         associate (own => full(disks_before(species, k) + 1:disks_before(species, k + 1)))
-          wanted = wanted + own(1)**2*sum((own/own(1))**2)
+          wanted = wanted + own(1)**2*sum((own/own(1))**2)      ! of equal disks their number, exactly
         end associate
       end do
       wanted = pi*wanted/product(sim%box%edges())
