@@ -147,12 +147,6 @@ def kurtosis(runs: list[Run], until: int) -> Curve:
     return Curve(np.mean(tau, axis=0), *estimate(a2))
 
 
-def in_step(run: Run, frames: slice) -> bool:
-    """Whether frames are equally far apart."""
-    steps = np.diff(run.time[frames])
-    return bool(np.ptp(steps) <= transport.CLOSE * steps[0])
-
-
 def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Found:
     """All that runs at one packing fraction say."""
     frames = [later(run, skip) for run in runs]
@@ -164,7 +158,11 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
     until = max(own.start for own in frames) + 1 if settled else min(run.frames for run in runs)
     curves["a2"] = kurtosis(runs, until)
     members, lag = {}, None
-    if settled and runs[0].periodic.all() and all(in_step(*one) for one in pairs):
+    if (
+        settled
+        and runs[0].periodic.all()
+        and all(transport.in_step(run.time[own]) for run, own in pairs)
+    ):
         steps = transport.diffusion_lag(runs, frames)
         both = [transport.diffusion(*one, steps) for one in pairs]
         ways = 1 if "bathed" in runs[0].nature else 2

@@ -38,8 +38,9 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
     """A row per packing fraction and coefficient, in units of m, the diameter and kT; doubts."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
-        theories = enskog(henderson(eta), eta, 1.0)
-        for name, theory in ((name, theories[name]) for name in LABELS if name in found):
+        for name, theory in enskog(henderson(eta), eta, 1.0).items():
+            if name not in found:
+                continue
             members, about = found[name].members, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
             row |= measured("value", combined(members).scaled(theory)) | {"enskog": float(theory)}

@@ -34,6 +34,12 @@ TAKES = "transport takes equal elastic smooth disks in a periodic box"
 MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
 
 
+def in_step(times: np.ndarray) -> bool:
+    """Whether these times, two and more, are equally far apart."""
+    steps = np.diff(times)
+    return bool(np.ptp(steps) <= CLOSE * steps[0])
+
+
 # --- diffusion ---
 
 
@@ -103,8 +109,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     parts = [run.observable(name) for name in SUMS]
     first = int(np.searchsorted(parts[0].time, start))
     time = parts[0].time[first:-1]  # the last may come sooner
-    apart = np.diff(time)
-    if len(apart) < 2 or np.ptp(apart) > CLOSE * apart[0]:
+    if len(time) < 3 or not in_step(time):
         raise RunError(
             f"{run.path}: moments take observables equally far apart in time; set "
             f"output.observables_every_time = {td.mean_free_time(run, start) / PER_FREE_TIME:.2g}"
@@ -117,7 +122,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
     found = {name: np.stack(one, axis=1) for name, one in zip(MOMENTS, groups, strict=True)}
     share = np.linspace(0, 1, len(time))[:, None]
-    return float(apart.mean()), {
+    return float(np.diff(time).mean()), {
         name: one - one[0] - share * (one[-1] - one[0]) for name, one in found.items()
     }
 
@@ -193,11 +198,10 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     return found
 
 
-def in_step(run: Run, start: float) -> slice:
+def frames_in_step(run: Run, start: float) -> slice:
     """Frames in equilibrium that are equally far apart, as all but the last must be."""
     frames = slice(int(np.searchsorted(run.time, start)), run.frames - 1)
-    apart = np.diff(run.time[frames])
-    if len(apart) < 16 or np.ptp(apart) > 1e-6 * apart[0]:
+    if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(
             f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
             "output.frames_every_time alone"
@@ -207,7 +211,7 @@ def in_step(run: Run, start: float) -> slice:
 
 def of_displacements(runs: list[Run], starts: list[float]) -> Found:
     """The diffusion coefficient."""
-    frames = [in_step(run, start) for run, start in zip(runs, starts, strict=True)]
+    frames = [frames_in_step(run, start) for run, start in zip(runs, starts, strict=True)]
     lag = diffusion_lag(runs, frames)
     at, pairs = lags(4 * lag), list(zip(runs, frames, strict=True))
     units = [1 / enskog_of(run)["D"] for run in runs]
