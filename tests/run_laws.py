@@ -183,7 +183,8 @@ def log_error(found: Found) -> float:
     change = found["/events/momentum_change"]
     wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
     wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
-    for of_disks in found.get("/particles/disks/collisions/value", ())[-1:]:
+    if "/particles/disks/collisions/value" in found:
+        of_disks = found["/particles/disks/collisions/value"][-1]
         mine = np.bincount(np.concatenate([i, j[j > 0]]), minlength=len(of_disks) + 1)
         wrong += list(mine[1:] - of_disks)
     for code, name in walls:

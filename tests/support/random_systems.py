@@ -361,7 +361,7 @@ class Draw:
         words = rng.choice(
             [
                 f"kind = 'noise' strength = {energy / flight!r}"
-                + self.maybe(0.7, "keep_momentum = .true."),
+                f" keep_momentum = {'.true.' if self.chance(0.7) else '.false.'}",
                 f"kind = 'andersen' temperature = {energy!r}"
                 f" fraction = {rng.choice([1, 0.1, 1e-3])}",
                 f"kind = 'brownian' temperature = {energy!r}",
