@@ -27,13 +27,16 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from . import hard_disks
+from .nature import Nature
 from .program import ProgramError
-from .reader import Run, obstacles_of, walls_of
+from .reader import Run, Series, obstacles_of, walls_of
 from .simulation import NEVER, Simulation
 from .statistics import SeriesMean, equilibration, series_mean
 
@@ -282,15 +285,33 @@ class Bench:
 # --- numbers ---
 
 
-def pictured_run(simulation: Simulation) -> Run:
-    """The present moment as a run with one frame."""
+@dataclass(frozen=True)
+class Pictured(Run):
+    """The moment of a scene as a run with one frame; observables are those of now."""
+
+    simulation: Simulation
+
+    def observable(self, name: str) -> Series:
+        value = np.asarray(self.simulation.observable(name))
+        return Series(np.array([self.simulation.time]), value[None])
+
+    pushed = property(Run.pushed.func)  # at each look: sides that disks push move on
+
+    @cached_property
+    def nature(self) -> Nature:
+        return self.simulation.nature
+
+
+def pictured_run(simulation: Simulation) -> Pictured:
+    """The present moment as a run."""
     parameters = simulation.parameters
     box, kinds = parameters["box"], parameters["species"]
     lower, upper = (np.asarray(box[name], dtype=float) for name in ("lower", "upper"))
     elements = {}
     if "all/rotational_energy" in simulation.observables:
         elements[TURNS] = simulation.angular_velocity[None]
-    run = Run(
+    return Pictured(
+        simulation=simulation,
         path=Path(parameters.get("run", {}).get("title") or "simulation"),
         time=np.array([simulation.time]),
         position=simulation.position[None],
@@ -310,8 +331,6 @@ def pictured_run(simulation: Simulation) -> Run:
         parameters=parameters,
         provenance={},
     )
-    run.__dict__["nature"] = simulation.nature
-    return run
 
 
 def pressure_between(

@@ -60,7 +60,8 @@ class Film:
         self.frames, self.last = 0, {}
 
     async def say(self, do, **more):
-        await self.socket.send_json({"do": do, **more})
+        with suppress(ConnectionError):  # as a browser has it: what was sent before is still read
+            await self.socket.send_json({"do": do, **more})
 
     async def start(self, name="gas", settings=None, added=(), pace=0.1):
         """Start a run, and wait for its first frame, or for what is wrong."""
@@ -261,6 +262,18 @@ def test_an_added_group_is_run_and_in_what_is_kept(address):
             assert b"&obstacle" in text and b"post" in text
             with Simulation(text.decode()) as again:
                 assert again.count == 1000
+
+    asyncio.run(visit())
+
+
+def test_a_side_that_disks_push_is_where_the_engine_has_it(address):
+    async def visit():
+        async with film(address) as one:
+            names = {"motion": "'free'", "mass": "5", "force": "0.1"}
+            free = {f"side.right.{name}": value for name, value in names.items()}
+            await one.start(settings=free, added=[["side", "right"]], pace=1)
+            places = [np.frombuffer(await one.until("frame"), float, HEAD)[3] for _ in range(20)]
+            assert places[0] == 1 and places[-1] > places[5] > 1
 
     asyncio.run(visit())
 
