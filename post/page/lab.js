@@ -7,13 +7,14 @@ const lab = JSON.parse($('data').textContent);  // table: group -> variable; inp
 const state = {
   input: null, groups: [],   // the input: name, title, sliders, ...; kind, place, given values of each group of its file
   settings: {}, added: [],   // what the form changes: variable -> text; groups that are not in the file: [kind, name]
-  waiting: {},               // variables whose values cannot be: what is said about them
+  has: {},                   // what `settings` of the run is
+  waiting: {},               // variables whose new text cannot be: that text, and what is said about it
   runs: 0,                   // so far
   boxes: [],                 // runs: { figure, frame, letter, words, run, shown }, the newest last; the others are kept
   paused: false,
 };
 // What acts on the disks that move; all else starts anew.
-const ACTS = /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|velocity))/;
+const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|velocity))/.test(key);
 const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', pressure: 'pressure', dissipated_energy: 'energy lost', collisions: 'collisions' };
 const MOST_KEPT = 3, FULL = 0.5;  // runs on the shelf; share of the area that random placing fills with ease
 
@@ -39,21 +40,21 @@ const words = value => value === null || value === undefined ? '' : [value].flat
 const givenAs = key => givenIn(placeOf(key))[nameOf(key)] ?? '';
 const textOf = key => state.settings[key] ?? givenAs(key);
 const valueOf = key => textOf(key) || words(variableOf(key).default ?? variableOf(key).example);
-const split = text => text.split(/\s*,\s*|\s+/);
-const numberOf = key => parseFloat(valueOf(key).replace(/d/i, 'e'));
+const split = text => text.split(/\s*,\s*|\s+/).flatMap(one => /^[2-9]\*./.test(one) ? Array(+one[0]).fill(one.slice(2)) : one);
+const numberOf = (key, at = 0) => parseFloat(split(valueOf(key))[at]?.replace(/d/i, 'e'));
+const shownOf = key => state.waiting[key]?.text ?? textOf(key);
 
 function set(key, text) {
-  if (text === givenAs(key)) delete state.settings[key]; else state.settings[key] = text;
+  const old = textOf(key);
   delete state.waiting[key];
+  delete state.settings[key];  // the newest is the last
+  if (text !== givenAs(key)) state.settings[key] = text;
   sync();
-  changed(key);
+  if (text !== old) changed(key);
 }
 
-// The values that can be: one that cannot waits, the others act.
-const wish = () => ({
-  input: state.input.name, added: state.added,
-  settings: Object.fromEntries(Object.entries(state.settings).filter(([key]) => !state.waiting[key])),
-});
+const wish = () => ({ input: state.input.name, added: state.added, settings: { ...state.settings } });
+const differs = key => (state.settings[key] ?? givenAs(key)) !== (state.has[key] ?? givenAs(key));
 
 const changesInWords = () => Object.entries(wish().settings).map(([key, value]) => {
   const slider = state.input.sliders.find(one => one.key === key);
@@ -68,8 +69,7 @@ function sliderOf([name, text, from, to, log]) {
   return { key, at: at === undefined ? -1 : +at, words: text, from, to, log: !!log };
 }
 
-const read = ({ key, at }) => parseFloat(at < 0 ? valueOf(key) : split(valueOf(key))[at]);
-const acts = key => ACTS.test(key);
+const textWith = ({ key, at }, text) => at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(',');
 
 // The largest value that has room, up to another limit: all disks fill no more than a share of their region.
 function mostOf({ key, to = Infinity }) {
@@ -88,36 +88,43 @@ function mostOf({ key, to = Infinity }) {
   return isFinite(most) ? Math.min(to, most) : to;
 }
 
+// Values from one end of a slider to the other, rounded: no two are alike.
+function valuesOf(spec, steps) {
+  const { key, from, to, log } = spec, top = mostOf(spec), unit = variableOf(key).type === 'integer' ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
+  const near = value => log && unit !== 1 ? +value.toPrecision(3) : +(Math.round(value / unit) * unit).toPrecision(12);
+  return [...new Set(Array.from({ length: steps + 1 }, (_, k) => near(log ? from * (top / from) ** (k / steps) : from + k / steps * (top - from))))];
+}
+
+// The program judges what is typed; only the decimal comma is not its own.
 function buildSlider(spec) {
-  const { key, at, from, log } = spec, integer = variableOf(key).type === 'integer', id = 'slide.' + key + at;
-  const range = make('input', { type: 'range', min: 0, max: 1000, step: 1, id });
+  const { key, at } = spec, id = 'slide.' + key + at;
+  const range = make('input', { type: 'range', min: 0, id });
   const field = make('input', { inputMode: 'text', spellcheck: false });
   const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
     make('small', { textContent: acts(key) ? 'acts at once' : 'starts anew' }), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
-  const scaled = value => log ? Math.log(value) : value, most = () => mostOf(spec);
-  const put = value => {
-    const text = String(integer ? Math.round(value) : +(+value).toPrecision(3));
-    set(key, at < 0 ? text : split(valueOf(key)).map((one, k) => k === at ? text : one).join(','));
-  };
-  range.addEventListener('input', () => {
-    const share = range.value / 1000, low = scaled(from), value = low + share * (scaled(most()) - low), step = 10 ** Math.floor(Math.log10((spec.to - from) / 100));
-    put(log ? Math.exp(value) : Math.round(value / step) * step);
-  });
-  field.addEventListener('change', () => put(parseFloat(field.value.replace(',', '.')) || 0));
+  let values;
+  range.addEventListener('input', () => set(key, textWith(spec, String(values[range.value]))));
+  field.addEventListener('change', () => set(key, textWith(spec, field.value.trim().replaceAll(',', '.'))));
   row.sync = () => {
-    const value = read(spec), top = most(), place = 1000 * (scaled(value) - scaled(from)) / (scaled(top) - scaled(from));
-    if (document.activeElement !== range) range.value = clampTo(place);
-    if (document.activeElement !== field) field.value = integer ? value : short(value).replace('−', '-');
-    range.setAttribute('aria-valuetext', `${short(value)}, from ${short(from)} to ${short(top)}`);
-    row.classList.toggle('changed', key in state.settings);
-    row.classList.toggle('wrong', key in state.waiting);
-    row.lastChild.textContent = state.waiting[key] ?? '';
+    const value = numberOf(key, Math.max(at, 0)), text = shownOf(key) || valueOf(key);
+    if (document.activeElement !== range) {
+      values = valuesOf(spec, 1000);
+      range.max = values.length - 1;
+      range.value = (values.findIndex(one => one >= value) + values.length) % values.length;
+    }
+    if (document.activeElement !== field) field.value = at < 0 ? text : split(text)[at] ?? '';
+    range.setAttribute('aria-valuetext', `${short(value)}, from ${short(values[0])} to ${short(values.at(-1))}`);
+    mark(row, key);
   };
   return row;
 }
 
-const clampTo = place => Math.max(0, Math.min(1000, place || 0));
+function mark(row, key) {
+  row.classList.toggle('changed', key in state.settings);
+  row.classList.toggle('wrong', key in state.waiting);
+  row.lastChild.textContent = state.waiting[key]?.said ?? '';
+}
 
 // ---------- everything: by the program's own table ----------
 
@@ -148,10 +155,8 @@ function buildVariable(key) {
   input.setAttribute('aria-describedby', id + '.help');
   input.addEventListener('change', () => set(key, input.value.trim()));
   row.sync = () => {
-    if (document.activeElement !== input || menu) input.value = textOf(key);
-    row.classList.toggle('changed', key in state.settings);
-    row.classList.toggle('wrong', key in state.waiting);
-    row.lastChild.textContent = state.waiting[key] ?? '';
+    if (document.activeElement !== input || menu) input.value = shownOf(key);
+    mark(row, key);
   };
   row.sync();
   return row;
@@ -172,7 +177,7 @@ function addGroup(kind, name) {
 // Its run starts before the form is there.
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
-  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, waiting: {}, added: [] });
+  Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
   run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
@@ -231,8 +236,8 @@ function run() {
   const begin = () => {
     filmOf(box).theme(isDark());
     if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
-    box.wished = { wish: wish(), words: changesInWords() };
-    filmOf(box).start({ ...wish(), run: ++state.runs });
+    box.wished = { ...wish(), words: changesInWords(), run: ++state.runs };
+    filmOf(box).start(box.wished);
   };
   if (isThere(box)) begin(); else box.frame.addEventListener('load', begin, { once: true });
 }
@@ -253,6 +258,7 @@ function hear(source, news) {
   if (!box) return;
   if (news.is === 'scene' && !news.changed) {
     Object.assign(box, { run: news.run, words: box.wished.words, changes: [] });
+    state.has = { ...box.wished.settings };
     ready();
     for (const kept of state.boxes) if (kept !== box && kept.shown && isThere(kept)) filmOf(kept).replay();
     tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
@@ -263,6 +269,7 @@ function hear(source, news) {
     ready();
   } else if (news.is === 'state') {
     box.changes = news.changes;
+    if (box === current()) for (const [, key, value] of news.changes) state.has[key] = value;
     if (news.reason) tell(news.reason, true);
     tellShelf();
   } else if (news.is === 'file') {
@@ -277,16 +284,19 @@ function ready() {
   if (again) { again = false; run(); }
 }
 
-// Once, where it belongs; only that value waits, the others act.
+// Once, where it belongs, or at what has changed last: that text waits, what it would replace goes on, and the others act.
 function showProblems(problems) {
-  const known = problems.filter(({ place }) => place in state.settings && !state.waiting[place]);
-  for (const { place, text } of known) {
-    const most = mostOf({ key: place });
-    state.waiting[place] = most < numberOf(place) ? `too full: at most ${short(most)}` : text;
+  const changes = () => Object.keys({ ...state.has, ...state.settings }).filter(differs), before = changes();
+  for (const { place, text } of problems) {
+    const key = before.includes(place) ? place : before.at(-1);
+    if (!key || !differs(key)) continue;
+    const most = mostOf({ key });
+    state.waiting[key] = { text: textOf(key), said: most < numberOf(key) ? `too full: at most ${short(most)}` : text };
+    if (key in state.has) state.settings[key] = state.has[key]; else delete state.settings[key];
   }
   sync();
-  tell(known.length ? 'one value waits: see the form' : problems[0].text, true);
-  if (known.length) again = true;
+  tell(before.length ? 'one value waits: see the form' : problems[0].text, true);
+  again ||= before.length > 0 && changes().length > 0;
 }
 
 // ---------- the shelf of kept runs ----------
@@ -370,9 +380,7 @@ function paced(source) {
 
 let scan, scanner;  // what is measured; where from
 function beginScan() {
-  const spec = state.input.sliders[$('scanned').value], { key, at, from, log } = spec, to = mostOf(spec), integer = variableOf(key).type === 'integer';
-  const values = [0, 1, 2, 3, 4].map(k => log ? from * (to / from) ** (k / 4) : from + k / 4 * (to - from)).map(value => integer ? Math.round(value) : +value.toPrecision(3));
-  const texts = values.map(value => at < 0 ? String(value) : split(valueOf(key)).map((one, k) => k === at ? value : one).join(','));
+  const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values };
   filmOf(current()).showScan(scan);
   scanner?.close();

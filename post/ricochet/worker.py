@@ -17,7 +17,6 @@ import base64
 import ctypes
 import json
 import os
-import re
 import resource
 import select
 import signal
@@ -26,7 +25,7 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -68,7 +67,7 @@ class Bench:
         self.pace = 0.0  # of time, per second
         self.due = self.spoken = time.perf_counter()
         self.unseen = 0  # frames on the way to the page
-        self.actions: list[tuple[float, str, object]] = []  # since the start: time, what, value
+        self.actions: list[tuple] = []  # since the start: time, what, value as told, and exactly
         self.samples: deque[tuple[float, ...]] = deque(maxlen=MOST)
         self.happened: tuple | None = None
         self.goal: tuple[float, int, int] | None = None  # of a step that is on its way
@@ -115,17 +114,15 @@ class Bench:
 
     def change(self, wish: dict) -> None:
         """Let something else act on the disks from now on."""
-        self.act(
-            ("change", wish["settings"]),
-            lambda: self.simulation._change(told(wish["settings"])),
-        )
+        settings = wish["settings"]
+        self.act("change", settings, lambda: self.simulation._change(told(settings)))
 
     def heat(self, wish: dict) -> None:
         """Multiply all velocities."""
         factor = float(wish["factor"])
-        self.act(("heat", factor), lambda: speed_up(self.simulation, factor))
+        self.act("heat", factor, lambda: speed_up(self.simulation, factor))
 
-    def act(self, action: tuple[str, object], change: Callable[[], object]) -> None:
+    def act(self, what: str, value: object, change: Callable[[], object]) -> None:
         """Do something at a time that can be reached again."""
         now = self.simulation.time
         try:
@@ -134,7 +131,8 @@ class Bench:
         except (ProgramError, ValueError) as problem:
             refuse(problem, change=True)
             return
-        self.actions.append((now, *action))
+        exact = values_now(self.simulation, value) if what == "change" else value
+        self.actions.append((now, what, value, exact))
         self.renew(changed=True)
 
     def play(self, _: dict) -> None:
@@ -247,7 +245,7 @@ class Bench:
         """What it does, and what was changed on the way."""
         changes = [
             (when, name, value)
-            for when, what, values in self.actions
+            for when, what, values, _ in self.actions
             for name, value in (
                 values.items() if what == "change" else [("all velocities", f"times {values:g}")]
             )
@@ -400,16 +398,10 @@ def refuse(problem: Exception, change: bool = False) -> None:
     tell({"is": "problems", "change": change, "problems": found})
 
 
-def value_of(text: str) -> object:
-    """What Python has for a value as --set has it."""
-    found = []
-    for word in re.split(r"\s*,\s*", text.strip()):
-        try:
-            found.append(float(re.sub("[dD]", "e", word)))
-        except ValueError:
-            truth = {".true.": True, ".false.": False}
-            found.append(truth.get(word.lower(), word.strip("'\"")))
-    return found[0] if len(found) == 1 else tuple(found)
+def values_now(simulation: Simulation, names: Iterable[str]) -> dict[str, object]:
+    """What variables are at present, None for those that have no value."""
+    lines = dict(line.split(" = ", 1) for line in simulation._text("parameters").splitlines())
+    return {name: json.loads(lines.get(name, "null")) for name in names}
 
 
 def speed_up(simulation: Simulation, factor: float) -> None:
@@ -423,13 +415,12 @@ def script(name: str, text: str, actions: list[tuple], end: float) -> str:
     quoted = repr(text) if "\\" in text or '"""' in text else f'"""{text}"""'
     lines += ["from ricochet import Simulation", "", f"INPUT = {quoted}", ""]
     lines += ["with Simulation(INPUT) as simulation:"]
-    for when, what, value in actions:
+    for when, what, _, value in actions:
         lines.append(f"    simulation.advance(time={when!r})")
         if what == "heat":
             lines.append(f"    simulation.velocity = {value!r} * simulation.velocity")
         else:
-            values = {name: value_of(text) for name, text in value.items()}
-            lines.append(f"    simulation.change({values!r})")
+            lines.append(f"    simulation.change({value!r})")
     lines.append(f"    simulation.advance(time={end!r})")
     lines.append("    print(simulation.time, simulation.position, sep=chr(10))")
     return "\n".join(lines) + "\n"

@@ -134,8 +134,10 @@ def test_what_was_done_is_done_again_by_the_script_to_the_last_bit(address, tmp_
                 if rng.random() < 0.5:
                     await one.say("heat", factor=rng.uniform(0.5, 2))
                 else:
-                    xi = f"{rng.uniform(0.5, 1):.3f}"
-                    await one.say("change", settings={"contact.restitution": xi})
+                    xi = f"{rng.uniform(500, 1000):.3f}d-3"
+                    settings = {"contact.restitution": xi, "box.gravity": "2*-0.1"}
+                    wish = dict([rng.choice([*settings.items()])])
+                    await one.say("change", settings=wish)
                 await one.until("state", "problems")
             await one.say("pause")
             while (await one.until("state"))["playing"]:

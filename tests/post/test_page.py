@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import random
 import subprocess
 import sys
 from itertools import pairwise
@@ -12,6 +13,8 @@ from PIL import Image
 import player
 from ricochet import Simulation
 from ricochet.lab import form
+from ricochet.program import ProgramError
+from ricochet.worker import DISKS, told
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, wait_for
 
@@ -107,15 +110,15 @@ def moving(browser, than=0):
 
 
 def slide(browser, number, place):
-    """Drag a slider of the form."""
+    """Drag a slider of the form to a share of its length."""
     act = """const range = document.querySelectorAll('.slider [type=range]')[arguments[0]];
-    range.value = arguments[1]; range.dispatchEvent(new Event('input'));"""
+    range.value = arguments[1] * range.max; range.dispatchEvent(new Event('input'));"""
     browser.run(act, number, place)
 
 
 def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
     before, time = opened.run("return current().run"), inside(opened, "moment.time")
-    slide(opened, 3, 500)  # restitution
+    slide(opened, 3, 0.5)  # restitution
     wait_for(lambda: opened.run("return current().changes.length"))
     assert opened.run("return current().run") == before and inside(opened, "moment.time") >= time
     when, name, value = opened.run("return current().changes.at(-1)")
@@ -124,7 +127,7 @@ def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
     assert inside(opened, "film.settles") is False, "no Maxwell curve any more"
     opened.run("$('heat').querySelector('button:last-of-type').click()")
     wait_for(lambda: opened.run("return current().changes.length") == 2)
-    slide(opened, 1, 500)  # number of disks
+    slide(opened, 1, 0.5)  # number of disks
     moving(opened, before)
     assert inside(opened, "kinds[0].count") == int(opened.run("return textOf('species.gas.count')"))
     assert "number of disks = " in opened.run("return current().words")
@@ -146,10 +149,79 @@ def test_a_value_that_cannot_be_waits_alone(opened):
     assert opened.run("return document.querySelector('.wrong')") is None
 
 
+#: Texts that sliders of the input gas are given: number, variable, a value that can be.
+TYPED = [
+    (0, "species.gas.speed", lambda rng: rng.uniform(0.1, 9)),
+    (1, "species.gas.count", lambda rng: rng.randint(2, 900)),
+    (2, "species.gas.radius", lambda rng: rng.uniform(1e-4, 0.01)),
+    (3, "contact.restitution", lambda rng: rng.uniform(0.3, 1.0)),
+    (4, "box.gravity", lambda rng: rng.uniform(-9, 9)),
+]
+
+
+def some_text(rng, value):
+    """A number as people write it, or nearly."""
+    forms = "{}", "{:.3}", "{:.2e}", " {:.9f}", "{:.12}!"
+    text = str(value) if isinstance(value, int) else rng.choice(forms).format(value)
+    text = rng.choice([text, text.replace("e", "D"), text.replace(".", ",")])
+    if rng.random() < 0.5:
+        place = rng.randrange(len(text) + 1)
+        new = rng.choice(["", " ", "*", "/", "-", "abc", "2*", "'", "=", ",,", "½", "1 ", "nan"])
+        text = rng.choice([text[:place] + new + text[place + 1 :], new])
+    return text
+
+
+def type_at(browser, number, text):
+    """Type beside a slider, and Enter."""
+    field = "document.querySelectorAll('.slider input:not([type])')[arguments[0]].select()"
+    browser.run(field, number)
+    for key in text or "\ue003":  # backspace
+        browser.press(key)
+    browser.press("\ue007")  # enter
+
+
+def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(opened):
+    """As the program judges it; nothing else changes."""
+    rng, path = random.Random(8), ROOT / "input/gas.nml"
+    opened.run("""const old = hear; hear = (source, news) =>
+        news.is === 'file' ? window.kept = atob(news.body) : old(source, news);""")
+    good, waiting = {}, set()
+    for _ in range(40):
+        number, key, value = rng.choice(TYPED)
+        text = some_text(rng, value(rng))
+        before = opened.run("return [current().run, current().changes.length]")
+        type_at(opened, number, text)
+        done = f"return !busy && !again && ('{key}' in state.waiting || !differs('{key}'))"
+        wait_for(lambda script=done: opened.run(script))
+        plain = text.strip().replace(",", ".")
+        wish = good | {key: f"0,{plain}" if key == "box.gravity" else plain}
+        try:
+            with Simulation._of(path.read_text(), told(wish)) as trial:
+                fine = trial.count <= DISKS
+        except ProgramError:
+            fine = False
+        if fine:
+            good = wish
+        waiting = waiting - {key} if fine else waiting | {key}
+        wrong = """return [...document.querySelectorAll('.wrong')].map(
+            one => one.querySelector('.problem').textContent);"""
+        said = opened.run(wrong)
+        assert len(said) == len(waiting) and all(said), (text, said)
+        assert key in opened.run("return Object.keys(state.waiting)") or fine, text
+        assert fine or before == opened.run("return [current().run, current().changes.length]")
+        opened.run("window.kept = ''; filmOf(current()).send({ do: 'keep', part: 'input' })")
+        wait_for(lambda: opened.run("return window.kept"))
+        with (
+            Simulation(opened.run("return window.kept")) as there,
+            Simulation._of(path.read_text(), told(good)) as expected,
+        ):
+            assert there.parameters == expected.parameters, text
+
+
 def test_kept_runs_stand_beside_the_next_in_equal_boxes_and_plots(opened):
     opened.press("k")
     moving(opened, 1)
-    slide(opened, 0, 700)
+    slide(opened, 0, 0.7)
     wait_for(lambda: "speed" in opened.run("return current().words"))
     sizes = """return state.boxes.map(box => filmOf(box).document.getElementById('stage'))
     .map(stage => [stage.offsetWidth, stage.offsetHeight].join());"""
