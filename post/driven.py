@@ -2,37 +2,47 @@
 
     python post/driven.py runs/heated/*.h5 -o heated.png --csv heated.csv
     python post/driven.py runs/demon/*.h5 --show share -o demon.png
+    python post/driven.py runs/constant_pressure/*.h5 --show width -o width.png
 
 --show temperature: kT of all N disks, m <(v - u)^2> / 2 times N / (N - 1).  Dashed, for equal disks
 that noise heats in a periodic box: where heating and collisions balance (van Noije and Ernst 1998);
 for equal elastic disks in a box with one side that moves steadily: the adiabat from the equation of
 state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several
 runs, for one has no error of its own once the side stands.
+--show width: of the box, a side of which disks push (motion = 'free').  Dashed, for equal elastic
+disks: its mean, and a standard deviation more and less, by the equation of state, at constant
+enthalpy (docs/theory.md).  Printed besides: the deviation; and the largest changes of the enthalpy,
+over its own, and of the side's momentum less what force and disks gave it, over what disks gave.
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.
 --show cluster: share of the disks in the largest cluster, in which gaps are below a tenth of the
 mean diameter.
 
-A curve for each run, of means over a sixtieth of the time; a colour for each input and species.
+A curve for each run, of means over a sixtieth of the time (of a width over a thousandth); a colour
+for each input and species.
 Printed: the mean over the second half of the time, its error, and its ratio to the theory; of
 `share` in the half of the box that is the fuller one at another time.  Pictures: the end of the
 first run of each input, or of a single input its start and its end; the smallest disks are drawn
 larger.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 from ricochet import Run, RunError, drawing, hard_disks, theory
 from ricochet.drawing import plt
 from ricochet.nature import Refused
+from ricochet.reader import SIDES
 from ricochet.script import command_line, launch, measured, over_runs, report
-from ricochet.statistics import Estimate, grows, series_mean, windows
+from ricochet.statistics import Estimate, combined, grows, series_mean, windows
 from ricochet.structure import largest_cluster
 from ricochet.thermodynamics import packing
 
 import numpy as np
 
 MOST_PICTURES = 3
-POINTS = 60  # of a curve
+POINTS, FINE = 60, 1000  # of a curve; of one that fluctuates as it should
 HEIGHT = 4.5  # of a picture in inches
 GAP = 0.1  # of a cluster, in mean diameters
 SMALLEST = 2.2  # points across that a disk is drawn with at least
@@ -59,16 +69,74 @@ def noise_law(run: Run) -> float | None:
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
     """What lasts under noise, or the adiabat at the observables."""
-    moves = [side.get("motion", "still") != "still" for side in run.sides]
-    steady = [k for k, side in enumerate(run.sides) if side.get("motion") == "steady"]
-    if not run.nature <= {"moving", "walled", "turning"} or len(steady) != 1 or sum(moves) > 1:
+    side = only_moving(run, "steady")
+    if side is None:
         return noise_law(run)
-    time, kt = run.observable("all/temperature")
-    axis, (lower, upper) = steady[0] // 2, run.sides_at(time)
-    widths, height = (upper - lower)[:, axis], float(run.edges[1 - axis])
-    walled = not run.periodic[1 - axis]
-    factor = hard_disks.adiabat(widths, height, run.count, float(run.radius[0]), walled)
-    return kt[0] * run.count / (run.count - 1) * factor
+    kt = run.observable("all/temperature").value
+    return kt[0] * run.count / (run.count - 1) * adiabat(run, side, widths(run, side))
+
+
+def only_moving(run: Run, motion: str) -> int | None:
+    """The number of the only side that moves, if it does so, and equal elastic disks are inside."""
+    moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
+    plain = run.nature <= {"moving", "walled", "turning"} and len(moves) == 1
+    return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
+
+
+def widths(run: Run, side: int) -> np.ndarray:
+    """(S,) widths of the box along the way of a side, at the observables."""
+    lower, upper = run.sides_at(run.observable("total_energy").time)
+    return (upper - lower)[:, side // 2]
+
+
+def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
+    """T over that at the first of the widths (W,)."""
+    height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
+    return hard_disks.adiabat(widths, height, run.count, float(run.radius[0]), walled)
+
+
+def width(run: Run) -> Curves:
+    """Of the box along the way of a side that disks push."""
+    if not run.pushed:
+        raise Refused(f"{run.path}: has no side that disks push (motion = 'free')")
+    return {"": (run.observable("total_energy").time, widths(run, min(run.pushed)))}
+
+
+class Room(NamedTuple):
+    """A width that fluctuates."""
+
+    mean: float
+    deviation: float
+
+
+def width_law(run: Run) -> Room | None:
+    """At constant enthalpy, of a fluid; the side is at rest at first."""
+    side = only_moving(run, "free")
+    if side is None:
+        return None
+    along = bool(run.periodic[1 - side // 2])  # keeps its momentum
+    flow = along * run.observable("momentum").value[0, 1 - side // 2] ** 2 / 2 / run.mass.sum()
+    energy = run.observable("all/kinetic_energy").value[0] * run.count - flow
+    start, force = widths(run, side)[:1], float(run.sides[side]["force"])
+    grid = np.linspace(0, start + energy / force, 20002)[1:-1, 0]
+    places = -run.count * np.log(adiabat(run, side, np.append(start, grid))[1:])
+    left = energy + force * (start - grid)
+    mean, variance = theory.pushed_width(grid, places, 2 * run.count + 1 - along, left)
+    least = grid[np.isnan(places).sum()]
+    return Room(mean, variance**0.5) if mean - 4 * variance**0.5 > least else None
+
+
+def balances(run: Run) -> tuple[float, float]:
+    """The largest changes of what disks and side have together: of enthalpy, and of momentum."""
+    k, side = next((k, run.sides[k]) for k in run.pushed)
+    time, energy = run.observable("total_energy")
+    speed, impulse = (
+        run.observable(f"sides/{SIDES[k]}/{what}").value for what in ("velocity", "impulse")
+    )
+    speed, given = np.ravel(speed), (-1) ** k * impulse[:, k // 2]
+    energy = energy + side["mass"] * speed**2 / 2 + side["force"] * widths(run, k)
+    momentum = side["mass"] * speed - side["force"] * time - given
+    return np.ptp(energy) / energy[0], np.ptp(momentum) / np.abs(given).max()
 
 
 def share(run: Run) -> Curves:
@@ -126,11 +194,25 @@ def cluster(run: Run) -> Curves:
 
 #: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
+    "width": ("width of the box (reduced units)", width, width_law, np.asarray),
     "temperature": ("kT (reduced units)", temperature, temperature_law, np.asarray),
     "share": ("share of the disks in the left half", share, demon_law, fuller),
     "height": ("mean height (reduced units)", height, lambda run: None, np.asarray),
     "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, np.asarray),
 }
+
+
+def on_average(laws: list) -> np.ndarray | float | Room | None:
+    """That of runs that differ by their seed, and so in how much energy they start with."""
+    rooms = all(isinstance(law, Room) for law in laws)
+    return Room(*map(float, np.mean(laws, axis=0))) if rooms else laws[0]
+
+
+def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
+    """Where lines of a law are drawn."""
+    if isinstance(law, Room):
+        return [law.mean, law.mean - law.deviation, law.mean + law.deviation]
+    return [] if law is None else [law, 1 - law] if compared is fuller else [law]
 
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
@@ -144,25 +226,27 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
     return groups
 
 
-def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict) -> None:
+def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict, points: int):
     """Solid what was measured, dashed what should last."""
     for (key, curves), colour in zip(tracks.items(), drawing.colours(len(tracks)), strict=True):
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
-            means = windows(time, value, (time[-1] - time[0]) / POINTS)
+            means = windows(time, value, (time[-1] - time[0]) / points)
             style = {"label": label * (k == 0)} | drawing.lone(means[0])
-            axes.plot(*means, color=colour, lw=1, **style)
+            axes.plot(*means, color=colour, lw=1, alpha=1 if points == POINTS else 0.4, **style)
         for level in laws[key[0]]:
             over = curves[0][0] if np.ndim(level) else np.array([0, curves[0][0][-1]])
             axes.plot(over, np.broadcast_to(level, over.shape), color=colour, ls="--", lw=1.6)
     if any(laws.values()):
         axes.plot([], [], color="black", ls="--", label="theory")
-    top = 1.06 * axes.dataLim.y1
-    axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(0, top))
+    bottom, top = 0 if points == POINTS else 0.9 * axes.dataLim.y0, 1.06 * axes.dataLim.y1
+    axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(bottom, top))
     axes.legend()
 
 
-def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> plt.Figure:
+def draw(
+    groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str, points: int
+) -> plt.Figure:
     """The curves, and pictures."""
     runs = [run for own in groups.values() for run in own]
     pictures = [(own[0], -1, name) for name, own in groups.items()][:MOST_PICTURES]
@@ -175,7 +259,7 @@ def draw(groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str) -> 
         figsize=(1.5 * HEIGHT + width * len(pictures) + 1, HEIGHT + 1),
         width_ratios=[1.5 * HEIGHT, *[width] * len(pictures)],
     )
-    draw_curves(axes, tracks, laws)
+    draw_curves(axes, tracks, laws, points)
     axes.set_ylabel(label)
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         drawing.draw_box(panel, run, run.time[frame])
@@ -205,7 +289,7 @@ def main() -> None:
         for run in runs:
             for species, curve in curves_of(run).items():
                 tracks.setdefault((name, species), []).append(curve)
-    expected = {name: law_of(runs[0]) for name, runs in groups.items()}
+    expected = {name: on_average([law_of(run) for run in runs]) for name, runs in groups.items()}
     for (name, species), curves in tracks.items():
         late = [compared(value[time >= (time[0] + time[-1]) / 2]) for time, value in curves]
         about = ", ".join(filter(None, (args.show, name, species)))
@@ -215,16 +299,21 @@ def main() -> None:
             map(grows, late)
         )
         law, mean, error = expected[name], row["late"], row["late_error"]
+        if isinstance(law, Room):
+            squares = combined([series_mean((half - mean) ** 2) for half in late])
+            found = Estimate(squares.mean**0.5, squares.error / 2 / squares.mean**0.5)
+            row |= measured("deviation", found) | {"theory_deviation": law.deviation}
+            changes = np.max([balances(run) for run in groups[name]], axis=0)
+            row |= dict(zip(("enthalpy_change", "momentum_change"), changes, strict=True))
+            law = law.mean
         if np.ndim(law):
             time = curves[0][0]
             law = float(np.mean(law[time >= (time[0] + time[-1]) / 2]))
         row |= {"theory": law} | measured("ratio", law and Estimate(mean / law, error / law))
         rows.append(row)
-    laws = {
-        name: [] if law is None else [law, 1 - law] if compared is fuller else [law]
-        for name, law in expected.items()
-    }
-    report(args, draw(groups, tracks, laws, label), rows, notes=notes)
+    laws = {name: levels(law, compared) for name, law in expected.items()}
+    points = FINE if args.show == "width" else POINTS
+    report(args, draw(groups, tracks, laws, label, points), rows, notes=notes)
 
 
 if __name__ == "__main__":

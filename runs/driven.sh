@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Gases that walls heat and shear, rough disks, transport in equilibrium, and what shaking, kicks and
-# swimming do to disks: Leidenfrost, Maxwell's demon, the Brazil nut, noise, active disks; four seeds
-# each.
+# Gases that walls heat and shear, rough disks, transport in equilibrium, and what pistons, shaking,
+# kicks and swimming do to disks: Leidenfrost, Maxwell's demon, the Brazil nut, noise, active disks;
+# four seeds each.
 . "$(dirname -- "${BASH_SOURCE[0]}")/common.sh"
 
 for system in fourier couette rough; do
@@ -42,6 +42,8 @@ done <<'TABLE'
 leidenfrost height side.bottom.period_0.3_seed_1 side.bottom.period=0.3,2
 demon share side.bottom.velocity_0.5_seed_1 side.bottom.velocity=0.5,0.9
 nut height seed_1
+piston temperature seed_1
+constant_pressure width seed_1
 heated temperature restitution_0.8_seed_1 contact.restitution=0.8,0.9
 active cluster speed_1_seed_1 drive.speed=1,0
 TABLE

@@ -98,6 +98,20 @@ def rough_temperatures(
     return vectors @ (parts[:, None] * np.exp(values[:, None] * np.asarray(tau, dtype=float)))
 
 
+def pushed_width(
+    widths: np.ndarray, places: np.ndarray, squares: int, energy: np.ndarray
+) -> tuple[float, float]:
+    """Mean and variance of the width that elastic disks and a constant force leave each other.
+
+    Of the density Q(w) (H - F w)^(f/2 - 1) at widths (W,) equally far apart: `places` is ln Q, NaN
+    where it is not known, `squares` f, with that of the side, `energy` H - F w (docs/theory.md).
+    """
+    log = np.where(np.isnan(places), -np.inf, places) + (squares / 2 - 1) * np.log(energy)
+    density = np.exp(log - log.max())
+    mean = np.average(widths, weights=density)
+    return float(mean), float(np.average((widths - mean) ** 2, weights=density))
+
+
 def demon_share(climb: float, layers: float, xi: float) -> float:
     """Share of a dilute gas that lasts in the fuller of two chambers; 1/2 above the threshold.
 

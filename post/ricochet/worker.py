@@ -47,6 +47,7 @@ AHEAD = 2  # frames that the page has not drawn yet
 SPEAK = 0.1  # s between two messages with numbers
 FEW = 20  # disks whose events to come are told
 COMING = 6  # of them
+WAY = 0.2  # of the box, that is left to a side that disks push
 FEWEST = 40  # samples of a mean with an error
 MOST = 4000  # samples that are kept
 LOOK = 1.0  # s that a value of a scan takes
@@ -229,6 +230,9 @@ class Bench:
         run, simulation = self.run, self.simulation
         now = simulation.time
         lower, upper = run.sides_at(now)
+        if np.any(lower < run.room[0]) or np.any(upper > run.room[1]):
+            self.renew(changed=True)
+            return
         head = [now, 2 * simulation.collisions / run.count, lower[0], upper[0], lower[1], upper[1]]
         parts = [simulation.position, simulation.velocity]
         if TURNS in run.elements:
@@ -294,6 +298,14 @@ class Pictured(Run):
         return Series(np.array([self.simulation.time]), value[None])
 
     pushed = property(Run.pushed.func)  # at each look: sides that disks push move on
+
+    @cached_property
+    def room(self) -> tuple[np.ndarray, np.ndarray]:
+        """With some way left for such sides."""
+        way = np.zeros(4)
+        way[[*self.pushed]] = WAY * self.edges.max()
+        lower, upper = Run.room.func(self)
+        return lower - way[::2], upper + way[1::2]
 
     @cached_property
     def nature(self) -> Nature:

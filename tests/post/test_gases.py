@@ -469,6 +469,26 @@ def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
         assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None
 
 
+@pytest.mark.parametrize("across", ["wall", "periodic"])
+def test_a_side_that_disks_push_is_drawn_beside_its_mean_and_deviation(simulated, tmp_path, across):
+    text = f"""&box boundary = '{across}', 'wall' / &side name = 'top' motion = 'free' mass = 5
+    force = 70 / &species count = 50 packing_fraction = 0.2 speed = 1 / &stop time = 300 /
+    &output observables_every_time = 0.02 /"""
+    runs = [simulated(text, f"run.seed={seed}", name=f"{seed}") for seed in (1, 2, 3)]
+    (row,) = drawn(tmp_path, "driven", *(run.path for run in runs), "--show", "width")
+    for found in ("late", "deviation"):
+        law = float(row["theory" if found == "late" else "theory_deviation"])
+        assert float(row[found]) == pytest.approx(law, abs=4 * float(row[f"{found}_error"]))
+        assert float(row[f"{found}_error"]) < 0.1 * float(row["deviation"])
+    assert max(float(row["enthalpy_change"]), float(row["momentum_change"])) < 1e-12
+    short = text.replace("time = 300", "time = 0.1")
+    for change in ("contact.restitution=0.9", "box.gravity=0,-1", "species.packing_fraction=0.53"):
+        crushed = simulated(short, change, "side.top.force=7000")
+        assert driven.width_law(crushed) is None, "lossy, falling, or freezing"
+    with pytest.raises(Refused, match="no side that disks push"):
+        driven.width(simulated("&species count = 2 radius = 0.1 / &stop time = 1 /"))
+
+
 def test_energy_is_kept_as_its_balance_says(simulated, tmp_path):
     text = """&side name = 'left' temperature = 2 / &contact restitution = 0.9 /
     &side name = 'right' motion = 'sine' amplitude = 0.2 period = 1 /

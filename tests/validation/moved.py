@@ -8,7 +8,7 @@ from driven import fuller, share
 from ricochet import Run
 from ricochet.statistics import Estimate, combined, series_mean
 from ricochet.hard_disks import adiabat
-from ricochet.theory import demon_share
+from ricochet.theory import demon_share, pushed_width
 
 from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative, sigmas, within
 from .estimators import each, over, several
@@ -118,8 +118,7 @@ PUSHED = ensemble(
     4,
     box={"upper": (WIDE, 1)},
     side={"name": "right", "motion": "free", "mass": 20.0, "force": FORCE},
-    species={"name": "gas", "count": PUSHING, "packing_fraction": 0.3, "temperature": 1.0,
-             "exact_temperature": 1.0},
+    species={"name": "gas", "count": PUSHING, "packing_fraction": 0.3, "speed": sqrt(2)},
     stop={"time": 1000},
     output={"observables_every_time": 0.1},
 )  # fmt: skip
@@ -146,26 +145,18 @@ def room(*runs: Run) -> Estimate:
     return several([combined([series_mean(one) for one in own]) for own in (widths, squares)])
 
 
-def room_law(widths: np.ndarray, factor: np.ndarray, freedom: float, energy: float) -> list[float]:
-    """The same of the density Q(w) (H - F w)^(f / 2 - 1), given T on the adiabat as Q^(-2 / f)."""
-    log = np.log(factor) + (freedom / 2 - 1) * np.log(energy)
-    density = np.exp(log - log.max())
-    mean = np.average(widths, weights=density)
-    return [float(mean), float(np.average((widths - mean) ** 2, weights=density))]
-
-
-def room_of_gas() -> list[float]:
-    """Of the gas: Q is what its adiabat says."""
+def room_of_gas() -> tuple[float, float]:
+    """The same by theory: its adiabat tells how many places the gas has."""
     radius, widths = sqrt(0.3 * WIDE / PUSHING / pi), np.linspace(1, 2.2, 20001)
-    q = adiabat(widths, 1.0, PUSHING, radius, walled=True) ** -float(PUSHING)
-    return room_law(widths, q, 2 * PUSHING + 1, PUSHING + FORCE * (WIDE - widths))
+    places = -PUSHING * np.log(adiabat(widths, 1.0, PUSHING, radius, walled=True))
+    return pushed_width(widths, places, 2 * PUSHING + 1, PUSHING + FORCE * (WIDE - widths))
 
 
-def room_of_rods() -> list[float]:
+def room_of_rods() -> tuple[float, float]:
     """Of rods: Q is the third power of the free length."""
     energy = 3 + 2.0
     widths = np.linspace(6 * ROD, energy, 200002)[1:-1]
-    return room_law(widths, (widths - 6 * ROD) ** 3, 4, energy - widths)
+    return pushed_width(widths, 3 * np.log(widths - 6 * ROD), 4, energy - widths)
 
 
 # --- Maxwell's demon: two chambers, a sawtooth floor, a hole above it ---
