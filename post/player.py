@@ -83,12 +83,21 @@ def in_room(run: Run, place: np.ndarray) -> np.ndarray:
 
 
 def sides(run: Run) -> list[dict]:
-    """Of each side its place, and how it moves about it, heats and slides."""
+    """Of each side its place, how it moves about it or was pushed, heats and slides."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
-    return [
+    found = [
         {"place": float(at)} | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
         for at, side in zip(places, run.sides, strict=True)
     ]
+    for k, (time, place) in run.pushed.items():
+        some = evenly(len(time), MOST_FRAMES)
+        found[k]["way"] = [time[some].tolist(), np.ravel(place)[some].tolist()]
+    return found
+
+
+def evenly(count: int, most: int) -> np.ndarray:
+    """Numbers of at most so many of `count` samples."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def laws_of(run: Run, group: str) -> list[dict]:
@@ -208,7 +217,7 @@ def curves(run: Run) -> dict:
         with suppress(RunError):
             found["time"], series[name] = run.observable(name)
     time = found.get("time", run.time[[0, -1]])
-    some = np.unique(np.linspace(0, len(time) - 1, min(len(time), MOST_SAMPLES)).astype(int))
+    some = evenly(len(time), MOST_SAMPLES)
 
     def rounded(name: str) -> list | None:
         values = series.get(name, np.full(len(time), np.nan))

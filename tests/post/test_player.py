@@ -398,12 +398,17 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     text = f"&run seed = {seed} /\n&box lower = -3, 2 upper = -1.8, 3.1 /\n" + FEW
     for name in rng.choice(SIDES, rng.integers(1, 4), replace=False):
         size, period, phase = rng.uniform((0.02, 0.3, 0), (0.1, 1, 1))
-        kind, words = rng.choice(["sine", "parabolic", "steady"]), f"amplitude = {size} "
+        kind = rng.choice(["sine", "parabolic", "steady", "free"])
+        words = f"amplitude = {size} "
         words += f"period = {period} phase = {phase}"
         if kind == "steady":
             words = f"velocity = {(phase - 0.5) * size} begin = {period / 9} end = {period}"
+        if kind == "free":
+            words = f"mass = {period} force = {30 * size}"
         text += f"&side name = '{name}' motion = '{kind}' {words} /\n"
-    run = simulated(text, "output.frames_every_events=1", "output.event_log=.true.")
+    samples = ("frames", "observables")
+    every = [f"output.{what}_every_events=1" for what in samples]
+    run = simulated(text, *every, "output.event_log=.true.")
     events, reach = run.events, run.radius[:, None] + [-1e-9, -1e-9]
     (lower, upper), place = run.sides_at(run.time), run.position[:]
     assert np.all(place - reach >= lower[:, None]) and np.all(place + reach <= upper[:, None])
