@@ -23,23 +23,20 @@ import json
 import re
 import webbrowser
 from argparse import Namespace
-from collections.abc import Callable, Iterable
+from collections import defaultdict
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 from ricochet import Run, RunError
 from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
 from ricochet.files import destination
-from ricochet.nature import KICKED, known, rows_of
-from ricochet.paths import MOST_AT_ONCE, Paths
+from ricochet.nature import known, rows_of
+from ricochet.paths import seen, turns_between, why_unknown
 from ricochet.reader import SIDES, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
-from ricochet.thermodynamics import has_log
 
 import numpy as np
 from matplotlib.colors import to_hex
-from tqdm import tqdm
 
 PAGE = Path(__file__).with_name("page")  # what the page is made of
 INPUTS = Path(__file__).resolve().parents[1] / "input"
@@ -48,13 +45,13 @@ SWING, STROKE = ("amplitude", "period", "phase"), ("velocity", "begin", "end")  
 LAWS = ("motion", *SWING, *STROKE, "temperature", "speed")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
-TURN = (16 + 8) * 4 / 3  # bytes of a collision of a disk between two frames, and of its time
+TURN = (16 + 8) * 4 / 3  # bytes of a turn of a disk between two frames, and of half an event
 MOST_FRAMES = 20000
 MOST_RADII = 256  # that are told apart
 FEW_DISKS = 20  # up to here every digit is in the page, and the events to come
 MOST_SAMPLES = 2000  # of a plot
 ENERGIES = ("kinetic", "potential", "rotational")
-MOST_EVENTS = 20000  # to come
+MOST_AT_ONCE = 200000  # disks of the frames that are read together
 
 
 def frames_that_fit(run: Run, room: float) -> int:
@@ -106,76 +103,69 @@ def laws_of(run: Run, group: str) -> list[dict]:
     return [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
 
 
-def moving(run: Run, frames: list[int], before: int, top: float) -> dict[str, np.ndarray]:
-    """(T, N, ...) what differs from frame to frame; `before` is the frame before them.
+def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
+    """What differs from frame to frame, of all disks, read in parts.
 
     Positions in units of the room, as 16-bit integers, velocities in those of the fastest component
     in the frame, likewise; of few disks with every digit.  Collisions as places 0 to 255 on their
     scale up to `top`; periods crossed along x and y since the frame before, four bits each; angles.
     """
-    inside, velocity = in_room(run, run.position[frames]), run.velocity[frames]
-    if run.count > FEW_DISKS:
-        inside = np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
-        fastest = np.abs(velocity).max(axis=(1, 2), keepdims=True)
-        velocity = velocity / np.where(fastest > 0, fastest, 1)
-        velocity = np.round(32767 * velocity).astype("<i2")
-    else:
-        fastest = np.ones(len(frames))
-    found = {"positions": inside, "velocities": velocity, "fastest": fastest.astype("<f8")}
-    if run.collisions is not None:
-        share = np.log1p(run.collisions[frames]) / np.log1p(top)
-        found["hits"] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
-    if run.image is not None:
-        x, y = np.moveaxis(np.clip(np.diff(run.image[[before, *frames]], axis=0), -7, 7) + 8, -1, 0)
-        found["shifts"] = (16 * x + y).astype("u1")
-    if "orientation" in run.elements:
-        found["angles"] = run.orientation[frames].astype("<f4")
+    found: dict[str, bytearray] = defaultdict(bytearray)
+    at_once = max(1, MOST_AT_ONCE // run.count)
+    for first in range(0, len(frames), at_once):
+        some, before = frames[first : first + at_once], frames[max(0, first - 1)]
+        inside, velocity = in_room(run, run.position[some]), run.velocity[some]
+        fastest = np.ones(len(some))
+        if run.count > FEW_DISKS:
+            inside = np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
+            fastest = np.abs(velocity).max(axis=(1, 2))
+            unit = np.where(fastest > 0, fastest, 1)[:, None, None]
+            velocity = np.round(32767 * velocity / unit).astype("<i2")
+        parts = {"positions": inside, "velocities": velocity, "fastest": fastest}
+        if run.collisions is not None:
+            share = np.log1p(run.collisions[some]) / np.log1p(top)
+            parts["hits"] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
+        if run.image is not None:
+            crossed = np.clip(np.diff(run.image[[before, *some]], axis=0), -7, 7) + 8
+            parts["shifts"] = (16 * crossed[..., 0] + crossed[..., 1]).astype("u1")
+        if "orientation" in run.elements:
+            parts["angles"] = run.orientation[some].astype("<f4")
+        for name, part in parts.items():
+            found[name] += part.tobytes()
     return found
 
 
-def coded_turns(
-    run: Run, paths: Paths, frames: list[int]
-) -> tuple[dict[str, bytearray], list[bool]]:
-    """Collisions between the frames, and whether the paths of all disks are known there.
+def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[str, np.ndarray]]:
+    """Collisions per disk in each frame, events and paths; these need a log that is not too long.
 
-    Of each gap between two frames the number of collisions; of each collision its disk, and three
-    numbers: when, as share of the gap, and the velocity afterwards.
+    Events as their times and partners.  Of each gap between two frames the number of turns; of each
+    turn its disk, and three numbers: when, as share of the gap, and the velocity afterwards.
     """
-    kind = "<f8" if run.count <= FEW_DISKS else "<f4"
-    blocks = {name: bytearray() for name in ("gaps", "turning", "turns")}
-    sure = []
-    for k, turns in enumerate(paths.along(frames)):
-        start, end = run.time[[frames[k], frames[k + 1]]]
-        when = (turns.time - start) / (end - start if end > start else 1)
-        blocks["gaps"] += np.uint32(len(when)).astype("<u4").tobytes()
-        blocks["turning"] += turns.disk.astype("<u4").tobytes()
-        blocks["turns"] += np.column_stack([when, turns.velocity]).astype(kind).tobytes()
-        sure.append(not turns.guessed.any())
-    return blocks, [*sure, True]
-
-
-def told_by_log(
-    run: Run, paths: Paths, frames: list[int], most: float
-) -> tuple[dict, dict[str, np.ndarray]]:
-    """Collisions per disk in each frame, and the events of few disks; the moments of all events.
-
-    No events and moments without a log, no moments if it is longer than `most`.
-    """
-    facts, moments = {"events": None}, dict.fromkeys(("pairs", "others"), np.zeros(0))
-    if paths.log is None:
-        facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
-        return facts, moments
-    time, i, j = paths.log[:3]
-    before = np.searchsorted(time[j > 0], run.time[frames], "right")
-    facts["collisions"] = (2 * before / run.count).tolist()
-    some = slice(*np.searchsorted(time, run.time[[frames[0], frames[-1]]], "right"))
-    time, i, j = time[some], i[some], j[some]
-    if len(time) <= most:
-        moments = {"pairs": time[j > 0], "others": time[j <= 0]}
-    if run.count <= FEW_DISKS:
-        parts = {"time": time, "i": i - 1, "j": j - 1}
-        facts["events"] = {name: own[:MOST_EVENTS].tolist() for name, own in parts.items()}
-    return facts, moments
+    exact, known = run.count <= FEW_DISKS, run.collisions_per_disk_at(run.time)[frames]
+    facts = {"collisions": known.tolist(), "known": False, "events": False}
+    try:
+        log = run.events
+    except RunError:  # that it is not there, or damaged, does not stop a film
+        facts["note"] = "output.event_log tells the paths between"
+        return facts, {}
+    ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
+    facts["collisions"] = (2 / run.count * pairs[ends]).tolist()
+    some = slice(ends[0], ends[-1])
+    if ends[-1] - ends[0] + pairs[ends[-1]] - pairs[ends[0]] > most:
+        return facts | {"note": "too many collisions between"}, {}
+    facts |= {"events": exact, "note": why_unknown(run, log)}
+    blocks = {"when": log.time[some].astype("<f8")}
+    blocks |= {name: (own[some] - 1).astype("<i4") for name, own in (("i", log.i), ("j", log.j))}
+    if not facts["note"]:
+        facts["known"] = True
+        turns, time = turns_between(run, log, frames, ends), run.time[frames]
+        apart = np.append(np.diff(time), 1)[turns.frame]
+        share = (turns.time - time[turns.frame]) / np.where(apart > 0, apart, 1)
+        blocks["gaps"] = np.bincount(turns.frame, minlength=len(frames)).astype("<u4")
+        blocks["turning"] = turns.disk.astype("<u4")
+        numbers = np.column_stack([share, turns.velocity])
+        blocks["turns"] = numbers.astype("<f8" if exact else "<f4")
+    return facts, blocks
 
 
 def species(run: Run) -> list[dict]:
@@ -243,7 +233,6 @@ def scene(run: Run) -> tuple[dict, dict]:
     radii, own = radii_of(run)
     facts = {
         "exact": run.count <= FEW_DISKS,
-        "kicked": bool(run.nature & KICKED),
         "settles": run.nature.in_equilibrium,
         "gravity": run.gravity.tolist(),
         "lower": run.room[0].tolist(),
@@ -275,35 +264,22 @@ def film(
     colour: str,
     traced: list[int],
     room: float = ROOM,
-    watched: Callable[[list], Iterable] = iter,
 ) -> tuple[dict, dict]:
-    """What the page needs to know, and the arrays that move as name -> bytes.
-
-    `watched` passes on the parts in which frames are read, as tqdm does.
-    """
+    """What the page needs to know, and the arrays that move as name -> bytes."""
     tops = {name: scale_top(run, frames, name) for name in quantities(run)}
-    parts, before, at_once = [], frames[0], max(1, MOST_AT_ONCE // run.count)
-    for some in watched([frames[k : k + at_once] for k in range(0, len(frames), at_once)]):
-        parts.append(moving(run, some, before, tops.get("collisions", 1)))
-        before = some[-1]
-    blocks = {name: b"".join(part[name].tobytes() for part in parts) for name in parts[0]}
-    most = 0.4 * room // TURN  # the rest of its half is for the moments of events
-    paths = Paths(run, most)
-    turns, sure = coded_turns(run, paths, frames)
-    told, moments = told_by_log(run, paths, frames, most / 2)
-    blocks |= turns | {name: when.astype("<f8").tobytes() for name, when in moments.items()}
+    told, blocks = told_by_log(run, frames, room / 2 // TURN)
+    blocks = {name: block.tobytes() for name, block in blocks.items()}
+    blocks |= moving(run, frames, tops.get("collisions", 1))
     # Where displacements count from, without jumps until the first frame of the film.
     origin = run.unwrapped(0) + run.position[frames[0]] - run.unwrapped(frames[0])
     blocks["origins"] = in_room(run, origin).astype("<f4").tobytes()
     facts, own = scene(run)
     facts |= {
         "time": run.time[frames].tolist(),
-        "known": sure,
         "curves": curves(run),
         "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
         "traced": traced or ([0] if run.count == 1 else []),
-        "logged": has_log(run),
         **told,
     }
     return facts, blocks | own
@@ -399,13 +375,11 @@ def policy(style: str, script: str, *more: str) -> str:
     return "; ".join(rules)
 
 
-def chosen_film(
-    run: Run, args: Namespace, room: float, watched: Callable[[list], Iterable] = iter
-) -> tuple[list[int], tuple[dict, dict]]:
-    """The film that the options ask for, and its frames; `watched` is as in `film`."""
+def chosen_film(run: Run, args: Namespace, room: float) -> tuple[list[int], tuple[dict, dict]]:
+    """The film that the options ask for, and its frames."""
     frames = chosen_frames(run, args.frames, args.count or frames_that_fit(run, room))
     traced = chosen_disks(run, args.disks or [])
-    return frames, film(run, frames, chosen_colour(run, args.colour), traced, room, watched)
+    return frames, film(run, frames, chosen_colour(run, args.colour), traced, room)
 
 
 def whole(run: Run, colour: str | None = None) -> str:
@@ -437,9 +411,7 @@ def main() -> None:
     path = args.output or Path(run.path.name).with_suffix(".html")
     if path.suffix != ".html":
         raise RunError(f"{path}: a player ends in .html")
-    # Only here: a server makes films in threads, and the lock of tqdm may be lost to an interrupt.
-    bar = partial(tqdm, desc="player", unit="part", leave=False, disable=None)
-    frames, parts = chosen_film(run, args, ROOM, bar)
+    frames, parts = chosen_film(run, args, ROOM)
     text = page(run, texts(*parts))
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6

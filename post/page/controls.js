@@ -32,7 +32,7 @@ function prepareFilm() {
   $('sofar').hidden = film.speeds.rest;
   if (!film.speeds.rest) $('bars').textContent = 'Bars: share of the disks per unit of speed.'
     + (film.settles ? ' Curves: Maxwell’s law at the mean kinetic energy of the species.' : '');
-  $('guess').hidden = !film.known || film.known.every(Boolean);
+  $('between').textContent = film.note ? `Frames only: ${film.note}.` : '';
   $('event').hidden = !source.hasEvents();
 }
 

@@ -57,16 +57,15 @@ function cross(frame, moved) {
 // ---------- the way from frame to frame ----------
 
 // In the time between two frames a disk flies from the first one on, by way of its turns; each flight is straight, or a parabola
-// under gravity. Where not all ways are known all disks stand: the frame is shown as it is. What comes from a worker has no ways,
+// under gravity. Where the ways are not known all disks stand: the frame is shown as it is. What comes from a worker has no ways,
 // but frames that are close enough.
-let ways;  // of a film: the first collision after each frame (start); disk, and share of the time, new velocity of each (turns);
-           // times of all collisions of two disks (pairs), and of other ones, if they are known
-const stands = k => !film.known?.[k];
+let ways;    // of a film: the first turn after each frame (start); disk, and share of the time, new velocity of each (turns)
+let events;  // of a film: when, partners (i, j), and how many were collisions of two disks up to each (pairs)
 
 function move(time) {
   moment.time = clamp(time, first(), last());
   const k = moment.frame = frameAt(moment.time), here = past[k], then = past[k + 1], { place, velocity, crossed } = here;
-  const passed = stands(k) ? 0 : moment.time - here.time, share = passed && then ? passed / (then.time - here.time) : 0;
+  const passed = film.known ? moment.time - here.time : 0, share = passed && then ? passed / (then.time - here.time) : 0;
   const [width, height] = film.edges, [left, bottom] = film.lower, [wrapX, wrapY] = film.periodic, [gx, gy] = film.gravity;
   const { start, disk, turns } = ways ?? {}, stop = start?.[k + 1];
   moment.shown = here.time + passed;
@@ -98,7 +97,7 @@ function move(time) {
     if (wrapY) Y[i] -= height * Math.floor((y - bottom) / height);
     if (angles) angles[i] = here.angle[i] + (share && share * (then.angle[i] - here.angle[i]));
   }
-  moment.collisions = ways?.pairs.length ? past[0].collisions + 2 * upTo(ways.pairs, moment.shown) / disks : here.collisions;
+  moment.collisions = events?.when.length ? past[0].collisions + 2 * events.pairs[upTo(events.when, moment.shown)] / disks : here.collisions;
   const kinetic = kinds.map(() => 0), potential = kinds.map(() => 0), mean = (sum, s) => sum / kinds[s].count;
   for (let i = 0; i < disks; i++) {
     kinetic[speciesOf[i]] += 0.5 * masses[i] * (VX[i] * VX[i] + VY[i] * VY[i]);
@@ -127,20 +126,21 @@ function displacement(i) {
   return Math.hypot(UX[i] + x - origins[2 * i], UY[i] + y - origins[2 * i + 1]);
 }
 
-// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight); whether it is guessed.
+// The path of a disk between two moments, flight by flight: from, to, and what bends it (0, 0 if straight). Straight from frame
+// to frame if it is not known.
 function flights(i, from, to) {
   const result = [], plus = (a, b) => a.map((one, axis) => one + b[axis]);
   for (let k = frameAt(from); k < past.length - 1 && past[k].time < to; k++) {
-    const here = past[k], then = past[k + 1], h = then.time - here.time, guessed = stands(k), own = [], { start, disk, turns } = ways ?? {};
-    const pair = array => [array[2 * i], array[2 * i + 1]], g = guessed ? [0, 0] : film.gravity;
+    const here = past[k], then = past[k + 1], h = then.time - here.time, own = [], { start, disk, turns } = ways ?? {};
+    const pair = array => [array[2 * i], array[2 * i + 1]], g = film.known ? film.gravity : [0, 0];
     let place = pair(here.place), velocity = pair(here.velocity), since = 0;
-    if (guessed) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
+    if (!film.known) velocity = pair(then.place).map((end, axis) => (end - place[axis] + (here.crossed ? film.edges[axis] * (then.crossed[2 * i + axis] - here.crossed[2 * i + axis]) : 0)) / h);
     else for (let turn = start[k] + disk.subarray(start[k], start[k + 1]).indexOf(i); turn >= start[k] && turn < start[k + 1] && disk[turn] === i; turn++)
       own.push([h * turns[3 * turn], [turns[3 * turn + 1], turns[3 * turn + 2]]]);
     for (const [end, after] of [...own, [h, velocity]]) {
       const along = t => plus(place, velocity.map((v, axis) => (v + 0.5 * g[axis] * (t - since)) * (t - since)));
       const a = Math.max(since, from - here.time), b = Math.min(end, to - here.time);
-      if (b > a) result.push({ from: along(a), to: along(b), bend: g.map(one => one * (b - a) ** 2 / 4), guessed: guessed && !!ways });
+      if (b > a) result.push({ from: along(a), to: along(b), bend: g.map(one => one * (b - a) ** 2 / 4) });
       [place, velocity, since] = [along(end), after, end];
     }
   }
@@ -158,10 +158,12 @@ function eachSpeed(action) {
 
 // ---------- a film: a file that holds all of it ----------
 
+const running = counts => counts.reduce((sums, one) => { sums.push(sums.at(-1) + one); return sums; }, [0]);
+
 function loadFilm({ facts, blocks }) {
   setScene(facts, blocks);
   const { exact, time, lower, edges } = film, real = exact ? Float64Array : Float32Array;
-  const block = (name, kind) => new kind(bytes(blocks[name]).buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
+  const block = (name, kind) => new kind(bytes(blocks[name] ?? '').buffer), part = (array, k, width) => array?.subarray(k * width, (k + 1) * width);
   const positions = block('positions', exact ? Float64Array : Uint16Array), velocities = block('velocities', exact ? Float64Array : Int16Array);
   const fastest = block('fastest', Float64Array), [shifts, hits] = ['shifts', 'hits'].map(name => blocks[name] && bytes(blocks[name]));
   const turned = blocks.angles && block('angles', Float32Array);
@@ -173,9 +175,9 @@ function loadFilm({ facts, blocks }) {
   }, signs)));
   angles = turned && new Float32Array(disks);
   origins = block('origins', Float32Array).map((one, k) => lower[k % 2] + edges[k % 2] * one);
-  ways = { disk: block('turning', Uint32Array), turns: block('turns', real), start: [0] };
-  block('gaps', Uint32Array).forEach((count, k) => ways.start.push(ways.start[k] + count));
-  for (const name of ['pairs', 'others']) ways[name] = block(name, Float64Array);
+  ways = film.known ? { disk: block('turning', Uint32Array), turns: block('turns', real), start: running(block('gaps', Uint32Array)) } : null;
+  events = { when: block('when', Float64Array), i: block('i', Int32Array), j: block('j', Int32Array) };
+  events.pairs = running(events.j.map(j => j >= 0));
   source = fromFile;
   const atRest = past.at(-1).velocity.filter((v, k, all) => v === 0 && all[k ^ 1] === 0).length / (2 * disks);
   let most = 1.3 * film.scales.speed[1];
@@ -187,10 +189,10 @@ const fromFile = {
   counted: () => `frame ${moment.frame + 1}/${past.length}`,
   curves: () => film.curves,
   coming() {
-    const { time, i, j } = film.events, next = upTo(time, moment.time), one = k => [time[k], i[k], j[k]];
-    return { happened: next ? one(next - 1) : null, next: Array.from(time.slice(next, next + 20), (_, k) => one(next + k)) };
+    const { when, i, j } = events, next = upTo(when, moment.time), one = k => [when[k], i[k], j[k]];
+    return { happened: next ? one(next - 1) : null, next: Array.from(when.slice(next, next + 20), (_, k) => one(next + k)) };
   },
-  nextEvent: () => Math.min(...[ways.pairs, ways.others].map(times => times[upTo(times, moment.time)] ?? last())),
-  hasEvents: () => ways.pairs.length + ways.others.length > 0,
+  nextEvent: () => events.when[upTo(events.when, moment.time)] ?? last(),
+  hasEvents: () => events.when.length > 0,
   goesOn: () => live.on,
 };

@@ -17,11 +17,10 @@ async function ask() {
 }
 
 function receive(news) {
-  const started = live.stamp !== '', { time } = moment, own = started ? kinds.map(kind => kind.own) : [];
+  const started = live.stamp !== '', { time } = moment;
   const now = performance.now(), taken = Math.min(10, (now - live.heard) / 1000);
   live.heard = now;
   loadFilm(news);
-  kinds.forEach((kind, s) => { kind.own = own[s]; });
   live.stamp = news.stamp;
   live.on = !news.end;
   $('warning').textContent = news.end ? news.warning : '';

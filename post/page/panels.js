@@ -8,7 +8,7 @@ const safe = text => text.replace(/[&<]/g, sign => `&#${sign.charCodeAt(0)};`);
 const long = value => String(+value.toPrecision(8)).replace('-', '−');
 
 function tell() {
-  const { time, frame, collisions } = moment;
+  const { time, collisions } = moment;
   const share = (time - first()) / (last() - first() || 1);
   $('scrub').value = share;
   $('scrub').setAttribute('aria-valuetext', `time ${short(time)} of ${short(last())}`);
@@ -17,8 +17,6 @@ function tell() {
   $('traced').hidden = !state.traced.length;
   $('disk').innerHTML = state.traced.map(i =>
     `disk <b>${i + 1}</b> (${safe(kinds[speciesOf[i]].name)}) at <b>${short(X[i])}, ${short(Y[i])}</b>`).join('<br>');
-  $('guess').textContent = !stands(frame) ? 'Here all paths are true.' : 'Here the film shows frames as they are'
-    + (film.kicked ? ': kicks bend the paths between them.' : film.logged ? '.' : '. output.event_log = .true. in the input would tell the paths.');
 }
 
 // What is seen, for those who do not: of the stage, and of each plot.
@@ -40,23 +38,19 @@ function describe() {
 const describeLaw = (name, { temperature, speed, motion }) => (temperature || speed || motion) && `${name} ${listed([
   temperature && `heats: kT = ${short(temperature)}`, speed && `slides with ${short(speed)}`, motion && `moves (${motion})`])}`;
 
-// The colour of a species, to be chosen by the user.
-function chooser(kind) {
-  const label = document.createElement('label'), input = document.createElement('input');
-  const hex = speciesColour(kind).map(part => part.toString(16).padStart(2, '0')).join('');
-  const pattern = ['', ', with a hole', ', with a ring', ', with hole and ring'][kinds.indexOf(kind) % 4];
-  Object.assign(input, { type: 'color', value: '#' + hex, title: `another colour for ${kind.name}` });
-  input.addEventListener('input', () => { kind.own = input.value; layOutStage(); show(moment.time, true); });
-  input.addEventListener('change', refresh);
-  label.className = 'chip';
-  label.append(input, `${kind.name}, ${kind.sizes}${pattern}`);
-  return label;
+// A species and its colour.
+function chip(kind, text) {
+  const element = Object.assign(document.createElement('span'), { className: 'chip', textContent: text });
+  element.style.setProperty('--own', css(speciesColour(kind)));
+  return element;
 }
+
+const PATTERN = ['', ', with a hole', ', with a ring', ', with hole and ring'];
 
 function drawLegend() {
   const scale = film.scales[state.colour], legend = $('legend');
   legend.replaceChildren();
-  if (!scale) legend.replaceChildren(...kinds.map(chooser));
+  if (!scale) legend.replaceChildren(...kinds.map((kind, s) => chip(kind, `${kind.name}, ${kind.sizes}${PATTERN[s % PATTERN.length]}`)));
   else {
     const stops = Array.from({ length: 17 }, (_, k) => css(scaleColour(255 * k / 16)));
     const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
@@ -256,10 +250,10 @@ function drawPressure() {
 
 function layTableOut() {
   const heads = ['', 'disks', ...there().map(name => name + { kinetic: '', potential: ' (dashed)', rotational: ' (dotted)' }[name])];
-  const rows = kinds.map(({ name, count }) => [`<span class="chip">${safe(name)}</span>`, count, ...heads.slice(2).map(() => '')]);
+  const rows = kinds.map(({ count }) => ['', count, ...heads.slice(2).map(() => '')]);
   const cells = (row, tag) => `<tr>${row.map(one => `<${tag}>${one}</${tag}>`).join('')}</tr>`;
   $('energies').innerHTML = cells(heads, 'th') + rows.map(row => cells(row, 'td')).join('');
-  $('energies').querySelectorAll('.chip').forEach((chip, s) => chip.style.setProperty('--own', css(speciesColour(kinds[s]))));
+  kinds.forEach((kind, s) => $('energies').rows[s + 1].cells[0].append(chip(kind, kind.name)));
 }
 
 function tellEnergies() {

@@ -25,9 +25,8 @@ function withLuminance(rgb, wanted) {
 }
 
 function speciesColour(kind) {
-  const [low, high, steps] = LIGHTS[dark()], hex = kind.own ?? kind.colour;
-  const parts = [1, 3, 5].map(k => parseInt(hex.slice(k, k + 2), 16));
-  return withLuminance(parts, kind.own ? clamp(luminance(parts), low, high) : steps[kinds.indexOf(kind) % steps.length]);
+  const steps = LIGHTS[dark()][2], parts = [1, 3, 5].map(k => parseInt(kind.colour.slice(k, k + 2), 16));
+  return withLuminance(parts, steps[kinds.indexOf(kind) % steps.length]);
 }
 
 function scaleColour(place) {
@@ -253,11 +252,8 @@ function drawRadii() {
 function drawTrace(i) {
   const [old, recent] = [300, 30].map(k => frameTime(moment.frame - k));
   for (const [from, to, colour, width] of [[old, recent, ink.soft, 0.9], [recent, moment.shown, ink.ink, 1.6]]) {
-    const all = flights(i, from, to);
-    for (const guessed of [false, true]) {
-      marks.setLineDash(guessed ? [page.dots, 4 * page.dots] : []);
-      drawPath(all.filter(flight => flight.guessed === guessed), colour, width);
-    }
+    marks.setLineDash(film.note ? [page.dots, 4 * page.dots] : []);
+    drawPath(flights(i, from, to), colour, width);
   }
   marks.setLineDash([]);
   marks.lineWidth = 2 * page.dots;

@@ -42,7 +42,6 @@ const hear = {
     if (names(kinds) === names(facts.species)) facts.colour = state.colour;
     if (changed) {
       film = { ...film, ...facts, scales: film.scales, speeds: film.speeds };
-      kinds.forEach(({ own }, s) => { film.species[s].own = own; });
       kinds = film.species;
       prepareFilm();
       refresh();
@@ -77,9 +76,7 @@ const hear = {
 };
 
 function open({ facts, blocks, run }) {
-  const own = kinds?.map(kind => kind.own) ?? [];
   setScene(facts, blocks);
-  kinds.forEach((kind, s) => { kind.own = own[s]; });
   angles = facts.turning ? new Float32Array(disks) : null;
   const each = there => there ? kinds.map(() => []) : null;
   const curves = { time: [], kinetic: each(true), potential: each(facts.gravity.some(Boolean)), rotational: each(facts.turning), pressure: [] };

@@ -207,7 +207,7 @@ def terminate(worker: Process) -> None:
 
 def wrong(problem: object) -> dict:
     """What a page is told of a wish that cannot be."""
-    lines = [{"place": "", "text": str(problem), "limit": None}]
+    lines = [{"place": "", "text": str(problem)}]
     return {"is": "problems", "change": False, "problems": lines}
 
 

@@ -406,7 +406,7 @@ def refuse(problem: Exception, change: bool = False) -> None:
     found = []
     for line in str(problem).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
-        found.append({"place": place, "text": line.split(": ", 2)[-1], "limit": None})
+        found.append({"place": place, "text": line.split(": ", 2)[-1]})
     tell({"is": "problems", "change": change, "problems": found})
 
 

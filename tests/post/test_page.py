@@ -104,8 +104,10 @@ def inside(browser, what):
 
 def moving(browser, than=0):
     """Wait until there is a newer run than this one, and its disks move."""
-    seen = "const box = current(); return box?.run > arguments[0] && !busy && !again"
-    wait_for(lambda: browser.run(seen + " && filmOf(box).inside().moment.time > 0", than))
+    seen = """const box = current(); if (!(box?.run > arguments[0]) || busy || again) return false;
+        const { stream, moment } = filmOf(box).inside();
+        return stream.run === box.run && moment.time > 0"""
+    wait_for(lambda: browser.run(seen, than))
     return browser
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ricochet.paths import CLOSE, Paths
+from ricochet.paths import seen, turns_between, why_unknown
 
 SHAPES = """&obstacle name = 'post' centre = 1, 0.4 radius = 0.15 /
 &wall name = 'ramp' from = 0.2, 0.2 to = 0.5, 0.4 /
@@ -34,77 +34,53 @@ SYSTEMS = {
 }
 
 
-@pytest.fixture(params=SYSTEMS)
-def runs(request, simulated):
-    """One trajectory with few frames and an event log, with some frames, and with many."""
-    text = SYSTEMS[request.param] + DISKS + "&stop time = 1 /\n"
-    return [
-        simulated(text, f"output.frames_every_time={gap}", *log, name=f"{gap}")
-        for gap, log in ((0.25, [LOG]), (0.05, []), (0.01, []))
-    ]
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_event_log_gives_the_true_paths(simulated, system):
+    """One trajectory with few frames and an event log, and with many frames."""
+    text = SYSTEMS[system] + DISKS + "&stop time = 1 /\n"
+    run = simulated(text, LOG, "output.frames_every_time=0.25")
+    dense = simulated(text, "output.frames_every_time=0.01", name="dense")
+    frames, gap = list(range(run.frames)), 0.0
+    turns, truth = turns_of(run, frames), dense.unwrapped(slice(None))
+    assert not why_unknown(run, run.events) and len(turns.disk) > 20
+    for frame, (start, end) in enumerate(pairwise(run.time)):
+        inside = (dense.time > start) & (dense.time < end)
+        origin = truth[np.searchsorted(dense.time, start - 1e-9)]
+        for disk in range(run.count):
+            own = (turns.frame == frame) & (turns.disk == disk)
+            place, velocity = origin[disk], run.velocity[frame][disk]
+            legs = [start, *turns.time[own], end]
+            for (a, b), after in zip(pairwise(legs), [*turns.velocity[own], None], strict=True):
+                during = inside & (dense.time > a) & (dense.time <= b)
+                path = flown(run, place, velocity, dense.time[during] - a)
+                gap = max(gap, np.abs(path - truth[during, disk]).max(initial=0))
+                (place,), velocity = flown(run, place, velocity, np.array([b - a])), after
+    assert gap < 1e-6
 
 
-def places(run, frame, ends, turns, disk, times):
-    """Where the path leads, from one frame to the next; `ends` are its places in them."""
-    own = turns.disk == disk
-    t = [run.time[frame], *turns.time[own], run.time[frame + 1]]
-    cell = ends[0] - run.position[frame][disk] if own.any() else 0
-    x = [ends[0], *(turns.place[own] + cell), ends[1]]
-    result = np.column_stack([np.interp(times, t, [place[axis] for place in x]) for axis in (0, 1)])
-    for a, b in pairwise(t):
-        during = (times > a) & (times <= b)
-        bend = 0.5 * (times[during] - a) * (times[during] - b)
-        result[during] += bend[:, None] * run.gravity
-    return result
+def flown(run, place, velocity, t):
+    """(T, 2) places of a disk after these times."""
+    return place + t[:, None] * velocity + 0.5 * t[:, None] ** 2 * run.gravity
 
 
-def farthest(run, dense) -> tuple[float, int]:
-    """How far paths miss the places of the denser run, and how many paths are guessed."""
-    gap, guessed, known, truth = 0.0, 0, run.unwrapped(slice(None)), dense.unwrapped(slice(None))
-    for frame, turns in enumerate(Paths(run).along(list(range(run.frames)))):
-        inside = (dense.time > run.time[frame]) & (dense.time < run.time[frame + 1])
-        guessed += turns.guessed.sum()
-        for disk in np.flatnonzero(~turns.guessed):
-            ends = known[frame : frame + 2, disk]
-            path = places(run, frame, ends, turns, disk, dense.time[inside])
-            gap = max(gap, np.abs(path - truth[inside, disk]).max())
-    return gap, guessed
+def turns_of(run, frames):
+    return turns_between(run, run.events, frames, seen(run, run.events, frames))
 
 
-def test_the_event_log_gives_the_true_paths(runs):
-    gap, guessed = farthest(runs[0], runs[2])
-    assert gap < 1e-6 and guessed == 0
+def test_a_part_of_the_frames_has_the_turns_between_them(simulated):
+    run = simulated(DISKS + "&stop time = 2 /\n", LOG, "output.frames_every_time=0.25")
+    all_turns, some = turns_of(run, list(range(run.frames))), turns_of(run, [2, 3, 5])
+    own = (all_turns.frame >= 2) & (all_turns.frame < 5)
+    assert sorted(some.time) == sorted(all_turns.time[own]) and set(some.frame) == {0, 1}
 
 
-def test_without_a_log_a_path_is_known_if_it_is_a_free_flight(runs):
-    hits = np.sum(np.diff(runs[1].collisions[:], axis=0) > 0)
-    gap, guessed = farthest(runs[1], runs[2])
-    assert gap < CLOSE * runs[1].radius.max() and 0.99 * hits <= guessed <= hits > 20
-
-
-def test_a_log_that_leads_elsewhere_is_not_believed(simulated):
-    """That of a run leads from its first frame to its last; not so with a collision less."""
-    run = simulated(DISKS + "&stop time = 5 /\n", LOG, "output.precision='single'")
-    (turns,) = Paths(run).along([0, run.frames - 1])
-    assert not turns.guessed.any()
-    run.events.momentum_change[7] = 0
-    (turns,) = Paths(run).along([0, run.frames - 1])
-    assert turns.guessed[run.events.i[7] - 1]
-
-
-def test_turns_beyond_the_room_for_them_are_guessed(simulated):
-    """And not looked for: a log may hold 1e9 events."""
-    run = simulated(DISKS + "&stop time = 2 /\n", LOG, "output.frames_every_time=0.5")
-    frames = list(range(run.frames))
-    all_turns = [len(turns.disk) for turns in Paths(run).along(frames)]
-    some = list(Paths(run, all_turns[0] + 1).along(frames))
-    assert [len(turns.disk) for turns in some] == [all_turns[0], 0, 0, 0]
-    hits = np.diff(run.collisions[:], axis=0) > 0
-    assert np.mean([turns.guessed for turns in some[1:]] != hits[1:]) < 0.02
-
-
-def test_with_kicks_no_path_between_frames_is_known(simulated):
-    drive = "&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n"
-    run = simulated(drive + DISKS + "&stop time = 1 /\n", LOG, "output.frames_every_time=0.05")
-    for turns in Paths(run).along(list(range(run.frames))):
-        assert len(turns.disk) == 0 and turns.guessed.all()
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ("&drive kind = 'andersen' fraction = 0.1 interval = 0.1 temperature = 1 /\n", "kicks"),
+        ("&box boundary = 'periodic', 'periodic' shear_rate = 1 /\n", "images"),
+    ],
+)
+def test_where_more_than_collisions_acts_paths_are_not_known(simulated, more, why):
+    run = simulated(more + DISKS + "&stop time = 0.1 /\n", LOG)
+    assert why in why_unknown(run, run.events)

@@ -338,7 +338,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
         ]; })""",
         truth.time[frames].tolist(),
     )
-    assert browser.run("return film.known.every(Boolean) && $('guess').hidden")
+    assert browser.run("return film.known && !$('between').textContent")
     pairs, tops = run.events.time[run.events.j > 0], browser.run("return film.scales")
     heights = -run.mass * (truth.unwrapped(frames) @ run.gravity)
     worst, turned = 1e-6 if exact else 2e-4, []
@@ -452,21 +452,22 @@ def test_disks_with_unknown_paths_stand_as_in_the_frame_and_the_film_says_so(sim
     assert browser.run("return moment.collisions") == pytest.approx(
         run.collisions_per_disk_at(run.time)[at]
     )
-    said = browser.run("return $('guess').textContent")
-    assert "shows frames as they are" in said and "output.event_log" in said
+    said = browser.run("return $('between').textContent")
+    assert "Frames only" in said and "output.event_log" in said
     before = browser.run("return moment.time")
     browser.press("n")  # nothing is told of what comes next
     told = "return [moment.time, $('event').hidden, $('coming').hidden]"
     assert browser.run(told) == [before, True, True]
 
 
-def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, tmp_path):
+def test_time_is_that_of_the_run_whenever_frames_are_taken(playing, simulated):
     """Frames at unequal times: half of the film's time is half of the way."""
-    when = np.array([0, 0.1, 0.2, 0.3, 10.0])
-    position = 0.05 + 0.08 * when[:, None, None] * np.ones((1, 1, 2))
-    more = {"collisions": np.zeros((5, 1), int), "observables": {"collisions": np.zeros(5)}}
-    path = write_run(tmp_path / "a.h5", position, 0 * position + 0.08, time=when, **more)
-    browser = playing(path)
+    run = simulated(
+        """&species name = 'a' radius = 0.01 position = 0.05, 0.05 velocity = 0.08, 0.08 /
+        &output frames_at = 0.1, 0.2, 0.3 event_log = .true. / &stop time = 10 /"""
+    )
+    assert run.time.tolist() == [0, 0.1, 0.2, 0.3, 10]
+    browser = playing(run.path)
     browser.run("go(5)")
     assert browser.run("return [X[0], Y[0]]") == pytest.approx([0.45, 0.45])
     assert browser.run("return +$('scrub').value") == pytest.approx(0.5)

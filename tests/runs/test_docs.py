@@ -418,12 +418,12 @@ def look_at_bars(run, folder):
     ran(*run, "--set", "contact.wall_rule=normal", "--force", cwd=folder, check=True)
     code = """if True:
         from ricochet import read_run
-        from ricochet.paths import Paths
+        from ricochet.paths import seen, turns_between
         run = read_run("all.h5")
         assert run.walls.tolist() == [[[1, 0.1], [1, 0.9]]]
-        turns = [turn for turn in Paths(run).along(range(0, run.frames, 50))]
-        assert not any(turn.guessed.any() for turn in turns)
-        assert sum(len(turn.time) for turn in turns) == (run.events[0] <= run.time[300]).sum() > 200
+        frames = list(range(0, run.frames, 50))
+        turns = turns_between(run, run.events, frames, seen(run, run.events, frames))
+        assert len(turns.time) == (run.events[0] <= run.time[300]).sum() > 200
     """
     own = environment(PYTHONPATH=folder / "post")
     ran(sys.executable, "-c", code, cwd=folder, env=own, check=True)
