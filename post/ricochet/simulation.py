@@ -94,6 +94,7 @@ class Simulation:
 
     def _take(self, handle: int) -> None:
         self._handle, self._lock = handle, threading.RLock()
+        self._settled = -1.0  # a time at which all has happened
         ALIVE.add(self)
         self._start_energy = self.observable("all/kinetic_energy") * self.count
 
@@ -193,6 +194,17 @@ class Simulation:
         """Towards these limits for some seconds; whether they are still ahead."""
         with self._open() as handle:
             return called(library().ricochet_advance, handle, *limits, patience)
+
+    def _settle(self) -> float:
+        """Complete what happens about now; returns a time that leads another run to the same state.
+
+        Where a slice has ended, `time` may be rounded, and the engine about to count from another
+        origin: that is over at the next double.
+        """
+        if self.time != self._settled:
+            self._settled = math.nextafter(self.time, math.inf)
+            self.advance(time=self._settled)
+        return self._settled
 
     def change(self, values: Mapping[str, object]) -> Self:
         """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.

@@ -125,9 +125,8 @@ class Bench:
 
     def act(self, what: str, value: object, change: Callable[[], object]) -> None:
         """Do something at a time that can be reached again."""
-        now = self.simulation.time
         try:
-            self.simulation.advance(time=now)
+            now = self.simulation._settle()
             change()
         except (ProgramError, ValueError) as problem:
             refuse(problem, change=True)
@@ -174,10 +173,11 @@ class Bench:
         """What the run was, as a file: `input`, `script` or `output`."""
         name, part = self.wish["input"], wish["part"]
         try:
+            end = self.simulation.time if self.ended else self.simulation._settle()
             if part == "output":
                 body = self.saved(f"{name}.h5")
             elif part == "script":
-                body = script(name, self.initial, self.actions, self.simulation.time)
+                body = script(name, self.initial, self.actions, end)
             else:
                 body = self.simulation.input if self.actions else self.initial
         except (OSError, ProgramError) as problem:

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from ricochet import ProgramError, RunError, Simulation, read_run
-from ricochet.simulation import COLUMNS, library
+from ricochet.simulation import COLUMNS, NEVER, library
 from whole_runs import ran
 
 GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /
@@ -58,6 +58,18 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
         assert {*gas.observables} == {*whole.observables}
         assert (gas.time, gas.collisions, gas.count) == (whole.time[-1], 400, 80)
         assert gas.events == len(log.time)
+
+
+def test_a_moment_where_a_slice_has_ended_is_reached_again():
+    """In one go, to the last bit: in the middle of an epoch, and where one ends."""
+    text = "&box boundary = 'periodic', 'periodic' /\n&species name = 'a' count = 200"
+    text += " packing_fraction = 0.6 placement = 'dense' temperature = 1 /\n"
+    with Simulation(text) as one, Simulation(text) as other:
+        while one.collisions < 1e5:
+            one._go_on((np.inf, NEVER, NEVER), 1e-6)
+            other.advance(time=one._settle())
+            for name in ("events", "position", "velocity"):
+                assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
 def test_handles_share_nothing_and_give_all_back():
