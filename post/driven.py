@@ -16,6 +16,8 @@ over its own, and of the side's momentum less what force and disks gave it, over
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.
+--show viscosity: -P_xy over the shear rate of a sheared box (box.shear_rate), from one observable
+to the next, by what disks carry and what collisions hand on; also of disks that lose energy.
 --show cluster: share of the disks in the largest cluster, in which gaps are below a tenth of the
 mean diameter.
 
@@ -192,12 +194,23 @@ def cluster(run: Run) -> Curves:
     return {"": (run.time, np.array(shares))}
 
 
+def viscosity(run: Run) -> Curves:
+    """-P_xy over the shear rate."""
+    if "sheared" not in run.nature:
+        raise Refused(f"{run.path}: is not sheared; a viscosity takes box.shear_rate")
+    time, first = np.unique(run.observable("stress_tensor").time, return_index=True)
+    flown, handed = (run.observable(f"{k}_tensor").value[first, 1] for k in ("stress", "virial"))
+    stress = (flown[1:] + flown[:-1]) / 2 + np.diff(handed) / np.diff(time)
+    return {"": (time[1:], -stress / (run.shear_rate * np.prod(run.edges)))}
+
+
 #: What is shown: its label, its curves, what should last of it, and what of a mean is compared.
 QUANTITIES = {
     "width": ("width of the box (reduced units)", width, width_law, np.asarray),
     "temperature": ("kT (reduced units)", temperature, temperature_law, np.asarray),
     "share": ("share of the disks in the left half", share, demon_law, fuller),
     "height": ("mean height (reduced units)", height, lambda run: None, np.asarray),
+    "viscosity": ("$-P_{xy}$ / shear rate", viscosity, lambda run: None, np.asarray),
     "cluster": ("share of the disks in the largest cluster", cluster, lambda run: None, np.asarray),
 }
 

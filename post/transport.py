@@ -2,29 +2,37 @@
 
     python post/transport.py runs/driven/transport_*/*.h5 -o transport.png --csv transport.csv
 
-Equal elastic disks in a periodic box.  Runs are combined by packing fraction; they take the Helfand
+Elastic disks in a periodic box.  Runs are combined by packing fraction; they take the Helfand
 moments of momentum and energy (output.helfand), as observables some four times in a mean free time
 (output.observables_every_time), and for D, if it is wanted, frames equally far apart in time.
+Mixtures, of species or of many sizes, have the viscosities only: their energy goes with the species
+that diffuse, too, and their D are by species, in correlations.py.
 
 Small panels: half of the slope of the mean square of a moment between neighbouring lags, over
 Enskog's coefficient; bands are errors over the runs.  For D half the integral of
 <v(0) v(s)> from 0 to t.  Right, and in the table: the means between half a lag and that lag, with
-errors from the series of their values.  The lag is 20 mean free times, or an eighth of the run;
-that of D is the time in which sound crosses the box, as in correlations.py.
+errors from the series of their values.  The lag is 20 mean free times, longer where heavy disks
+remember longer, or an eighth of the run; that of D is the time in which sound crosses the box, as
+in correlations.py.
 
-Enskog's coefficients (Gass 1971) are those with the pair correlation at contact by Henderson.  The
-theory takes the velocities of disks that meet for independent.  Unless the gas is dense that is
-good to some per cent for viscosity and conductivity, not for D.  In two dimensions none of them has
-a limit for late times in large boxes.  N disks that share a fixed energy have a conductivity that
-is lower by about 6 / N of it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
+Enskog's coefficients (Gass 1971; of mixtures after Lopez de Haro, Cohen and Kincaid 1983) are those
+with the pair correlation at contact by Henderson, of mixtures after Jenkins and Mancini 1987.  The
+table has them in units of the mean mass, the mean diameter and kT.  The theory takes the velocities
+of disks that meet for independent.  Unless the gas is dense that is good to some per cent for
+viscosity and conductivity, not for D.  In two dimensions none of them has a limit for late times in
+large boxes.  N disks that share a fixed energy have a conductivity that is lower by about 6 / N of
+it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
 """
 
 from ricochet.drawing import COLOURS, band, caption, colours, plt
-from ricochet.hard_disks import enskog, henderson
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
 from ricochet.statistics import combined
-from ricochet.transport import MEMORY, Found, coefficients
+from ricochet.transport import Found, coefficients
 
+NO_CONDUCTIVITY = (
+    "no conductivity and D of a mixture: its energy goes with the species that diffuse, too; "
+    "D by species: correlations.py"
+)
 LABELS = {
     "viscosity": "shear viscosity",
     "conductivity": "heat conductivity",
@@ -35,28 +43,28 @@ Results = list[tuple[float, dict[str, Found]]]
 
 
 def table(results: Results) -> tuple[list[dict], list[str]]:
-    """A row per packing fraction and coefficient, in units of m, the diameter and kT; doubts."""
+    """A row per packing fraction and coefficient; doubts."""
     rows, unsettled, notes = [], [], []
     for eta, found in results:
-        for name, theory in enskog(henderson(eta), eta, 1.0).items():
-            if name not in found:
-                continue
-            members, about = found[name].members, f"η = {eta:g}, {name}"
+        for name in filter(found.get, LABELS):
+            members, theory, about = found[name].members, found[name].enskog, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
-            row |= measured("value", combined(members).scaled(theory)) | {"enskog": float(theory)}
+            row |= measured("value", combined(members).scaled(theory)) | {"enskog": theory}
             rows.append(row | over_runs("ratio", members, notes, about))
-            if found[name].lag < MEMORY / 4:
+            if found[name].lag < found[name].memory / 4:
                 unsettled.append(
                     f"{about}: taken at {found[name].lag:.1f} mean free times, before it has "
-                    f"settled; longer runs let it reach {MEMORY:g}"
+                    f"settled; longer runs let it reach {found[name].memory:.3g}"
                 )
-    return rows, unsettled + notes
+    mixed = any("conductivity" not in found for _, found in results)
+    return rows, [*unsettled, *notes, *[NO_CONDUCTIVITY] * mixed]
 
 
 def draw(results: Results, rows: list[dict]) -> plt.Figure:
     """All coefficients over Enskog's, against the lag and against packing."""
-    layout, height = [["viscosity", "conductivity", "bulk_viscosity", "all"]], 4.5
-    if any("D" in found for _, found in results):
+    there = set().union(*(found for _, found in results))
+    layout, height = [[*filter(there.__contains__, LABELS), "all"]], 4.5
+    if "D" in there:
         layout, height = [["viscosity", "conductivity", "all"], ["bulk_viscosity", "D", "all"]], 7
     widths = [1] * (len(layout[0]) - 1) + [1.3]
     figure, panels = plt.subplot_mosaic(layout, figsize=(13, height), width_ratios=widths)
@@ -68,7 +76,7 @@ def draw(results: Results, rows: list[dict]) -> plt.Figure:
     for (name, label), marker in zip(LABELS.items(), "osv^", strict=True):
         if name not in panels:
             continue
-        panels[name].set(xlabel="$w\\,t$", xscale="log", xlim=(0.03, 100))
+        panels[name].set(xlabel="$w\\,t$", xscale="log", xlim=(0.03, None))
         panels[name].set(ylabel=f"{label} / Enskog's", ylim=(0, 1.6))
         own = [row for row in rows if row["what"] == name]
         bars = ([row[key] for row in own] for key in ("packing", "ratio", "ratio_error"))

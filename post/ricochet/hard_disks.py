@@ -193,6 +193,46 @@ def enskog(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float =
     }
 
 
+def contact_values(z: float, density: np.ndarray, diameter: np.ndarray) -> np.ndarray:
+    """chi_ij of a mixture (S,), from the Z of equal disks at its packing fraction; to a percent.
+
+    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
+    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002).
+    """
+    eta = math.pi / 4 * np.sum(density * diameter**2)
+    mean = np.sum(density * diameter) / np.sum(density * diameter**2)
+    unlike = 2 * diameter[:, None] * diameter / (diameter[:, None] + diameter)
+    return 1 / (1 - eta) + (contact_value(z, eta) - 1 / (1 - eta)) * unlike * mean
+
+
+def enskog_mixture(
+    z: float, density: np.ndarray, diameter: np.ndarray, mass: np.ndarray, kt: float = 1.0
+) -> dict[str, float]:
+    """Viscosities of a mixture (S,), and "memory": the time in which they forget stress and heat.
+
+    Enskog's theory in first Sonine approximation, as in Lopez de Haro, Cohen and Kincaid, J. Chem.
+    Phys. 78, 2746 (1983), here in two dimensions; what disks carry in flight has the factor 1.022
+    that higher ones add for equal disks.  While a gas expands its species differ in temperature.
+    """
+    total, pair = mass[:, None] + mass, (diameter[:, None] + diameter) / 2
+    reduced = mass[:, None] * mass / total
+    met = density * pair * contact_values(z, density, diameter)  # (i, j)
+    rate = met * 2 * np.sqrt(2 * math.pi * kt * reduced) / total  # 2 of it: of temperatures
+    handed = 1 + math.pi / 2 * np.sum(met * pair * mass / total, axis=1)  # by collisions, too
+    stress = np.diag(np.sum(rate * (2 + mass / mass[:, None]), axis=1)) - rate
+    lives = np.linalg.solve(stress, handed)
+    sums, share = 2 * rate.sum(axis=1), density / density.sum()
+    heat = np.diag(sums) - 2 * rate + sums.max() * share  # the mean of all never changes
+    cooler = np.linalg.solve(heat, 2 * handed - 2 * share @ handed)
+    together = np.sum(density[:, None] * met * pair**2 * np.sqrt(math.pi / 2 * kt * reduced))
+    slowest = min(np.linalg.eigvals(matrix).real.min() for matrix in (stress, heat))
+    return {
+        "viscosity": float(1.022 * kt * density @ (lives * handed) + together / 2),
+        "bulk_viscosity": float(together + 2 * kt * density @ (handed * cooler)),
+        "memory": float(1 / slowest),
+    }
+
+
 def long_time_tail(time: np.ndarray, density: float, diffusion: float, viscosity: float):
     """<v(0) v(t)> / <v^2> at late times by mode coupling; Dorfman and Cohen, PRL 25, 1257."""
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

@@ -11,6 +11,12 @@ displacement does, and half of the slope is the transport coefficient: times 1 /
 viscosities, 1 / (A kT^2) for the conductivity, A the area.  See Helfand, Phys. Rev. 119, 1 (1960);
 Alder, Gass and Wainwright, J. Chem. Phys. 53, 3813 (1970).  The run sums them up exactly, as
 observables, where `output.helfand` is set.
+
+In a mixture the stress is that of all disks, and so are its viscosities.  Its conductivity is not
+the growth of the energy: species that diffuse take some along, each its own enthalpy.  Where
+energy is lost, or noise replaces it, fluctuations do not say how a gas flows: in the theory of the
+gas that cools the moments meet others, which take the unknown law of its states (Baskaran, Dufty
+and Brey, Phys. Rev. E 77, 031311 (2008)), and noise obeys no law of fluctuation and dissipation.
 """
 
 from typing import NamedTuple
@@ -26,11 +32,15 @@ from .statistics import Curve, SeriesMean, estimate, series_mean
 
 PER_FREE_TIME = 4  # samples of the moments that are enough
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
-#: Mean free times after which fluxes are forgotten: in a dilute gas as exp(-w t / 2.06), that of
-#: heat, which lives longest; from half of this on less than 0.2 % of the conductivity is missing.
-MEMORY = 20.0
+#: Mean free times that heat lives, longest of all in a gas of equal disks when dilute; and after
+#: which it is forgotten: from half of this on less than 0.2 % of the conductivity is missing.
+HEAT, MEMORY = 2.06, 20.0
 CLOSE = 1e-6  # of a step
-TAKES = "transport takes equal elastic smooth disks in a periodic box"
+UNLIKE = 0.05  # of Enskog's viscosity, between runs that are taken together
+TAKES = (
+    "transport takes elastic smooth disks in a periodic box, whose fluctuations say how they flow; "
+    "of others driven.py --show viscosity (box.shear_rate) and correlations.py, D(t)"
+)
 MOMENTS = ("viscosity", "bulk_viscosity", "conductivity")  # that grow from moments
 
 
@@ -103,7 +113,7 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     and (xx - yy) / 2, of (xx + yy) / 2, of the energy x and y; all relative to the centre of mass.
     Raises RunError where the run has not summed them up, or not equally far apart in time.
     """
-    allow(run, TAKES)
+    allow(run, TAKES, "mixture")
     if "helfand_heat" not in run.observables:
         raise RunError(f"{run.path}: has no Helfand moments, set output.helfand = .true.")
     parts = [run.observable(name) for name in SUMS]
@@ -120,7 +130,8 @@ def moments(run: Run, start: float) -> tuple[float, dict[str, np.ndarray]]:
     heat = heat + heat_handed - np.einsum("a,tab->tb", td.drift(run), momentum)
     xx, xy, yy = momentum[:, 0, 0], momentum[:, 0, 1], momentum[:, 1, 1]
     groups = (xy, (xx - yy) / 2), ((xx + yy) / 2,), heat.T
-    found = {name: np.stack(one, axis=1) for name, one in zip(MOMENTS, groups, strict=True)}
+    known = MOMENTS[: 2 if "mixture" in run.nature else 3]
+    found = {name: np.stack(one, axis=1) for name, one in zip(known, groups, strict=False)}
     share = np.linspace(0, 1, len(time))[:, None]
     return float(np.diff(time).mean()), {
         name: one - one[0] - share * (one[-1] - one[0]) for name, one in found.items()
@@ -161,23 +172,46 @@ class Found(NamedTuple):
     members: list[SeriesMean]  # of the runs
     curve: Curve  # against the lag, in mean free times
     lag: float  # at which they were taken [mean free times]
+    memory: float  # at which they should be; 0 of a coefficient that has its own time
+    enskog: float  # in units of the mean mass, the mean diameter and kT
 
 
-def enskog_of(run: Run) -> dict[str, float]:
-    """Those of a run that keeps its kinetic energy, in its units and at its temperature."""
-    eta, kt = td.packing(run), td.kt_at_start(run)
-    return hard_disks.enskog(hard_disks.henderson(eta), eta, 2 * run.radius[0], kt, run.mass[0])
+def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
+    """Those of a run that keeps its kinetic energy, in its units and at its temperature.
+
+    `reduced`: in units of the mean mass, the mean diameter and kT.  Of a mixture only what
+    `enskog_mixture` has; disks alike to a hundredth are one species.
+    """
+    eta, kt = td.packing(run), 1.0 if reduced else td.kt_at_start(run)
+    z, area = hard_disks.henderson(eta), float(np.prod(run.edges))
+    diameter, mass = 2 * run.radius, run.mass
+    if reduced:
+        area, mass = area / diameter.mean() ** 2, mass / mass.mean()
+        diameter = diameter / diameter.mean()
+    if "mixture" not in run.nature:
+        return hard_disks.enskog(z, eta, diameter[0], kt, mass[0])
+    kinds = np.round(np.log([diameter, mass]), 2)
+    _, which, count = np.unique(kinds, axis=1, return_inverse=True, return_counts=True)
+    means = [np.bincount(which.ravel(), one) / count for one in (diameter, mass)]
+    return hard_disks.enskog_mixture(z, count / area, *means, kt)
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
-    """Viscosities and conductivity."""
+    """Viscosities and, but of a mixture, conductivity."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
+    theories = [enskog_of(run, reduced=True) for run in runs]
+    for run, own in zip(runs, theories, strict=True):
+        off = own["viscosity"] / theories[0]["viscosity"] - 1
+        if own.keys() != theories[0].keys() or abs(off) > UNLIKE:
+            raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
     steps = [step / td.mean_free_time(run) for run, (step, _) in zip(runs, each, strict=True)]
     if np.ptp(steps) > 0.1 * steps[0]:
         raise RunError(f"{runs[0].path}: samples of the others are not as far apart")
     per_free_time = 1 / float(np.mean(steps))
     shortest = min(len(one["viscosity"]) for _, one in each)
-    lag = min(round(MEMORY * per_free_time), shortest // 8)
+    lives = enskog_of(runs[0]).get("memory", 0) / td.mean_free_time(runs[0])
+    memory = MEMORY * max(1.0, lives / HEAT)
+    lag = min(round(memory * per_free_time), shortest // 8)
     if lag < max(2, per_free_time):
         raise RunError(
             f"{runs[0].path}: needs more than eight collisions per disk in equilibrium, and "
@@ -186,7 +220,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     at = lags(4 * lag)  # up to twice the lag
     middle = (at + np.append(0, at[:-1])) / 2 / per_free_time
     found = {}
-    for name in MOMENTS:
+    for name in each[0][1]:
         members, slopes = [], []
         for run, (step, one) in zip(runs, each, strict=True):
             kt = td.kt_at_start(run)
@@ -194,7 +228,9 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
             unit = 1 / unit / enskog_of(run)[name]
             members.append(coefficient(one[name], step, lag).scaled(unit))
             slopes.append(running(one[name], step, at) * unit)
-        found[name] = Found(members, Curve(middle, *estimate(slopes)), lag / per_free_time)
+        curve = Curve(middle, *estimate(slopes))
+        theory = float(np.mean([own[name] for own in theories]))
+        found[name] = Found(members, curve, lag / per_free_time, memory, theory)
     return found
 
 
@@ -222,18 +258,20 @@ def of_displacements(runs: list[Run], starts: list[float]) -> Found:
         known = Correlator(run, time, lags=at * (time[1] - time[0])).follow(run)
         slopes.append(known.means("diffusion") * unit)
     step = np.mean([(run.time[1] - run.time[0]) / td.mean_free_time(run) for run in runs])
-    return Found(members, Curve(at * step, *estimate(slopes)), lag * step)
+    curve, theory = Curve(at * step, *estimate(slopes)), enskog_of(runs[0], reduced=True)["D"]
+    return Found(members, curve, lag * step, 0.0, float(theory))
 
 
 def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]:
     """All coefficients at one packing fraction, from `skip` collisions per disk on.
 
-    "D" only where runs have more frames than the first and the last.  Raises RunError.
+    "D" only of equal disks, where runs have more frames than the first and the last.  Raises
+    RunError.
     """
     for run in runs:
-        allow(run, TAKES)
+        allow(run, TAKES, "mixture")
     starts = [td.start_of_equilibrium(run, skip) for run in runs]
     found = of_moments(runs, starts)
-    if any(run.frames > 2 for run in runs):
+    if "conductivity" in found and any(run.frames > 2 for run in runs):
         found["D"] = of_displacements(runs, starts)
     return found

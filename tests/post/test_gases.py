@@ -21,7 +21,7 @@ import melting
 import rates
 import trajectory
 from driven import demon_law, fuller, noise_law, temperature_law
-from ricochet import Events, fields, read_run, statistics, theory, write_start
+from ricochet import Events, RunError, fields, read_run, statistics, theory, write_start
 from ricochet import cooling as cool
 from ricochet import hard_disks as hd
 from ricochet import thermodynamics as td
@@ -542,18 +542,21 @@ def gas(simulated):
     return lambda name="gas", **unusual: simulated(GAS.format(**USUAL | unusual), name=name)
 
 
+UNLIKE = "0.1 mass = {} temperature = 2 / &species name = 'b' packing_fraction = 0.1 count = {}"
+
+
 def carried(v, mass):
     """(5,) what disks with the velocities (N, 2) carry: momentum xx, xy, yy, energy x, y."""
     energy = mass * np.sum(v**2, axis=1) / 2
-    products = [v[:, 0] ** 2, v[:, 0] * v[:, 1], v[:, 1] ** 2]
-    return np.array([*(mass * np.sum(products, axis=1)), *(energy @ v)])
+    products = np.array([v[:, 0] ** 2, v[:, 0] * v[:, 1], v[:, 1] ** 2])
+    return np.array([*(products @ mass), *(energy @ v)])
 
 
 def test_moments_are_those_of_the_definition(gas):
     """With a frame at each event places and velocities tell what is carried and handed on."""
     every = "frames_every_events = 1 observables_every_events = 1"
-    run = gas(count=10, packing=0.3, length=40, restitution=0.9, cadence=every)
-    x, v, m, time = run.position[:], run.velocity[:], run.mass[0], run.time
+    run = gas(count=10, packing=UNLIKE.format(1, 5), length=40, restitution=0.9, cadence=every)
+    x, v, m, time = run.position[:], run.velocity[:], run.mass, run.time
     flown, handed = [np.zeros(5)], [np.zeros(5)]
     for k in range(run.frames - 1):
         flown.append((time[k + 1] - time[k]) * carried(v[k], m))
@@ -564,7 +567,7 @@ def test_moments_are_those_of_the_definition(gas):
         i, j = changed
         r = x[k + 1, i] - x[k + 1, j]
         r -= run.edges * np.round(r / run.edges)
-        dp = m * (v[k + 1, i] - v[k, i])
+        dp = m[i] * (v[k + 1, i] - v[k, i])
         gain = m * (np.sum(v[k + 1] ** 2, axis=1) - np.sum(v[k] ** 2, axis=1)) / 2
         handed[-1] = [dp[0] * r[0], dp[0] * r[1], dp[1] * r[1], *((gain[i] - gain[j]) / 2 * r)]
     for parts, (stress, heat) in ((flown, tp.SUMS[::2]), (handed, tp.SUMS[1::2])):
@@ -644,11 +647,38 @@ def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, ca
     assert "before it has settled" in capsys.readouterr().err
 
 
+def test_of_a_mixture_there_are_the_viscosities(gas, tmp_path, capsys):
+    """Hardly unlike disks have those of equal ones; runs of other disks are not taken together."""
+    mixed = gas("mixed", packing=UNLIKE.format(0.1, 9))
+    rows = drawn(tmp_path, "transport", mixed.path)
+    assert {row["what"] for row in rows if not row["wt"]} == {"viscosity", "bulk_viscosity"}
+    assert "no conductivity and D of a mixture" in capsys.readouterr().err
+    nearly, plain = gas("nearly", packing=UNLIKE.format(3.01, 64)), gas(packing=0.2)
+    whole, one = (tp.enskog_of(run, reduced=True) for run in (nearly, plain))
+    for name in tp.MOMENTS[:2]:
+        assert whole[name] == pytest.approx(one[name], rel=1e-4)
+    for own in (nearly, plain):
+        with pytest.raises(RunError, match="its disks are not those of"):
+            tp.coefficients([own, mixed])
+
+
+def test_the_viscosity_of_grains_is_what_their_heat_takes(simulated):
+    """In a sheared box: work, the shear rate squared times it, is lost or heats."""
+    run = simulated("""&box boundary = 'periodic', 'periodic' shear_rate = 0.5 /
+    &species count = 100 packing_fraction = 0.4 temperature = 1 / &contact restitution = 0.8 /
+    &stop collisions_per_disk = 100 / &output observables_every_collisions_per_disk = 0.1 /""")
+    (time, lost), kt = run.observable("dissipated_energy"), run.observable("all/temperature").value
+    later, found = driven.viscosity(run)[""]
+    mean = np.average(found, weights=np.diff(later, prepend=0))
+    work = np.ptp(lost) + run.count * (kt[-1] - kt[0])
+    assert mean == pytest.approx(work / (0.25 * time[-1]), rel=0.05)
+
+
 LOSSY = {"restitution": 0.9}
 SOFT = {"restitution": "0.9 restitution_law = 'power' restitution_speed = 9"}
 WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1", "helfand": ".false."}
-MIXED = {"packing": "0.1 temperature = 2 / &species name = 'b' count = 9 packing_fraction = 0.1"}
+MIXED = {"packing": UNLIKE.format(1, 9)}
 ROUND = {"sides": "'wall', 'wall' / &obstacle centre = 0.5, 0.5 radius = 0.5 side = 'inside'"}
 APART = {"sides": "'wall', 'wall' / &wall from = 0.5, 0 to = 0.5, 1"}
 APART |= {
@@ -664,7 +694,7 @@ SETTLED = ("equation_of_state", "melting", "coverage", "transport", "gravity", "
 @pytest.mark.parametrize(
     ("unusual", "refused"),
     [
-        (WALLS, {"transport": "in a periodic box", "melting": "has walls"}),
+        (WALLS, {"transport": "driven.py --show viscosity", "melting": "has walls"}),
         ({"helfand": ".false."}, {"transport": "output.helfand"}),
         ({"length": 12}, {"transport": "eight collisions"}),
         (

@@ -6,7 +6,7 @@ import pytest
 from ricochet import hard_disks as hd
 from ricochet import theory
 from ricochet.theory import path_density
-from validation.laws import cooling_ratio, mixture_contact, mixture_rates
+from validation.laws import cooling_ratio, mixture_rates
 
 
 def test_equation_of_state_has_the_virial_coefficients_and_goes_through_its_points():
@@ -58,7 +58,7 @@ def test_the_pressure_of_many_sizes_is_that_of_their_contacts():
     """Z = 1 + pi / 2 n sum x_i x_j s_ij^2 chi_ij, and equal disks are themselves."""
     s, n = np.array([0.01, 0.02, 0.04]), np.array([300, 200, 50])
     eta, pair = np.pi / 4 * n @ s**2, (s[:, None] + s) / 2
-    z = 1 + np.pi / 2 * n @ (pair**2 * mixture_contact(s, n)) @ n / n.sum()
+    z = 1 + np.pi / 2 * n @ (pair**2 * hd.contact_values(hd.simulated(eta), n, s)) @ n / n.sum()
     alike = (n @ s) ** 2 / (n @ s**2) / n.sum()
     assert z == pytest.approx(hd.of_sizes(hd.simulated(eta), eta, alike))
     assert hd.of_sizes(hd.simulated(eta), eta, 1) == hd.simulated(eta)
@@ -90,14 +90,21 @@ def test_free_paths_without_memory_have_the_mean_one():
     assert np.trapezoid(x * density, x) == pytest.approx(1, rel=1e-3)
 
 
-def test_enskog_bulk_viscosity_is_what_uncorrelated_collisions_hand_on():
-    """Half of their rate per area times <(diameter dP / 2)^2> / kT, where <dP^2> is 4 m kT."""
-    eta, diameter, kt, mass = 0.3, 0.7, 2.0, 3.0
-    z, density = float(hd.henderson(eta)), 4 * eta / (np.pi * 0.7**2)
-    pairs = density * hd.collision_rate(z, diameter, 1e6, kt, mass) / 2
-    expected = pairs / 2 * diameter**2 / 4 * 4 * mass
-    bulk = hd.enskog(z, eta, diameter, kt, mass)["bulk_viscosity"]
-    assert bulk == pytest.approx(expected, rel=1e-6)
+def test_a_mixture_flows_as_one_gas_if_its_disks_are_equal_and_however_its_species_are_cut():
+    """And it scales with its units."""
+    eta, z, names = 0.3, float(hd.henderson(0.3)), ("viscosity", "bulk_viscosity")
+    n, size, mass = 4 * eta / np.pi * np.array([0.2, 0.3, 0.5]), np.ones(3), np.ones(3)
+    equal, one = hd.enskog_mixture(z, n, size, mass), hd.enskog(z, eta, 1.0)
+    assert [equal[name] for name in names] == pytest.approx([one[name] for name in names], rel=1e-5)
+    assert equal["memory"] * hd.collision_rate(z, 1.0, 1e6) == pytest.approx(1, rel=1e-5)
+    size, mass, n = np.array([1.0, 2.0, 1.0]), np.array([1.0, 9.0, 1.0]), n / 3
+    cut = hd.enskog_mixture(z, n, size, mass)
+    whole = hd.enskog_mixture(z, np.array([n[0] + n[2], n[1]]), size[:2], mass[:2])
+    other = hd.enskog_mixture(z, n / 4, 2 * size, 3 * mass, 5.0)
+    for name in names:
+        assert cut[name] == pytest.approx(whole[name])
+        assert other[name] == pytest.approx(np.sqrt(3 * 5) / 2 * cut[name])
+    assert other["memory"] == pytest.approx(2 * np.sqrt(3 / 5) * cut["memory"])
 
 
 @pytest.mark.parametrize("eta", [0.001, 0.2])

@@ -5,6 +5,7 @@ from math import pi, sqrt
 import numpy as np
 
 from ricochet import Run
+from ricochet import hard_disks as hd
 from ricochet.statistics import Estimate, combined, hold_against
 from ricochet.theory import ROUGH_RATIOS, maxwell_cdf
 from ricochet.thermodynamics import start_of_equilibrium
@@ -12,7 +13,7 @@ from ricochet.transport import MOMENTS, of_moments
 
 from .case import AT_LEAST, Case, Member, sigmas, within
 from .estimators import over
-from .inputs import PERIODIC, ensemble, gases
+from .inputs import PERIODIC, ensemble
 
 # --- one disk between a hot and a cold wall, which its centre finds 1 apart ---
 
@@ -101,22 +102,31 @@ def ratio(run: Run) -> float:
 
 # --- viscosities and conductivity of a gas in equilibrium ---
 
+FLOWING = 200
 
-def flowing(eta: float) -> tuple[Member, ...]:
-    """Runs with all that the Helfand moments take."""
-    return gases(
-        8, 512, packing_fraction=eta, periodic=True, temperature=1.0,
-        stop={"collisions_per_disk": 2500},
-        output={
-            "frames_every_collisions": 640000, "observables_every_time": 0.004, "helfand": True,
-        },
+
+def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
+    """Two species, as many of each; the first has the diameter 1 and the mass 1."""
+    edge = sqrt(FLOWING * pi / 8 * (1 + size**2) / eta)
+    own = np.full(2, FLOWING / 2 / edge**2), np.array([1, size]), np.array([1, mass])
+    memory = hd.enskog_mixture(hd.henderson(eta), *own)["memory"]
+    half = {"count": FLOWING // 2, "temperature": 1.0, "exact_temperature": 1.0}
+    return ensemble(
+        8,
+        box={"upper": (edge, edge), **PERIODIC},
+        species=[
+            {"name": "first", "radius": 0.5, "mass": 1.0, **half},
+            {"name": "other", "radius": size / 2, "mass": mass, **half},
+        ],
+        stop={"time": 4000 * memory},
+        output={"observables_every_time": 0.1 * memory, "helfand": True},
     )  # fmt: skip
 
 
 def enskog_ratios(*runs: Run) -> Estimate:
-    """Shear and bulk viscosity and conductivity over those of Enskog's theory."""
+    """Shear and bulk viscosity, and conductivity of equal disks, over those of Enskog's theory."""
     found = of_moments(list(runs), [start_of_equilibrium(run) for run in runs])
-    means = [combined(found[name].members) for name in MOMENTS]
+    means = [combined(found[name].members) for name in MOMENTS if name in found]
     return Estimate(*(np.array([getattr(one, k) for one in means]) for k in ("mean", "error")))
 
 
@@ -146,9 +156,10 @@ CASES = [
     ],
     *[
         Case(
-            "P15-04", f"packing {eta}: shear, bulk viscosity, conductivity over Enskog's",
-            flowing(eta), enskog_ratios, 1, sigmas(4, 0.2), "D",
+            "P15-04",
+            f"packing {eta}, radii 1 : {size}, masses 1 : {mass}: transport over Enskog's",
+            flowing(eta, size, mass), enskog_ratios, 1, sigmas(4, 0.2), "D",
         )
-        for eta in (0.05, 0.2)
+        for eta, size, mass in ((0.05, 1, 1), (0.2, 1, 1), (0.01, 2, 4), (0.2, 1, 10))
     ],
 ]  # fmt: skip

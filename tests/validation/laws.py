@@ -8,26 +8,13 @@ from scipy.optimize import brentq
 from ricochet import hard_disks as hd
 
 
-def mixture_contact(diameters: np.ndarray, density: np.ndarray) -> np.ndarray:
-    """chi_ij of a mixture, from that of equal disks at the same packing fraction.
-
-    Jenkins and Mancini, J. Appl. Mech. 54, 27 (1987), with the better chi of equal disks as
-    Santos, Yuste and Lopez de Haro, J. Chem. Phys. 117, 5785 (2002). Good to a percent.
-    """
-    s, n = np.asarray(diameters, dtype=float), np.asarray(density, dtype=float)
-    eta = math.pi / 4 * np.sum(n * s**2)
-    mean = np.sum(n * s) / np.sum(n * s**2)
-    pair = (s[:, None] + s) / 2
-    more = hd.contact_value(float(hd.simulated(eta)), eta) - 1 / (1 - eta)
-    return 1 / (1 - eta) + more * (s[:, None] * s / pair) * mean
-
-
 def mixture_rates(diameters, density, masses, kt: float = 1.0) -> np.ndarray:
     """w_ij: collisions of a disk of species i with those of species j, per time."""
     s, n, m = (np.asarray(a, dtype=float) for a in (diameters, density, masses))
     pair = (s[:, None] + s) / 2
     reduced = 2 * math.pi * kt * (1 / m[:, None] + 1 / m)
-    return n * pair * mixture_contact(s, n) * np.sqrt(reduced)
+    z = float(hd.simulated(math.pi / 4 * np.sum(n * s**2)))
+    return n * pair * hd.contact_values(z, n, s) * np.sqrt(reduced)
 
 
 def cooling_ratio(mass_ratio: float, xi: float, share: float = 0.5) -> float:

@@ -72,7 +72,7 @@ def number(value: float, digits: int = 9) -> str:
 
 def measured(value: float, error: float) -> str:
     """A measured value, with its error if it has one."""
-    if not (value and error):
+    if not (value and error and np.isfinite(error)):
         return number(value)
     digits = max(2, int(np.ceil(np.log10(abs(value) / error + 1))) + 2)
     return f"{value:.{digits}g} ± {error:.1g}"
