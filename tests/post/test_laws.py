@@ -91,7 +91,7 @@ def test_free_paths_without_memory_have_the_mean_one():
 
 
 def test_a_mixture_flows_as_one_gas_if_its_disks_are_equal_and_however_its_species_are_cut():
-    """And it scales with its units."""
+    """It scales with its units; and a few heavy disks forget stress twice as fast as velocity."""
     eta, z, names = 0.3, float(hd.henderson(0.3)), ("viscosity", "bulk_viscosity")
     n, size, mass = 4 * eta / np.pi * np.array([0.2, 0.3, 0.5]), np.ones(3), np.ones(3)
     equal, one = hd.enskog_mixture(z, n, size, mass), hd.enskog(z, eta, 1.0)
@@ -105,6 +105,12 @@ def test_a_mixture_flows_as_one_gas_if_its_disks_are_equal_and_however_its_speci
         assert cut[name] == pytest.approx(whole[name])
         assert other[name] == pytest.approx(np.sqrt(3 * 5) / 2 * cut[name])
     assert other["memory"] == pytest.approx(2 * np.sqrt(3 / 5) * cut["memory"])
+    few, mass = eta * np.array([1, 1e-5]), np.array([1.0, 1e5])
+    alone, heavy = (
+        hd.enskog_mixture(z, few[:k], np.ones(k), mass[:k])["viscosity"] for k in (1, 2)
+    )
+    rate = 2 * np.sqrt(2 * np.pi) * eta * hd.contact_value(z, np.pi / 4 * eta) / mass[1]
+    assert heavy - alone == pytest.approx(1.022 * few[1] / (2 * rate), rel=0.01)
 
 
 @pytest.mark.parametrize("eta", [0.001, 0.2])
