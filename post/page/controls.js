@@ -46,7 +46,7 @@ function show(time, anew = false) {
   if (state.playing && !anew && performance.now() - told < (disks > 4000 ? 250 : 90)) return;  // they may come later than disks
   told = performance.now();
   if (source.grows) drawEnergies();
-  $('cursor').style.transform = `translateX(${cursorAt(moment.time)}px)`;
+  $('cursor').style.transform = `translateX(${Math.min(cursorAt(moment.time), $('energy').width / page.dots - 4)}px)`;
   drawHistogram();
   drawPressure();
   tellNumbers();
@@ -57,7 +57,7 @@ function show(time, anew = false) {
 }
 
 function layout() {
-  if (!film) return;  // it is still to come
+  if (!film || !$('main').clientWidth) return;  // it is still to come, or is not seen
   tell();  // the stage gets the room that plots and words leave
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {

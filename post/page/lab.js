@@ -225,7 +225,7 @@ function newBox() {
 const PLACING = 2000;  // ms, after which placing the disks keeps no other wish waiting
 let busy = 0, again = false, timer, latest = {};
 function run() {
-  clearTimeout(timer);
+  timer = clearTimeout(timer);
   latest = {};
   const box = current(), now = performance.now();
   if (busy && now < busy + PLACING) { again = true; return; }
@@ -244,12 +244,9 @@ function run() {
 
 // What acts on the running state does so at once, while the slider moves; the rest starts anew.
 function changed(key) {
-  clearTimeout(timer);
-  const box = current();
-  if (acts(key) && box?.run && !busy) {
-    latest[key] = state.settings[key] ?? givenAs(key);
-    timer = setTimeout(() => { filmOf(box).send({ do: 'change', settings: latest }); latest = {}; }, 25);
-  } else timer = setTimeout(run, 60);
+  if (busy || !acts(key) || !current()?.run) { run(); return; }
+  latest[key] = state.settings[key] ?? givenAs(key);
+  timer ??= setTimeout(() => { filmOf(current()).send({ do: 'change', settings: latest }); latest = {}; timer = undefined; }, 25);
 }
 
 // What a film hears from its worker.
@@ -421,6 +418,7 @@ function larger() {
 const actions = {
   run, keep, larger, scan: beginScan, theme: () => theme(!isDark()), choose: () => $('inputs').showModal(),
   pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
+  another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
 const keys = { r: 'run', p: 'pause', k: 'keep', s: 'settings', l: 'larger' };
@@ -439,7 +437,6 @@ addEventListener('keydown', typed);
 addEventListener('resize', () => arrangeAll());
 $('form').addEventListener('submit', event => event.preventDefault());
 $('everything').addEventListener('toggle', buildEverything);
-$('add').addEventListener('change', () => { if ($('add').value) addGroup(...$('add').value.split(' ')); });
 for (const button of $('heat').querySelectorAll('button')) button.addEventListener('click', () => filmOf(current()).send({ do: 'heat', factor: +button.dataset.factor }));
 $('measured').replaceChildren(...Object.entries(MEASURED).map(([name, text]) => new Option(text, name)));
 addEventListener('pageshow', event => { if (event.persisted) location.reload(); });

@@ -15,12 +15,15 @@ function talk(wish, heard) {
   return socket;
 }
 
+function starts(on) { document.documentElement.classList.toggle('starting', on); }
+const isStarting = () => document.documentElement.classList.contains('starting');
+
 // The run that the laboratory wishes, on the same line for all runs of this film.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
   if (!same) stream.sent = 0;
   stream.wish = run;
-  document.documentElement.classList.add('starting');
+  starts(true);
   if (stream.socket?.readyState === 1) { send(wish); return; }
   stream.socket = talk(wish, news => {
     hear[news.is]?.(news);
@@ -69,10 +72,11 @@ const hear = {
     if (!state.playing && source) show(moment.time, true);
   },
   state({ playing, ended }) {
+    if (isStarting()) return;  // that is said of the run before
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
-  problems() { document.documentElement.classList.remove('starting'); },
+  problems() { starts(false); },
 };
 
 function open({ facts, blocks, run }) {
@@ -101,7 +105,7 @@ function setTop(top) {
 }
 
 function take(buffer) {
-  if (stream.scene) { open(stream.scene); stream.scene = null; }
+  if (stream.scene) { open(stream.scene); stream.scene = null; starts(false); }
   const head = new Float64Array(buffer, 0, HEAD), pairs = from => new Float32Array(buffer, 8 * HEAD + 8 * from * disks, 2 * disks);
   const frame = { time: head[0], collisions: head[1], sides: [...head.slice(2)], place: pairs(0), velocity: pairs(1) };
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
@@ -112,7 +116,6 @@ function take(buffer) {
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
   stream.fresh++;
-  document.documentElement.classList.remove('starting');
   if (isFirst) {
     document.documentElement.classList.remove('empty');
     origins = frame.place;
@@ -136,7 +139,7 @@ const fromWorker = {
   numbers: () => stream.numbers,
   coming: () => stream.live ? stream.events : { next: [], happened: null },
   hasEvents: () => !film.stepped,
-  goesOn: () => !stream.ended || !stream.live,
+  goesOn: () => isStarting() || !stream.ended || !stream.live,
   setPace(value) {
     if (value === stream.sent) return;
     stream.sent = value;

@@ -17,6 +17,7 @@ import base64
 import ctypes
 import json
 import os
+import re
 import resource
 import select
 import signal
@@ -406,7 +407,8 @@ def refuse(problem: Exception, change: bool = False) -> None:
     found = []
     for line in str(problem).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
-        found.append({"place": place, "text": line.split(": ", 2)[-1]})
+        text = re.sub(r"^(--set .*|\w+:\d+): \w+\.\w+: ", "", line)
+        found.append({"place": place, "text": text})
     tell({"is": "problems", "change": change, "problems": found})
 
 
