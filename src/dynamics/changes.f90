@@ -6,6 +6,7 @@ module changes
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
+  use side_motion, only: free
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
   implicit none
@@ -32,7 +33,7 @@ contains
     other%box%epoch = sim%epoch
     do k = 1, n_sides                                        ! of one that is free still, its mass and force may be others
       associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
-        if (.not. (old%is_free() .and. new%is_free())) cycle
+        if (.not. (old%kind == free .and. new%kind == free)) cycle
         tau = old%moment(sim%epoch, sim%now)
         new%at = old%place(tau)
         new%v = old%velocity(tau)

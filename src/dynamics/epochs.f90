@@ -6,6 +6,7 @@ module epochs
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
+  use side_motion, only: steady
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -110,7 +111,7 @@ contains
       sim%last_advance = sim%last_advance - shift
       sim%box%epoch = sim%epoch
       sim%box%surface%motion%clock = sim%box%surface%motion%clock - shift
-      if (.not. sim%box%has_moving_sides()) return
+      if (.not. any(sim%box%surface%motion%travels())) return
       do i = 1, sim%n_disks()
         call keep_off_sides(sim%box, sim%disk(i), sim%now)
       end do
@@ -132,7 +133,7 @@ contains
     logical :: yes
 
     associate (box => sim%box)
-      yes = any(box%surface%motion%strokes()) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
+      yes = any(box%surface%motion%kind == steady) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
       if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
         + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
     end associate

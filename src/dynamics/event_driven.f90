@@ -16,6 +16,7 @@ module event_driven
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: event_t
   use partners, only: is_wall
+  use side_motion, only: free
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use tracks, only: tracks_t
@@ -206,7 +207,7 @@ contains
       else
         call collide_wall(sim, i, code, t, counts)
       end if
-      if (sim%box%surface(1 - code)%motion%is_free()) call follow_side(self, sim, code)
+      if (sim%box%surface(1 - code)%motion%kind == free) call follow_side(self, sim, code)
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)

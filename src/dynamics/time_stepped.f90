@@ -124,7 +124,7 @@ contains
     logical :: yes
     integer(int32) :: i
 
-    yes = .not. (sim%box%falling() .or. sim%box%has_moving_sides())
+    yes = .not. (sim%box%falling() .or. any(sim%box%surface%motion%travels()))
     do i = 1, sim%n_disks()
       if (.not. yes) return
       yes = .not. any(abs(sim%disk(i)%v) > slowest)

@@ -8,11 +8,11 @@ module side_motion
   use kinds, only: never, pi, real64
   implicit none
   private
-  public :: motions, sawtooth, side_motion_t
+  public :: motions, side_motion_t
 
   !> The motions by their names in the input; a motion is its number in this list.
   character(len=*), parameter :: motions = "still sine parabolic sawtooth steady free"
-  integer, parameter :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5, free = 6
+  integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5, free = 6
   real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
   !> A part of a period: what bends the gap for so short a time does not change it by a bit.
   real(real64), parameter :: negligible = 1.0e-10_real64
@@ -33,10 +33,7 @@ module side_motion
     real(real64) :: at = 0.0_real64                  !! how far inwards it was then [length]
     real(real64) :: v = 0.0_real64                   !! its velocity inwards then, after the hit [length/time]
   contains
-    procedure :: is_on
     procedure :: travels
-    procedure :: strokes
-    procedure :: is_free
     procedure :: drifts
     procedure :: inmost
     procedure :: top_speed
@@ -49,14 +46,6 @@ module side_motion
 
 contains
 
-  !> Whether disks meet the side as one that moves.
-  elemental function is_on(self) result(yes)
-    class(side_motion_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%kind /= still
-  end function is_on
-
   !> Whether its place changes.
   elemental function travels(self) result(yes)
     class(side_motion_t), intent(in) :: self
@@ -64,22 +53,6 @@ contains
 
     yes = self%kind == sine .or. self%kind == parabolic .or. self%drifts()
   end function travels
-
-  !> Whether it goes somewhere, once.
-  elemental function strokes(self) result(yes)
-    class(side_motion_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%kind == steady
-  end function strokes
-
-  !> Whether disks push it.
-  elemental function is_free(self) result(yes)
-    class(side_motion_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%kind == free
-  end function is_free
 
   !> Whether the room that it leaves to the disks changes for good.
   elemental function drifts(self) result(yes)
@@ -95,7 +68,7 @@ contains
     real(real64) :: x                                !! [length]
 
     x = self%amplitude
-    if (self%is_free() .or. (self%kind == steady .and. self%strike < 0)) x = 0
+    if (self%kind == free .or. (self%kind == steady .and. self%strike < 0)) x = 0
   end function inmost
 
   !> The highest speed of the side; of a free one, that of a fall through the box.

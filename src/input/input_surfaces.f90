@@ -10,7 +10,7 @@ module input_surfaces
   use variables, only: largest, table, words_of
   use partners, only: n_sides, side_name
   use segments, only: new_segment
-  use side_motion, only: motions, sawtooth, side_motion_t
+  use side_motion, only: free, motions, sawtooth, side_motion_t, steady
   use texts, only: place_of, written
   implicit none
   private
@@ -86,7 +86,7 @@ contains
         if (.not. box%surface(side)%motion%travels()) cycle
         ! Sides must not meet, whenever each is how far inwards.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
-          trim(merge("end      ", "amplitude", box%surface(side)%motion%strokes())), "leaves no room between the sides, " &
+          trim(merge("end      ", "amplitude", box%surface(side)%motion%kind == steady)), "leaves no room between the sides, " &
           //"which are "//written(width)//" apart (box.upper)", problems)
       end if
     end do
@@ -134,7 +134,7 @@ contains
       motion%strike = group%real_of("velocity", 0.0_real64)
       if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
         "velocity", "must be > 0 with motion = 'sawtooth': it strikes inwards", problems)
-      if (motion%strokes()) then
+      if (motion%kind == steady) then
         motion%begin = group%real_of("begin", 0.0_real64)
         motion%end = group%real_of("end", 0.0_real64)
         motion%amplitude = abs(motion%strike)*(motion%end - motion%begin)
@@ -142,7 +142,7 @@ contains
           "end", "is not after begin, "//written(motion%begin), problems)
         if (motion%amplitude > largest) call group%complain("end", "the side moves as far as "//written(motion%amplitude) &
           //"; allowed: up to "//written(largest), problems)
-      else if (motion%is_free()) then
+      else if (motion%kind == free) then
         motion%mass = group%real_of("mass", 1.0_real64)
         motion%pull = group%real_of("force", 0.0_real64)/motion%mass
         motion%amplitude = width

@@ -8,7 +8,7 @@ module box_geometry
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, sense_of, side_name
   use shapes, only: shape_t
-  use side_motion, only: side_motion_t
+  use side_motion, only: side_motion_t, still
   implicit none
   private
   public :: box_t, surface_t
@@ -41,7 +41,6 @@ module box_geometry
     procedure :: stream
     procedure :: add_obstacles
     procedure :: has_obstacles
-    procedure :: has_moving_sides
     procedure :: is_wall
     procedure :: has_lossy_walls
     procedure :: has_rough_walls
@@ -149,14 +148,6 @@ contains
 
     yes = size(self%surface) > n_sides
   end function has_obstacles
-
-  !> Whether the place of any side changes.
-  pure function has_moving_sides(self) result(yes)
-    class(box_t), intent(in) :: self
-    logical :: yes
-
-    yes = any(self%surface%motion%travels())
-  end function has_moving_sides
 
   !> Whether disks bounce off surface k.
   pure function is_wall(self, k) result(yes)
@@ -292,7 +283,7 @@ contains
 
     u = 0
     associate (motion => box%surface(1 - code)%motion)
-      if (motion%is_on()) u = motion%velocity(motion%moment(box%epoch, t))*normal
+      if (motion%kind /= still) u = motion%velocity(motion%moment(box%epoch, t))*normal
     end associate
   end function strike_velocity
 

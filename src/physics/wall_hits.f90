@@ -6,7 +6,7 @@ module wall_hits
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: disk_t, land, spin_column
   use partners, only: is_side
-  use side_motion, only: side_motion_t
+  use side_motion, only: free, side_motion_t
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, gain, heat, impulse, work
@@ -46,7 +46,7 @@ contains
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
     associate (motion => sim%box%surface(1 - code)%motion)
-      if (motion%is_free()) call push(motion, sim%disk(i), sim%mass_of(i), normal, v, u, t)
+      if (motion%kind == free) call push(motion, sim%disk(i), sim%mass_of(i), normal, v, u, t)
     end associate
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))

@@ -171,7 +171,7 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%moving = box%has_moving_sides()
+    self%moving = any(box%surface%motion%travels())
     self%falling = box%falling() .or. self%moving
     self%box = box
     call cut(1, self%column)

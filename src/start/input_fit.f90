@@ -13,6 +13,7 @@ module input_fit
   use radii, only: drawn_radii
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
+  use side_motion, only: steady
   use starting_disks, only: read_disks, resolution
   use texts, only: place_of, written
   use variables, only: most_disks, obstacle_groups
@@ -78,7 +79,7 @@ contains
       side = place_of(trim(groups(k)%instance), side_name)
       axis = (side + 1)/2
       associate (motion => box%surface(side)%motion)
-        if (.not. motion%strokes() .or. motion%strike < 0) cycle
+        if (motion%kind /= steady .or. motion%strike < 0) cycle
         call bounds(box, motion%end, low, high)
         if (product(high - low) > disks) cycle
         last = motion%end - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
