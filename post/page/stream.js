@@ -231,7 +231,7 @@ function showScan({ x: variable, y: measured, log, points, values }) {
   }
   pen.stroke();
   for (const [value, mean] of points) pen.fillRect(x(scaled(value)) - 3, y(mean) - 3, 6, 6);
-  const words = points.map(([value, mean, error]) => `${short(value)}: ${short(mean)} ± ${short(+error.toPrecision(2))}`).join('; ');
-  $('scan').querySelector('p').textContent = `Against ${variable}, with standard errors. ${words}`;
+  const words = points.map(([value, mean, error]) => `${short(value)}: ${withError({ value: mean, error })}`).join('; ');
+  $('scan').querySelector('p').textContent = `Against ${variable}. ${words}`;
   canvas.setAttribute('aria-label', `${measured} against ${variable}. ${words}`);
 }

@@ -51,7 +51,9 @@ COMING = 6  # of them
 WAY = 0.2  # of the box, that is left to a side that disks push
 FEWEST = 40  # samples of a mean with an error
 MOST = 4000  # samples that are kept
-LOOK = 1.0  # s that a value of a scan takes
+LOOKS, SOME = 160, 1000  # samples for a value of a scan; disks of a run whose collisions are enough
+LONGEST = 4.0  # s that they may take
+COUNTED = ("collisions", "dissipated_energy")  # since the start
 TURNS = "angular_velocity"
 ENDINGS = {"input": ".nml", "script": ".py", "output": ".h5.part"}
 UNREAD = bytearray()  # of a line that has not come to its end
@@ -481,25 +483,31 @@ def scan(wish: dict) -> None:
         tell({"is": "scan", "index": index, "mean": found[0], "error": found[1]})
 
 
-def measured(text: str, lines: list[str], name: str) -> tuple[float, float]:
-    """Mean of an observable in the second half of a second, and its error."""
+def measured(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
+    """Mean over time of an observable, or the rate of one that counts; its error if it settles.
+
+    In the second half of `LOOKS` samples, between which each disk has half a collision or so.
+    """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
-        count = simulation.count
-        step = max(1, count // 2)
-        while time.perf_counter() < began + LOOK or len(samples) < 2 * FEWEST:
+        count, settles = simulation.count, simulation.nature.in_equilibrium
+        step = max(count, SOME) // 4
+        while len(samples) < LOOKS and time.perf_counter() < began + LONGEST:
             seen = simulation._observed()
             value = {key: float(np.sum(part)) for key, part in seen.items()}
             value["time"] = simulation.time
             samples.append([value[key] for key in ("time", "all/kinetic_energy", "virial", name)])
-            simulation._go_on((np.inf, simulation.collisions + step, NEVER), LOOK / FEWEST)
-            if time.perf_counter() > began + 4 * LOOK:
-                break
+            simulation._go_on((np.inf, NEVER, simulation.events + step), LONGEST / LOOKS)
     late = np.array(samples[len(samples) // 2 :]).T
-    one = series_mean(late[-1])
+    apart = np.diff(late[0])
+    if not apart.any():
+        raise ValueError("nothing happens here")
     if name == "pressure":  # that is a mean since the start
         one = pressure_between(*late[:3], count, value)
-    return float(one.mean), float(one.error) if np.isfinite(one.error) else 0.0
+    else:
+        gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
+        one = series_mean(gain, apart)
+    return float(one.mean), float(one.error) if settles and np.isfinite(one.error) else None
 
 
 def work(pictured: Callable[[Run], tuple[dict, dict]]) -> None:

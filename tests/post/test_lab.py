@@ -348,17 +348,36 @@ def test_a_run_can_be_kept_after_a_wrong_wish_and_without_a_folder(program, tmp_
         assert process.poll() is None
 
 
-def test_a_scan_gives_the_mean_for_each_value(address):
+SCANS = {  # of a gas: changes, what is measured, with which values, and what it is proportional to
+    "gas, the energy of each disk": ({}, "all/kinetic_energy", ("1", "2"), (1, 4)),
+    "gas, collisions per time": ({}, "collisions", ("1", "2"), (1, 2)),
+    "gas, pressure": ({}, "pressure", ("1", "2"), (1, 4)),
+    "a gas that cools, energy per time": (
+        {"contact.restitution": "0.9"},
+        "dissipated_energy",
+        ("1", "2"),
+        (1, 8),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SCANS)
+def test_a_scan_gives_means_and_rates_whatever_the_time_it_takes(address, case):
+    """All of a run goes as its speeds."""
+    settings, of, values, powers = SCANS[case]
+
     async def visit():
         async with film(address) as one:
             await one.start()
-            wish = {"input": "gas", "settings": {}, "added": [], "of": "all/kinetic_energy"}
-            await one.say("scan", **wish, variable="species.gas.speed", values=["1", "2"])
-            return [await one.until("scan") for _ in range(2)]
+            wish = {"input": "gas", "settings": settings, "added": [], "of": of}
+            await one.say("scan", **wish, variable="species.gas.speed", values=values)
+            return [await one.until("scan") for _ in values]
 
     found = asyncio.run(visit())
     assert [one["index"] for one in found] == [0, 1]
-    np.testing.assert_allclose([one["mean"] for one in found], [0.5, 2.0], rtol=1e-9)
+    means = [one["mean"] / power for one, power in zip(found, powers, strict=True)]
+    assert means[0] == pytest.approx(means[1], rel=1e-6) and means[0] > 0
+    assert (found[0]["error"] is None) == bool(settings)
 
 
 def test_runs_have_their_number(address):
