@@ -59,6 +59,7 @@ function show(time, anew = false) {
 function layout() {
   if (!film || !$('main').clientWidth) return;  // it is still to come, or is not seen
   tell();  // the stage gets the room that plots and words leave
+  $('pressures').hidden = false;  // to be measured
   layOutStage();
   for (const canvas of ['histogram', 'energy', 'pressure'].map($)) {
     const { clientWidth, clientHeight } = canvas;  // asked for once, for it takes long

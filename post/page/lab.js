@@ -231,7 +231,7 @@ function run() {
   if (busy && now < busy + PLACING) { again = true; return; }
   if (busy && isThere(box)) filmOf(box).leave();
   busy = now;
-  tell('starting …');
+  tell('');
   state.paused = false;
   const begin = () => {
     filmOf(box).theme(isDark());

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -256,6 +257,38 @@ def test_a_paused_run_goes_back_step_by_step_and_on(opened):
     wait_for(lambda: inside(opened, "moment.time") > before + 0.01)
 
 
+def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
+    """A script and an output of the same moment, an input that runs; the energies of a scan."""
+    opened.press("p")
+    slide(opened, 3, 0.5)  # restitution
+    wait_for(lambda: "script" in opened.run("return $('shelf').textContent"))
+    where = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    wish = {"cmd": "Browser.setDownloadBehavior", "params": where}
+    opened.call("POST", "/goog/cdp/execute", wish)
+    for number, name in enumerate(("gas.nml", "gas.py", "gas.h5.part")):
+        opened.run("$('shelf').querySelectorAll('button')[arguments[0]].click()", number)
+        wait_for((tmp_path / name).exists)
+    space = {}
+    script = (tmp_path / "gas.py").read_text()
+    exec(
+        script.replace("    print(", "    state = simulation.time, simulation.position  # ("), space
+    )
+    time, position = space["state"]
+    with Simulation.load(tmp_path / "gas.h5.part") as there:
+        assert there.time == time and np.array_equal(there.position, position)
+    with Simulation(tmp_path / "gas.nml") as again:
+        assert again.parameters["contact"]["restitution"] == 0.65
+    opened.run("set('contact.restitution', '1')")
+    opened.run("$('scanning').open = true")
+    opened.click("scan")
+    wait_for(lambda: opened.run("return scan.points.length") == 5)
+    for speed, mean, _ in opened.run("return scan.points"):
+        assert mean == pytest.approx(speed**2 / 2)
+    assert "mean kinetic energy" in opened.run(
+        "return filmOf(current()).document.getElementById('scan').innerText"
+    )
+
+
 SIZES = [(1280, 800, False), (1920, 1080, False), (820, 1180, False), (390, 844, True)]
 
 
@@ -279,6 +312,13 @@ def test_everything_has_a_name_and_nothing_is_covered_or_too_wide(opened, size):
         return [[frame.x + stage.left, frame.y + stage.bottom], [form.right, form.top]];"""
     )
     assert stage[0] >= form[0] - 1 or stage[1] <= form[1] + 1, "the form covers the film"
+    widths = opened.run(
+        """const film = filmOf(current()), plots = film.document.querySelectorAll('aside canvas');
+        film.document.getElementById('pressures').hidden = true;
+        film.layout();
+        return [...plots].filter(one => one.offsetParent).map(one => one.width);"""
+    )
+    assert all(widths), "a plot that was hidden has no size"
     opened.press("p")
     wait_for(lambda: not inside(opened, "state.playing"))
     names = opened.run(
