@@ -199,11 +199,9 @@ async function choose(name) {
 function buildInputs() {
   const subjects = [...new Set(lab.inputs.map(({ subject }) => subject))];
   $('inputs').replaceChildren(make('header', {}, make('h2', { textContent: 'What shall run?' }), make('button', { type: 'button', textContent: 'Close', onclick: () => $('inputs').close() })),
-    ...subjects.flatMap(subject => [make('h3', { textContent: subject }), make('div', {}, ...lab.inputs.filter(one => one.subject === subject).map(({ name, title, sentence, picture }) => {
-      const button = make('button', { type: 'button' }, ...(picture ? [make('img', { src: picture, alt: '', width: 144, height: 144 })] : []), make('b', { textContent: title }), make('span', { textContent: sentence }));
-      button.addEventListener('click', () => { $('inputs').close(); choose(name); });
-      return button;
-    }))]));
+    ...subjects.flatMap(subject => [make('h3', { textContent: subject }), make('div', {}, ...lab.inputs.filter(one => one.subject === subject).map(({ name, title, sentence, picture }) =>
+      make('button', { type: 'button', onclick: () => { $('inputs').close(); choose(name); } },
+        ...(picture ? [make('img', { src: picture, alt: '', width: 144, height: 144 })] : []), make('b', { textContent: title }), make('span', { textContent: sentence }))))]));
 }
 
 // ---------- runs ----------
@@ -228,7 +226,8 @@ function run() {
   timer = clearTimeout(timer);
   latest = {};
   const box = current(), now = performance.now();
-  if (busy && now < busy + PLACING) { again = true; return; }
+  again = busy && now < busy + PLACING;
+  if (again) { timer = setTimeout(run, busy + PLACING - now); return; }
   if (busy && isThere(box)) filmOf(box).leave();
   busy = now;
   tell('');
@@ -278,7 +277,7 @@ function hear(source, news) {
 
 function ready() {
   busy = 0;
-  if (again) { again = false; run(); }
+  if (again) run();
 }
 
 // Once, where it belongs, or at what has changed last: that text waits, what it would replace goes on, and the others act.
@@ -323,8 +322,7 @@ function tellShelf() {
       filmOf(box).play(box.shown && !state.paused);
       arrangeAll();
     });
-    const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}` });
-    away.addEventListener('click', () => remove(box));
+    const away = make('button', { type: 'button', textContent: '×', title: `remove run ${box.letter}`, onclick: () => remove(box) });
     const own = box === current(), parts = [make('b', { textContent: `${box.letter}: ` }), whatIs(box)];
     return make('li', {}, make('p', {}, ...(own ? [] : [seen, ' ']), ...parts), make('p', { className: 'links' }, ...['input', ...(box.changes.length ? ['script'] : []), 'output'].map(file), ...(own ? [] : [away])));
   }));

@@ -51,7 +51,7 @@ def setting(value: object) -> str:
     """A value as --set has it."""
     if isinstance(value, list):
         return ",".join(map(setting, value))
-    return value if isinstance(value, str) else value_text("", value)
+    return value if isinstance(value, str) else value_text("", value).removesuffix(".0")
 
 
 # --- processes ---
