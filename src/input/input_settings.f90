@@ -180,7 +180,8 @@ contains
       if (group%given("frames_from") .and. all(settings%output%sampling%per_decade == 0)) call group%complain("frames_from", &
         "has no effect without frames_per_decade or observables_per_decade", problems)
       associate (output => settings%output)
-        if (group%given("frame_columns")) output%frame_columns = group%values(row_of("output", "frame_columns"))%texts
+        k = row_of("output", "frame_columns")
+        if (group%values(k)%is_set()) output%frame_columns = group%values(k)%texts
         output%single_precision = group%text_of("precision") == "single"
         output%event_log = group%text_of("event_log") == ".true."
         output%virial_tensor = group%text_of("virial_tensor") == ".true."
