@@ -8,8 +8,9 @@ module cell_faces
   use box_sides, only: side_time
   use disks, only: disk_t
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
-  use partners, only: crossing, is_wall, nothing, sense_of, side_crossed
+  use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
+  use side_motion, only: free
   implicit none
   private
   public :: all_cells, cell_faces_t, patch_t
@@ -215,7 +216,8 @@ contains
     end subroutine find_struck
   end subroutine set
 
-  !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move.
+  !> The rectangle in which the centres of disks in a cell are. The outer ones go on as far as sides move: for ever, if
+  !> disks push them.
   pure subroutine rectangle(self, cell, n, low, high)
     class(cell_faces_t), intent(in) :: self
     integer(int32), intent(in) :: cell(2)          !! of all those of the box
@@ -224,6 +226,7 @@ contains
     real(real64) :: reach(2, 2)
 
     reach = self%box%reach()
+    where (transpose(reshape(self%box%surface(:n_sides)%motion%kind == free, [2, 2]))) reach = never
     low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(reach(:, 1), 0.0_real64, cell == 1)
     high = self%width*cell + 0.5_real64*self%overlap + merge(reach(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle

@@ -13,7 +13,7 @@ module input_fit
   use radii, only: drawn_radii
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
-  use side_motion, only: steady
+  use side_motion, only: free, steady
   use starting_disks, only: read_disks, resolution
   use texts, only: place_of, written
   use variables, only: most_disks, obstacle_groups
@@ -65,7 +65,8 @@ contains
     end associate
   end subroutine fit_together
 
-  !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end.
+  !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end. Where
+  !> disks push one side, they may make room.
   subroutine check_strokes(box, disks, groups, problems)
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: disks                         !! their area [length**2]
@@ -74,6 +75,7 @@ contains
     real(real64) :: low(2), high(2), last
     integer :: o(2), k, side, axis
 
+    if (any(box%surface(:n_sides)%motion%kind == free)) return
     o = range_of(groups, ["side"])
     do k = o(1), o(2)
       side = place_of(trim(groups(k)%instance), side_name)

@@ -284,6 +284,20 @@ def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
     assert v[:4].tolist() == [1, -1, 1, 0]
 
 
+def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
+    """Far beyond the box, big ones among small ones, too; a side with a stroke may follow."""
+    cells, pairs = (
+        observed(
+            f"""&run search = '{search}' / &side name = 'right' motion = 'free' mass = 20 force = 1 /
+            &side name = 'left' motion = 'steady' velocity = 0.01 end = 50 /
+            &species count = 40 radius = 0.03 speed = 1 / &stop time = 50 /
+            &species count = 2 radius = 0.1 speed = 1 / &output frames_every_time = 1 /"""
+        )["/particles/disks/position/value"]
+        for search in ("cells", "pairs")
+    )
+    assert cells[:, :, 0].max() > 5 and (cells == pairs).all()
+
+
 def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
     """Its own, that of the force, and what is lost, added to those of the disks."""
     found = observed(
