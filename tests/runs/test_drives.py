@@ -288,8 +288,9 @@ def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
     """Far beyond the box, big ones among small ones, too; a side with a stroke may follow."""
     cells, pairs = (
         observed(
-            f"""&side name = 'right' motion = 'free' mass = 20 force = 1 /
-            &run search = '{search}' / &side name = 'left' motion = 'steady' velocity = 0.01 end = 50 /
+            f"""&run search = '{search}' /
+            &side name = 'right' motion = 'free' mass = 20 force = 1 /
+            &side name = 'left' motion = 'steady' velocity = 0.01 end = 50 /
             &species count = 40 radius = 0.03 speed = 1 / &stop time = 50 /
             &species count = 2 radius = 0.1 speed = 1 / &output frames_every_time = 1 /"""
         )["/particles/disks/position/value"]
