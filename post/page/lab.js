@@ -178,6 +178,7 @@ function addGroup(kind, name) {
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
+  scan = scanner?.close();
   run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
@@ -233,7 +234,7 @@ function run() {
   tell('');
   state.paused = false;
   const begin = () => {
-    filmOf(box).theme(isDark());
+    if (!box.run) dress();
     if (state.boxes.length > 1 && !box.run) filmOf(box).choices(filmOf(state.boxes.at(-2)).choices());
     box.wished = { ...wish(), words: changesInWords(), run: ++state.runs };
     filmOf(box).start(box.wished);
@@ -349,6 +350,7 @@ function arrangeAll() {
   }
   tellShelf();
   overlayAll();
+  drawScan();
 }
 
 function overlayAll() {
@@ -377,15 +379,17 @@ let scan, scanner;  // what is measured; where from
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
   scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values };
-  filmOf(current()).showScan(scan);
+  drawScan();
   scanner?.close();
   scanner = filmOf(current()).talk({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value }, addToScan);
   tell('scanning …');
 }
 
+function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
+
 function addToScan({ is, index, mean, error, problems }) {
   if (is === 'scan') scan.points.push([scan.values[index], mean, error]);
-  filmOf(current()).showScan(scan);
+  drawScan();
   if (scan.points.length < scan.values.length && !problems) return;
   tell(problems ? problems[0].text : '', !!problems);
   scanner.close();
@@ -395,27 +399,27 @@ function addToScan({ is, index, mean, error, problems }) {
 
 const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-function theme(night) {
-  document.documentElement.dataset.theme = night ? 'dark' : 'light';
-  for (const box of state.boxes) if (isThere(box)) { filmOf(box).theme(night); filmOf(box).refresh(); }
-}
-
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
   arrangeAll();
 }
 
-function larger() {
-  const on = $('larger').ariaPressed !== 'true';
-  $('larger').ariaPressed = on;
-  for (const one of [window, ...state.boxes.filter(isThere).map(filmOf)]) one.document.documentElement.classList.toggle('larger', on);
+// All films are as the page.
+function dress() {
+  for (const one of state.boxes.filter(isThere).map(filmOf)) {
+    one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
+    one.theme(isDark());
+    if (one.inside().film) one.refresh();
+  }
   arrangeAll();
 }
 
 const actions = {
-  run, keep, larger, scan: beginScan, theme: () => theme(!isDark()), choose: () => $('inputs').showModal(),
+  run, keep, scan: beginScan, choose: () => $('inputs').showModal(),
   pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
+  larger: () => { $('larger').ariaPressed = document.documentElement.classList.toggle('larger'); dress(); },
+  theme: () => { document.documentElement.dataset.theme = isDark() ? 'light' : 'dark'; dress(); },
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());
@@ -438,7 +442,7 @@ $('everything').addEventListener('toggle', buildEverything);
 for (const button of $('heat').querySelectorAll('button')) button.addEventListener('click', () => filmOf(current()).send({ do: 'heat', factor: +button.dataset.factor }));
 $('measured').replaceChildren(...Object.entries(MEASURED).map(([name, text]) => new Option(text, name)));
 addEventListener('pageshow', event => { if (event.persisted) location.reload(); });
-theme(matchMedia('(prefers-color-scheme: dark)').matches);
+document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
 buildInputs();
 newBox();
 bare(matchMedia('(max-height: 500px)').matches);

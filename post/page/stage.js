@@ -58,7 +58,9 @@ function layOutStage() {
   page.width = Math.round(width * page.unit + 2 * margin);
   page.height = Math.round(height * page.unit + 2 * margin);
   for (const layer of layers) Object.assign(layer, { width: page.width, height: page.height });
-  Object.assign($('stage').style, { width: page.width / dots + 'px', height: page.height / dots + 'px', marginRight: boxSize ? (boxSize.width - page.width / dots) / 2 + 'px' : '' });
+  Object.assign($('stage').style, { width: page.width / dots + 'px', height: page.height / dots + 'px' });
+  const rest = boxSize && { marginRight: (boxSize.width - page.width / dots) / 2 + 'px', marginBottom: boxSize.height - page.height / dots + 'px' };
+  Object.assign($('stage').style, rest ?? { marginRight: '', marginBottom: '' });
   picture = disksBrush.createImageData(page.width, page.height);
   pixels = new Int32Array(picture.data.buffer);
   const colours = quantities[state.colour] ? Array.from({ length: 256 }, (_, k) => scaleColour(k)) : kinds.map(speciesColour);

@@ -21,7 +21,8 @@ const isStarting = () => document.documentElement.classList.contains('starting')
 // The run that the laboratory wishes, on the same line for all runs of this film.
 function start(run) {
   const same = stream.wish?.input === run.input, wish = { do: 'start', ...run, pace: same ? stream.sent : null, playing: !parent.isPaused() };
-  if (!same) stream.sent = 0;
+  if (!same) [stream.sent, usual] = [0, usual || !!stream.wish];
+  $('scan').hidden ||= !same;
   stream.wish = run;
   starts(true);
   if (stream.socket?.readyState === 1) { send(wish); return; }
