@@ -90,8 +90,9 @@ function mostOf({ key, to = Infinity }) {
 
 // Values from one end of a slider to the other, rounded: no two are alike.
 function valuesOf(spec, steps) {
-  const { key, from, to, log } = spec, top = mostOf(spec), unit = variableOf(key).type === 'integer' ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
-  const near = value => log && unit !== 1 ? +value.toPrecision(3) : +(Math.round(value / unit) * unit).toPrecision(12);
+  const { key, from, to, log } = spec, top = mostOf(spec), whole = variableOf(key).type === 'integer';
+  const unit = whole ? 1 : 10 ** Math.floor(Math.log10((to - from) / 100));
+  const near = value => log && !whole ? +value.toPrecision(3) : +(Math.round(value / unit) * unit).toPrecision(12);
   return [...new Set(Array.from({ length: steps + 1 }, (_, k) => near(log ? from * (top / from) ** (k / steps) : from + k / steps * (top - from))))];
 }
 

@@ -137,6 +137,12 @@ def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
     assert opened.run("return current().changes.length") == 0
 
 
+def test_a_slider_of_decades_has_each_of_them(opened):
+    for name, middle in (("mass", 31.6), ("count", 32)):
+        spec = {"key": f"species.gas.{name}", "from": 1, "to": 1000, "log": True}
+        assert opened.run("return valuesOf(arguments[0], 2)", spec) == [1, middle, 1000]
+
+
 def test_a_value_that_cannot_be_waits_alone(opened):
     before = opened.run("return current().run")
     opened.run("set('species.gas.radius', '0.03')")
