@@ -16,34 +16,37 @@ MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_co
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
 
 
-def refuse_shear(run: Run) -> None:
-    """The images here do not slide."""
-    allow(run, "structure is found in boxes at rest", *TRAITS.keys() - {"sheared"})
+def refuse(run: Run, *traits: str) -> None:
+    """The images here do not slide, and waves take a box without walls."""
+    law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walled" in traits)
+    allow(run, law, *TRAITS.keys() - set(traits))
 
 
 def pair_correlation(
     run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters; between walls only about disks far from them.
+    """g(r) in bins, `edges` in mean diameters; NaN without pairs.
 
-    Of a `pair` of species: of disks of the second about those of the first.
+    Between walls, which may move, only about disks far from them.  Of a `pair` of species: of disks of the second about those of the first.
     """
-    refuse_shear(run)
+    refuse(run, "sheared")
     r = edges * 2 * run.radius.mean()
     size = np.where(run.periodic, run.edges, 0.0)
     one, *others = masks(run, pair)
     other = others[0] if others else one
     sums = np.zeros(len(edges) - 1)
-    centres = 0
+    expected = 0.0  # pairs per area, of disks at random
     for k in frames:
-        x = run.position[k] - run.lower
+        x, (lower, upper) = run.position[k], run.sides_at(run.time[k])
         margin = np.where(run.periodic, -np.inf, r[-1])
-        inner = one & np.all((x > margin) & (x < run.edges - margin), axis=1)
-        tree, part = (scipy.spatial.cKDTree(x[some], boxsize=size) for some in (other, inner))
+        inner = one & np.all((x > lower + margin) & (x < upper - margin), axis=1)
+        tree, part = (
+            scipy.spatial.cKDTree(x[some] - run.lower * run.periodic, boxsize=size)
+            for some in (other, inner)
+        )
         sums += np.diff(part.count_neighbors(tree, r))
-        centres += inner.sum()
-    density = (other.sum() - (not others)) / np.prod(run.edges)
-    return sums / np.maximum(centres, 1) / (density * np.pi * np.diff(r**2))
+        expected += inner.sum() * (other.sum() - (not others)) / np.prod(upper - lower)
+    return sums / (expected or np.nan) / (np.pi * np.diff(r**2))
 
 
 def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
@@ -59,7 +62,7 @@ def structure_factor(
     Of a `pair` of species: the product of their two sums, over the root of their numbers.  Periodic
     boxes.  Of many disks only every so many wave vector along x and y is taken.
     """
-    refuse_shear(run)
+    refuse(run, "sheared", "walled")
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
     step = int(np.ceil(np.sqrt(2 * run.count * np.prod(most + 1) / MOST_TERMS)))
@@ -102,8 +105,9 @@ def averaged(
     middle, alone = (edges[1:] + edges[:-1]) / 2, len(runs) == 1
     parts = [(runs[0], [k]) for k in frames[0]] if alone else zip(runs, frames, strict=True)
     values = np.array([of(run, part, edges, *more) for run, part in parts])
-    known = np.isfinite(values).all(axis=0)
-    columns = values[:, known]
+    seen = np.isfinite(values).any(axis=1)  # between walls that are near there may be no pairs
+    known = np.isfinite(values[seen]).all(axis=0) & seen.any()
+    columns = values[np.ix_(seen, known)]
     if not alone:
         return Curve(middle[known], *estimate(columns))
     each = [series_mean(one)[:2] for one in columns.T]
@@ -112,7 +116,7 @@ def averaged(
 
 def largest_cluster(run: Run, frame: int, gap: float) -> int:
     """Disks in the largest cluster: those that hang together by gaps below `gap`."""
-    refuse_shear(run)
+    refuse(run, "sheared")
     x = np.clip(run.position[frame] - run.lower, 0, np.nextafter(run.edges, 0))
     tree = scipy.spatial.cKDTree(x, boxsize=np.where(run.periodic, run.edges, 0.0))
     i, j = tree.query_pairs(2 * float(run.radius.max()) + gap, output_type="ndarray").T

@@ -28,6 +28,28 @@ def test_points_at_random_are_not_correlated(tmp_path, rng, periodic):
     run = written(tmp_path / "run.h5", x, x, periodic=periodic)
     g = structure.pair_correlation(run, list(range(60)), np.linspace(1, 6, 6))
     np.testing.assert_allclose(g, 1, atol=0.05)
+    if not all(periodic):
+        with pytest.raises(Refused, match="has walls"):
+            structure.structure_factor(run, [0], np.array([0.1, 1.0]))
+
+
+def test_pairs_are_counted_in_the_box_of_the_moment(tmp_path, rng):
+    """Where a side presses the disks together; nothing is known of frames with none far from it."""
+    time, stroke = (
+        np.arange(60.0),
+        {"motion": "steady", "velocity": 0.01, "begin": 0.0, "end": 50.0},
+    )
+    x = rng.uniform(size=(60, 1000, 2))
+    x[..., 0] *= 1 - 0.01 * np.minimum(time, 50)[:, None]
+    x[-1] = 0.01
+    run = written(tmp_path / "run.h5", x, x, time=time, parameters={"side/right": stroke})
+    edges, frames = np.linspace(1, 6, 6), list(range(60))
+    g = structure.pair_correlation(run, frames, edges)
+    np.testing.assert_allclose(g, 1, atol=0.05)
+    assert np.isnan(structure.pair_correlation(run, [59], edges)).all()
+    np.testing.assert_allclose(
+        structure.averaged(structure.pair_correlation, [run], [frames], edges).y, g, atol=0.02
+    )
 
 
 def test_the_structure_factor_of_points_at_random_is_1_of_a_lattice_n(tmp_path, rng, monkeypatch):
