@@ -27,7 +27,8 @@ def pair_correlation(
 ) -> np.ndarray:
     """g(r) in bins, `edges` in mean diameters; NaN without pairs.
 
-    Between walls, which may move, only about disks far from them.  Of a `pair` of species: of disks of the second about those of the first.
+    Between walls, which may move, only about disks far from them.  Of a `pair` of species: of disks
+    of the second about those of the first.
     """
     refuse(run, "sheared")
     r = edges * 2 * run.radius.mean()

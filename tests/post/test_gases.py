@@ -755,6 +755,10 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
     assert found["flow_x"] == pytest.approx(1) and found["flow_y"] == pytest.approx(2)
     assert 3 / 4 * found["temperature"] == pytest.approx([0, 2]) == found["stress_xx"] / 8
     assert found["stress_yy"] == pytest.approx(0) and found["heat_x"] == pytest.approx(0)
+    leaves = {"side/top": {"motion": "free"}}
+    gone = written(tmp_path / "b.h5", position, velocity, parameters=leaves)
+    with pytest.raises(RunError, match="leaves its place"):
+        fields.fields([gone], None, (2, 1))
 
 
 @pytest.mark.parametrize(
