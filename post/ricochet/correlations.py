@@ -35,7 +35,7 @@ from .nature import KICKED, TRAITS, allow
 from .reader import Run, RunError
 from .simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
-from .thermodynamics import ALONG_WALLS, later, unmoved
+from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
 
 PER_DECADE = 12
 ORIGINS = 16  # in a lag
@@ -50,13 +50,13 @@ FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 def lags_of(times: np.ndarray) -> np.ndarray:
     """(L,) lags that samples at these times (T,) have, and 0; of very many times some are tried."""
+    if len(times) < 2 or not (np.diff(times) > 0).all():
+        raise ValueError("lags take two times and more, each later than the one before")
     origins = np.arange(len(times))
     most = max(16, MOST_PAIRS // len(times))
     if len(times) > most:
         origins = np.sort(np.random.default_rng(1).choice(origins, most, replace=False))
     apart = np.concatenate([times[k + 1 :] - times[k] for k in origins])
-    if len(apart) == 0:
-        raise ValueError("lags take two times and more")
     _, first, pairs = np.unique(np.round(np.log(apart) / CLOSE), True, return_counts=True)
     part = np.floor(PER_DECADE * np.log10(apart[first] / apart.min()) + CLOSE)
     order = np.lexsort((first, -pairs, part))
@@ -70,6 +70,8 @@ def bursts(first: float, last: float, apart: float, until: float) -> np.ndarray:
     Ten in each power of ten, none later than `until`: samples for all lags between, with many
     origins, where equal steps would be too many.
     """
+    if not (0 < first <= last <= until and apart > 0):
+        raise ValueError("bursts take 0 < first <= last <= until, and apart > 0")
     steps = np.geomspace(first, last, 1 + round(10 * np.log10(last / first)))
     starts = np.arange(0, until - last * (1 - CLOSE), apart)
     times = np.sort(np.add.outer(starts, np.append(0, steps)), axis=None)
@@ -181,7 +183,8 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:
         edges = np.subtract(box["upper"], box["lower"])
         for time in times:
             source.advance(time=time)
-            yield source.position + source.image * edges, source.velocity
+            images = source.image * edges if "periodic" in box["boundary"] else 0.0
+            yield source.position + images, source.velocity
         return
     frames = np.searchsorted(source.time, times * (1 - 1e-12))
     frames = frames[frames < source.frames]
@@ -230,6 +233,7 @@ def correlators(
     `skip` collisions per disk are left out at the start [until nothing drifts], and the last frame,
     which may be out of step.
     """
+    refuse_others(runs)
     times = [run.time[later(run, skip)] for run in runs]
     lags, found = lags_of(times[0]), []
     shared = lags > 0

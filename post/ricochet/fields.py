@@ -18,7 +18,7 @@ from . import hard_disks
 from .drawing import periods
 from .reader import SIDES, Run, RunError
 from .statistics import Estimate, memory, student
-from .thermodynamics import after_start, free_disks
+from .thermodynamics import after_start, free_disks, refuse_others
 
 MOST_BLOCKS = 16  # of a run
 FEWEST_BLOCKS = 3  # of all runs, for an error
@@ -133,6 +133,7 @@ def blocks_of(runs: list[Run], skip: float | None, cells: Cells) -> tuple[list[B
     See `kinship`: as much as means over parts of a series that forgets as exp(-t).  NaN if the
     blocks are too few to have an error.
     """
+    refuse_others(runs)
     steady = [steady_frames(run, skip) for run in runs]
     both = list(zip(runs, steady, strict=True))
     length = np.array([len(f) / longest_memory(run, f, cells) for run, f in both])

@@ -35,6 +35,13 @@ class Steps(NamedTuple):
     impulse: np.ndarray  # (T, 4) by side
 
 
+def refuse_others(runs: Sequence[Run]) -> None:
+    """Means are over runs of the same disks, which differ by their seed."""
+    for run in runs:
+        if run.names != runs[0].names or not np.array_equal(run.species, runs[0].species):
+            raise RunError(f"{run.path}: its disks are not those of {runs[0].path}")
+
+
 def all_settle(runs: Sequence[Run]) -> bool:
     """Whether the runs come to equilibrium: all of them, or none."""
     settled = [run.nature.in_equilibrium for run in runs]

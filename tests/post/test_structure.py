@@ -8,7 +8,7 @@ import scipy
 
 import correlations
 import snapshot
-from ricochet import Simulation, statistics, structure, transport
+from ricochet import RunError, Simulation, statistics, structure, transport
 from ricochet import correlations as pairs
 from ricochet import hard_disks as hd
 from ricochet.drawing import values_of
@@ -243,6 +243,28 @@ def test_a_correlator_keeps_few_samples_and_looks_at_many_lags(tmp_path, rng):
     assert lags[1] == 0.5 and np.allclose(2 * lags % 1, 0) and len(lags) > 40
 
 
+def test_what_makes_no_lags_is_refused(tmp_path, rng):
+    for times in ([], [1.0], [0.0, 1.0, 1.0], [2.0, 1.0]):
+        with pytest.raises(ValueError, match="two times and more, each later"):
+            pairs.lags_of(np.array(times))
+    for wrong in ((1, 0.1, 1, 4), (0, 1, 1, 4), (0.1, 1, 0, 4), (0.1, 1, 1, 0.5)):
+        with pytest.raises(ValueError, match="bursts take"):
+            pairs.bursts(*wrong)
+    x = rng.uniform(size=(9, 4, 2))
+    equal, mixed = (
+        written(
+            tmp_path / f"{names}.h5",
+            x,
+            x,
+            species=1 + np.arange(4) // 3 % names,
+            names="ab"[:names],
+        )
+        for names in (1, 2)
+    )
+    with pytest.raises(RunError, match="its disks are not those of"):
+        pairs.measured([equal, mixed], skip=0)
+
+
 MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
 &species name = 'a' count = 150 packing_fraction = {packing} temperature = 2 mass = 3 /
 &species name = 'b' count = 150 packing_fraction = {packing} temperature = 2 /
@@ -250,9 +272,11 @@ MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
 """
 
 
-def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path):
+@pytest.mark.parametrize("side", ["periodic", "wall"])
+def test_what_is_found_on_the_fly_and_in_parts_is_that_of_the_file(simulated, tmp_path, side):
     """To the last bit: in one go, of a file that grows, and through stop and resume."""
     texts = [MIXED.format(seed=1, packing=0.2, until=until) for until in (0.5, 1.01)]
+    texts = [text.replace("periodic", side) for text in texts]
     short, run = (simulated(text, name=f"{k}") for k, text in enumerate(texts))
     times = run.time[:-1]
     whole = pairs.Correlator(run, times, [30.0]).follow(run)
