@@ -99,8 +99,7 @@ function valuesOf(spec, steps) {
 // The program judges what is typed; only the decimal comma is not its own.
 function buildSlider(spec) {
   const { key, at } = spec, id = 'slide.' + key + at;
-  const range = make('input', { type: 'range', min: 0, id });
-  const field = make('input', { inputMode: 'text', spellcheck: false });
+  const range = make('input', { type: 'range', min: 0, id }), field = make('input', { inputMode: 'text', spellcheck: false });
   const row = make('div', { className: 'slider' }, make('label', { htmlFor: id, textContent: spec.words }),
     make('small', { textContent: acts(key) ? 'acts at once' : 'starts anew' }), make('div', {}, range, field), make('p', { className: 'problem' }));
   field.setAttribute('aria-label', `${spec.words}: value`);
@@ -277,10 +276,7 @@ function hear(source, news) {
   } else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
 }
 
-function ready() {
-  busy = 0;
-  if (again) run();
-}
+function ready() { busy = 0; if (again) run(); }
 
 // Once, where it belongs, or at what has changed last: that text waits, what it would replace goes on, and the others act.
 function showProblems(problems) {

@@ -265,9 +265,12 @@ def test_a_paused_run_goes_back_step_by_step_and_on(opened):
 
 def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
     """A script and an output of the same moment, an input that runs; the energies of a scan."""
-    opened.press("p")
     slide(opened, 3, 0.5)  # restitution
     wait_for(lambda: "script" in opened.run("return $('shelf').textContent"))
+    changed = opened.run("return current().changes[0][0]")
+    wait_for(lambda: inside(opened, "moment.time") > changed + 0.05)
+    opened.press("p")
+    wait_for(lambda: not inside(opened, "state.playing"))
     where = {"behavior": "allow", "downloadPath": str(tmp_path)}
     wish = {"cmd": "Browser.setDownloadBehavior", "params": where}
     opened.call("POST", "/goog/cdp/execute", wish)
