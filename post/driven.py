@@ -81,7 +81,7 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 def only_moving(run: Run, motion: str) -> int | None:
     """The number of the only side that moves, if it does so, and equal elastic disks are inside."""
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
-    plain = run.nature <= {"moving", "walled", "turning"} and len(moves) == 1
+    plain = run.nature <= {"moving", "pushed", "walled", "turning"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
 
 

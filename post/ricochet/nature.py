@@ -25,6 +25,7 @@ TRAITS = {
     "noisy": "is heated by noise (&drive)",
     "active": "has disks that drive themselves (&drive)",
     "moving": "has sides that move",
+    "pushed": "has sides that disks push",
     "sliding": "has surfaces that slide",
     "uneven": "is heated and cooled at different temperatures",
     "bathed": "is kicked by a heat bath (&drive)",
@@ -41,11 +42,12 @@ TRAITS = {
     "mixture": "has disks of different mass or radius",
 }
 #: By which energy comes and goes, other than by being lost in collisions.
-SOURCES = {"changed", "sheared", "noisy", "active", "moving", "sliding", "bathed", "thermal"}
+SOURCES = {"changed", "sheared", "noisy", "active", "moving", "pushed", "sliding"}
+SOURCES |= {"bathed", "thermal"}
 #: With which velocities change between collisions, too.
 KICKED = {"noisy", "active", "bathed"}
 #: With which velocities do not settle to Maxwell's law.
-UNSETTLED = {*SOURCES, "uneven", "lossy", "soft", "round"} - {"bathed", "thermal"}
+UNSETTLED = {*SOURCES, "uneven", "lossy", "soft", "round"} - {"bathed", "thermal", "pushed"}
 #: With which they do.
 SETTLED = TRAITS.keys() - UNSETTLED
 
@@ -108,6 +110,7 @@ def nature_of(
         *rows_of(parameters.get("obstacle", {})),
         *rows_of(parameters.get("wall", {})),
     ]
+    motions = {one.get("motion", "still") for one in surfaces}
     baths = {float(one["temperature"]) for one in surfaces if known(one.get("temperature"))}
     thermal = bool(baths)
     if kind in ("andersen", "brownian"):
@@ -124,7 +127,8 @@ def nature_of(
         "sheared": box.get("shear_rate", 0.0) != 0,
         "noisy": kind == "noise",
         "active": kind == "active",
-        "moving": any(one.get("motion", "still") != "still" for one in surfaces),
+        "moving": bool(motions - {"still", "free"}),
+        "pushed": "free" in motions,
         "sliding": any(one.get("speed", 0.0) != 0 for one in surfaces),
         "uneven": len(baths) > 1,
         "bathed": kind in ("andersen", "brownian"),
