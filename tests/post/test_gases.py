@@ -483,8 +483,8 @@ def test_a_side_that_disks_push_is_drawn_beside_its_mean_and_deviation(simulated
     assert max(float(row["enthalpy_change"]), float(row["momentum_change"])) < 1e-12
     assert all(run.nature.in_equilibrium for run in runs), "their speeds settle to Maxwell's law"
     frames = simulated(text, "output.frames_every_time=0.2", name="frames")
-    (row,) = drawn(tmp_path, "speeds", frames.path)
-    assert float(row["KS_p"]) > 1e-4
+    squares = np.sum(frames.velocity[100:] ** 2, axis=-1)
+    assert np.mean(squares**2) / np.mean(squares) ** 2 == pytest.approx(2, abs=0.08)
     short = text.replace("time = 300", "time = 0.1")
     for change in ("contact.restitution=0.9", "box.gravity=0,-1", "species.packing_fraction=0.53"):
         crushed = simulated(short, change, "side.top.force=7000")
