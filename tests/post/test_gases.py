@@ -651,6 +651,16 @@ def test_coefficients_are_drawn_with_their_numbers_and_doubted(gas, tmp_path, ca
     assert "before it has settled" in capsys.readouterr().err
 
 
+def test_runs_of_one_cadence_are_taken_together_however_warm_they_are(gas):
+    runs = [gas(f"gas{seed}", seed=seed, length=60) for seed in range(1, 7)]
+    paths = [td.mean_free_time(run) for run in runs]
+    assert np.ptp(paths) > 0.15 * np.mean(paths)
+    found = tp.coefficients(runs)["viscosity"]
+    assert len(found.members) == 6
+    with pytest.raises(RunError, match="not as far apart"):
+        tp.coefficients([runs[0], gas("rare", length=60, cadence="observables_every_time = 0.04")])
+
+
 def test_of_a_mixture_there_are_the_viscosities(gas, tmp_path, capsys):
     """Hardly unlike disks have those of equal ones; runs of other disks are not taken together."""
     mixed = gas("mixed", packing=UNLIKE.format(0.1, 9))
