@@ -394,8 +394,6 @@ function addToScan({ is, index, mean, error, problems }) {
 
 // ---------- what acts ----------
 
-const isDark = () => document.documentElement.dataset.theme === 'dark';
-
 function bare(on) {
   document.body.classList.toggle('bare', on);
   $('settings').ariaPressed = !on;
@@ -406,7 +404,7 @@ function bare(on) {
 function dress() {
   for (const one of state.boxes.filter(isThere).map(filmOf)) {
     one.document.documentElement.classList.toggle('larger', document.documentElement.classList.contains('larger'));
-    one.theme(isDark());
+    one.document.documentElement.dataset.theme = document.documentElement.dataset.theme;
     if (one.inside().film) one.refresh();
   }
   arrangeAll();
@@ -416,7 +414,7 @@ const actions = {
   run, keep, scan: beginScan, choose: () => $('inputs').showModal(),
   pause: () => filmOf(current()).play(state.paused), settings: () => bare(!document.body.classList.contains('bare')),
   larger: () => { $('larger').ariaPressed = document.documentElement.classList.toggle('larger'); dress(); },
-  theme: () => { document.documentElement.dataset.theme = isDark() ? 'light' : 'dark'; dress(); },
+  theme: () => { const { dataset } = document.documentElement; dataset.theme = dataset.theme === 'dark' ? 'light' : 'dark'; dress(); },
   another: () => { if ($('add').value) addGroup(...$('add').value.split(' ')); },
 };
 for (const [id, action] of Object.entries(actions)) $(id).addEventListener('click', () => action());

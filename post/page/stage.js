@@ -58,9 +58,8 @@ function layOutStage() {
   page.width = Math.round(width * page.unit + 2 * margin);
   page.height = Math.round(height * page.unit + 2 * margin);
   for (const layer of layers) Object.assign(layer, { width: page.width, height: page.height });
-  Object.assign($('stage').style, { width: page.width / dots + 'px', height: page.height / dots + 'px' });
-  const rest = boxSize && { marginRight: (boxSize.width - page.width / dots) / 2 + 'px', marginBottom: boxSize.height - page.height / dots + 'px' };
-  Object.assign($('stage').style, rest ?? { marginRight: '', marginBottom: '' });
+  const [wide, high] = [page.width, page.height].map(size => size / dots), rest = boxSize && `0 ${(boxSize.width - wide) / 2}px ${boxSize.height - high}px auto`;
+  Object.assign($('stage').style, { width: wide + 'px', height: high + 'px', margin: rest ?? '' });
   picture = disksBrush.createImageData(page.width, page.height);
   pixels = new Int32Array(picture.data.buffer);
   const colours = quantities[state.colour] ? Array.from({ length: 256 }, (_, k) => scaleColour(k)) : kinds.map(speciesColour);
