@@ -2,7 +2,7 @@
 module wall_hits
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
-  use box_sides, only: side_time
+  use box_sides, only: rim_gap, side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: disk_t, land, spin_column
   use partners, only: is_side
@@ -47,6 +47,7 @@ contains
     end if
     associate (motion => sim%box%surface(1 - code)%motion)
       if (motion%kind == free) call push(motion, sim%disk(i), sim%mass_of(i), normal, v, u, t)
+      if (motion%kind == free) motion%at = rim_gap(sim%box, sim%disk(i), code)   ! else rounding lifts what rests
     end associate
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
@@ -69,7 +70,6 @@ contains
     v = motion%velocity(tau)
     given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
     disk%v = disk%v - given*normal
-    motion%at = motion%place(tau)
     motion%v = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
     motion%clock = t
     u = u + (0.5_real64*(motion%v - v))*normal

@@ -350,19 +350,25 @@ def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
     assert list(laws_broken(found)) == []
 
 
+FLOOR = "gravity = 0, -1 / &side name = 'bottom' period = 1 motion = '{}"
+PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
+&side name = 'left' motion = 'free' mass = 0.3 force = 0.5 restitution = 0.6"""
+
+
 @pytest.mark.parametrize(
-    ("motion", "disk"),
-    [  # it chatters to rest on a floor whose acceleration is less than gravity, or has no room
-        ("'sine' amplitude = 0.01", "radius = 0.1 position = 0.5, 0.3"),
-        ("'parabolic' amplitude = 0.01", "radius = 0.1 position = 0.5, 0.3"),
-        ("'sine' amplitude = 0.5", "radius = 0.3 position = 0.5, 0.6"),
+    ("floor", "disk"),
+    [  # it chatters to rest on a floor whose acceleration is less than gravity, or has no room; or
+        # a side that a force presses on it does
+        (FLOOR.format("sine' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
+        (FLOOR.format("parabolic' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
+        (FLOOR.format("sine' amplitude = 0.5"), "0.3 position = 0.5, 0.6"),
+        (PRESSED, "0.1 position = -1.3, 10.5"),
     ],
 )
-def test_chattering_and_crushing_is_a_collapse(ricochet, tmp_path, motion, disk):
+def test_chattering_and_crushing_is_a_collapse(ricochet, tmp_path, floor, disk):
     write_input(
         tmp_path,
-        f"&box gravity = 0, -1 / &contact restitution = 0.5 / &species {disk} /"
-        f"&side name = 'bottom' motion = {motion} period = 1 / &stop time = 20 /",
+        f"&box {floor} / &contact restitution = 0.5 / &species radius = {disk} / &stop time = 20 /",
     )
     run = ricochet("gas.nml", "-o", "gas.h5")
     assert run.returncode == BROKEN and "inelastic collapse" in one_line(run)
