@@ -41,7 +41,10 @@ contains
       call leave_thermally(sim, i, law%temperature, normal, u)
     else
       sim%disk(i)%v = wall_rebound(law, v - strike, normal, elastic)
-      if (any(abs(strike) > 0)) sim%disk(i)%v = sim%disk(i)%v + strike   ! never behind the side: rounded sums keep order
+      if (any(abs(strike) > 0)) then
+        sim%disk(i)%v = sim%disk(i)%v + strike         ! never behind the side: rounded sums keep order
+        if (law%restitution < 1 .and. .not. elastic) call settle(sim%disk(i)%v, v, strike, normal)
+      end if
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
@@ -53,6 +56,17 @@ contains
     sim%tag(i)%met = merge(0, code, is_side(code))
     if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
+
+  !> Ends the bouncing on a side that moves where a hit loses less than rounding can tell: it would go on for ever.
+  pure subroutine settle(v, before, strike, normal)
+    real(real64), intent(inout) :: v(2)          !! of the disk after the hit [length/time]
+    real(real64), intent(in) :: before(2), strike(2)     !! of the disk before it, of the side [length/time]
+    real(real64), intent(in) :: normal(2)        !! inwards
+    real(real64) :: left
+
+    left = dot_product(v - strike, normal)
+    if (left >= -dot_product(before - strike, normal)) v = v - left*normal
+  end subroutine settle
 
   !> Lets a disk push a free side that it has hit as if it were of infinite mass. Both get the share of that impulse which
   !> their masses allow; for sums u becomes the mean of the velocities of the side, whose work the energy is.

@@ -352,7 +352,7 @@ def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
 
 FLOOR = "gravity = 0, -1 / &side name = 'bottom' period = 1 motion = '{}"
 PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
-&side name = 'left' motion = 'free' mass = 0.3 force = 0.5 restitution = 0.6"""
+&side name = 'left' motion = 'free' mass = {} force = {} restitution = 0.6"""
 
 
 @pytest.mark.parametrize(
@@ -362,13 +362,16 @@ PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
         (FLOOR.format("sine' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
         (FLOOR.format("parabolic' amplitude = 0.01"), "0.1 position = 0.5, 0.3"),
         (FLOOR.format("sine' amplitude = 0.5"), "0.3 position = 0.5, 0.6"),
-        (PRESSED, "0.1 position = -1.3, 10.5"),
+        (PRESSED.format(0.3, 0.5), "0.1 position = -1.3, 10.5"),
+        (PRESSED.format(0.01, 1), "0.1 position = 0.3, 10.4"),
     ],
 )
-def test_chattering_and_crushing_is_a_collapse(ricochet, tmp_path, floor, disk):
+@pytest.mark.parametrize("law", ["", "restitution_law = 'power' restitution_speed = 1"])
+def test_chattering_and_crushing_is_a_collapse(ricochet, tmp_path, floor, disk, law):
     write_input(
         tmp_path,
-        f"&box {floor} / &contact restitution = 0.5 / &species radius = {disk} / &stop time = 20 /",
+        f"&box {floor} / &contact restitution = 0.5 {law} / &species radius = {disk} /"
+        "&stop time = 20 /",
     )
     run = ricochet("gas.nml", "-o", "gas.h5")
     assert run.returncode == BROKEN and "inelastic collapse" in one_line(run)
