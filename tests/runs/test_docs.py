@@ -263,7 +263,9 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     x = np.random.default_rng(1).uniform(size=(2, 30, 2))
     names = "all/kinetic_energy", "total_energy", "pressure"
     energies = {name: [0.0, 0.0] for name in names}
-    write_run(tmp_path / "runs" / "gas.h5", x, x, observables=energies)
+    for name, periodic in (("gas", (False, False)), ("bulk", (True, True))):
+        path = tmp_path / "runs" / f"{name}.h5"
+        write_run(path, x, x, observables=energies, periodic=periodic)
     own = environment(PYTHONPATH=ROOT / "post")
     ran(sys.executable, "-c", code, cwd=tmp_path, env=own, check=True)
     assert (tmp_path / "runs" / "gas.png").exists()
