@@ -178,7 +178,7 @@ function addGroup(kind, name) {
 async function choose(name) {
   const input = lab.inputs.find(one => one.name === name);
   Object.assign(state, { input: { ...input, sliders: input.sliders.map(sliderOf) }, groups: [], settings: {}, has: {}, waiting: {}, added: [] });
-  scan = scanner?.close();
+  scan = scanner?.leave();
   run();
   $('name').textContent = input.title;
   $('own').hidden = !input.picture;
@@ -273,7 +273,7 @@ function hear(source, news) {
     const href = URL.createObjectURL(new Blob([filmOf(box).bytes(news.body)]));
     make('a', { href, download: news.name }).click();
     URL.revokeObjectURL(href);
-  } else if (news.is === 'gone' && box === current()) { ready(); tell('No answer: the laboratory has ended.', true); }
+  } else if (news.is === 'gone') { ready(); tell(`${box.letter}: ${news.problems[0].text}`, true); }
 }
 
 function ready() { busy = 0; if (again) run(); }
@@ -375,21 +375,23 @@ function paced(source) {
 let scan, scanner;  // what is measured; where from
 function beginScan() {
   const spec = state.input.sliders[$('scanned').value], { key, log } = spec, values = valuesOf(spec, 4), texts = values.map(value => textWith(spec, String(value)));
-  scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values };
+  scan = { x: spec.words, y: MEASURED[$('measured').value], log, points: [], values, said: '' };
   drawScan();
-  scanner?.close();
+  scanner?.leave();
   scanner = filmOf(current()).talk({ do: 'scan', ...wish(), variable: key, values: texts, of: $('measured').value }, addToScan);
   tell('scanning …');
 }
 
 function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
 
+// A value with which nothing can be measured leaves a gap.
 function addToScan({ is, index, mean, error, problems }) {
-  if (is === 'scan') scan.points.push([scan.values[index], mean, error]);
+  if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
+  else scan.points.push([scan.values[index], mean, error]);
   drawScan();
-  if (scan.points.length < scan.values.length && !problems) return;
-  tell(problems ? problems[0].text : '', !!problems);
-  scanner.close();
+  if (is === 'scan' && index < scan.values.length - 1) return;
+  tell(scan.said, !!scan.said);
+  scanner.leave();
 }
 
 // ---------- what acts ----------

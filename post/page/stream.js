@@ -9,9 +9,10 @@ function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSO
 
 // A worker of its own for a wish; what it says.
 function talk(wish, heard) {
-  const socket = Object.assign(new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws'))), { binaryType: 'arraybuffer' });
+  const socket = Object.assign(new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws'))), { binaryType: 'arraybuffer', leave() { this.onclose = null; this.close(); } });
   socket.onopen = () => socket.send(JSON.stringify(wish));
   socket.onmessage = ({ data }) => { if (typeof data === 'string') heard(JSON.parse(data)); else take(data); };
+  socket.onclose = ({ wasClean, reason }) => { if (reason || !wasClean) heard({ is: 'gone', problems: [{ text: reason || 'No answer: the laboratory has ended.' }] }); };
   return socket;
 }
 
@@ -30,14 +31,10 @@ function start(run) {
     hear[news.is]?.(news);
     parent.hear?.(window, news);
   });
-  stream.socket.onclose = () => parent.hear?.(window, { is: 'gone' });  // none: the page goes as well
 }
 
 // The next run has another worker: this one finds no place for its disks, or not soon.
-function leave() {
-  stream.socket.onclose = null;
-  stream.socket.close();
-}
+function leave() { stream.socket.leave(); }
 
 const hear = {
   scene({ facts, blocks, run, changed }) {
@@ -78,6 +75,7 @@ const hear = {
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
   problems() { starts(false); },
+  gone() { starts(false); },
 };
 
 function open({ facts, blocks, run }) {

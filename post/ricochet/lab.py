@@ -21,6 +21,8 @@ from .program import find_program, value_text
 
 RUNS = 24  # at a time, of all pages
 GRACE = 3.0  # seconds, after which a worker that has been asked to end is forced to
+ENDED = b"No answer: the laboratory has ended."  # why a socket closes: 123 bytes at most
+DIED = b"It has ended: it needs more memory than it may have here (fewer disks do), or was killed."
 NAME = re.compile(r"[\w.-]{1,200}")  # of a variable or a group
 
 
@@ -97,7 +99,10 @@ class Lab:
             raise RunError("the laboratory ends")
         worker = await task
         self.prepare()
-        return worker
+        if worker.returncode is None:
+            return worker
+        self.workers.discard(worker)  # something has killed it
+        return await self.worker()
 
     async def end(self, worker: Process) -> None:
         """It is not needed any more."""
@@ -138,7 +143,7 @@ class Lab:
 
     async def converse(self, worker: Process, socket: web.WebSocketResponse) -> None:
         """Until the page leaves, or the worker has ended."""
-        listening = asyncio.create_task(listen(worker, socket))
+        listening = asyncio.create_task(self.listen(worker, socket))
         try:
             async for message in socket:
                 try:
@@ -153,6 +158,15 @@ class Lab:
                         await worker.stdin.drain()
         finally:
             listening.cancel()
+
+    async def listen(self, worker: Process, socket: web.WebSocketResponse) -> None:
+        """Pass on what a worker says; the socket closes with it, and says why."""
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while True:
+                kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
+                body = await worker.stdout.readexactly(length)
+                await (socket.send_bytes(body) if kind == b"b" else socket.send_str(body.decode()))
+        await socket.close(message=ENDED if self.closed else DIED)
 
     def allowed(self, wish: dict) -> dict:
         """A wish, with the text of its input and the groups that are added if it is for a run.
@@ -180,17 +194,6 @@ class Lab:
         path = Path(re.fullmatch(r"""(['"]?)([^'"]*)\1""", file.strip())[2]).resolve()
         if not any(path.is_relative_to(folder) for folder in self.folders):
             raise RunError(f"{file}: lies elsewhere; start the laboratory with --files FOLDER")
-
-
-async def listen(worker: Process, socket: web.WebSocketResponse) -> None:
-    """Pass on what a worker says; the socket closes with it."""
-    with suppress(asyncio.IncompleteReadError, ConnectionError):
-        while True:
-            kind, length = struct.unpack(">cI", await worker.stdout.readexactly(5))
-            body = await worker.stdout.readexactly(length)
-            await (socket.send_bytes(body) if kind == b"b" else socket.send_str(body.decode()))
-    await say(socket, wrong("the run needs more memory than it may have here; take fewer disks"))
-    await socket.close()
 
 
 async def say(socket: web.WebSocketResponse, news: dict) -> None:

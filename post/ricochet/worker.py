@@ -274,8 +274,8 @@ class Bench:
             energies["potential"] = None
         if TURNS not in run.elements:
             energies["rotational"] = None
-        names = "time", "all/kinetic_energy", "virial", "all/temperature", "all/mean_speed"
-        sample = tuple(value[name] for name in names)
+        own = value["all/temperature"], value["all/mean_speed"]
+        sample = (*sampled(run.count, value), *own)
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample)
         hit = value["collisions"] > 0
@@ -346,14 +346,21 @@ def pictured_run(simulation: Simulation) -> Pictured:
     )
 
 
-def pressure_between(
-    time: np.ndarray, kt: np.ndarray, virial: np.ndarray, count: int, value: dict
-) -> SeriesMean:
-    """Mean pressure from the first to the last of these samples; the observable is that so far."""
-    apart = np.diff(time)
-    area = count * value["all/kinetic_energy"] + value["virial"] / (2 * value["time"])
-    area /= value["pressure"] or 1.0
-    return series_mean((count * kt[1:] * apart + np.diff(virial) / 2) / area, apart)
+def sampled(count: int, value: dict) -> tuple[float, ...]:
+    """What means are made of: time, kinetic energy, virial, and the area for disks of this moment.
+
+    That is what makes the observable `pressure` of the two before it.
+    """
+    time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
+    whole = count * kinetic + (virial / (2 * time) if time else 0.0)
+    return time, kinetic, virial, whole / (value["pressure"] or 1.0)
+
+
+def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
+    """Mean pressure from the first to the last of these samples; sides may move meanwhile."""
+    (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
+    gain = count * kinetic[1:] * apart + np.diff(virial) / 2
+    return series_mean(gain / area[1:], apart)
 
 
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
@@ -362,7 +369,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     Of what settles they are means over the time since it has settled, with the error of its
     series; else the values of now.  The pressure is between first and last of these samples.
     """
-    time, _, _, kt, speed = samples
+    time, kt, speed = samples[[0, 4, 5]]
     found = {
         "temperature": (value["all/temperature"], None),
         "mean_speed": (value["all/mean_speed"], None),
@@ -375,7 +382,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
             for name, one in (
                 ("temperature", series_mean(kt[first:])),
                 ("mean_speed", series_mean(speed[first:])),
-                ("mean_pressure", pressure_between(*late[:3], run.count, value)),
+                ("mean_pressure", pressure_between(late, run.count)),
             ):
                 known = one.mean, one.error
                 found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
@@ -404,14 +411,19 @@ def told(settings: dict[str, str]) -> list[str]:
     return lines
 
 
-def refuse(problem: Exception, change: bool = False) -> None:
-    """Answer with the program's lines, each with the variable it is about, as --set names it."""
+def problems(reason: Exception) -> list[dict]:
+    """The program's lines, each with the variable it is about, as --set names it."""
     found = []
-    for line in str(problem).splitlines():
+    for line in str(reason).splitlines():
         place = line.removeprefix("--set ").partition("=")[0] if line.startswith("--set ") else ""
         text = re.sub(r"^(--set .*|\w+:\d+): \w+\.\w+: ", "", line)
         found.append({"place": place, "text": text})
-    tell({"is": "problems", "change": change, "problems": found})
+    return found
+
+
+def refuse(reason: Exception, change: bool = False) -> None:
+    """Answer with what is wrong."""
+    tell({"is": "problems", "change": change, "problems": problems(reason)})
 
 
 def values_now(simulation: Simulation, names: Iterable[str]) -> dict[str, object]:
@@ -472,15 +484,15 @@ def wishes(wait: float | None) -> list[dict]:
 
 
 def scan(wish: dict) -> None:
-    """Runs with one variable at some values, and what was measured in each."""
+    """Runs with one variable at some values, and what was measured in each, or why nothing was."""
     for index, value in enumerate(wish["values"]):
         try:
             lines = told(wish["settings"] | {wish["variable"]: value})
-            found = measured(wish["text"], lines, wish["of"])
+            mean, error = measured(wish["text"], lines, wish["of"])
+            found = {"mean": mean, "error": error}
         except (ProgramError, ValueError) as problem:
-            refuse(problem)
-            return
-        tell({"is": "scan", "index": index, "mean": found[0], "error": found[1]})
+            found = {"problems": problems(problem)}
+        tell({"is": "scan", "index": index} | found)
 
 
 def measured(text: str, lines: list[str], name: str) -> tuple[float, float | None]:
@@ -496,14 +508,14 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
             seen = simulation._observed()
             value = {key: float(np.sum(part)) for key, part in seen.items()}
             value["time"] = simulation.time
-            samples.append([value[key] for key in ("time", "all/kinetic_energy", "virial", name)])
+            samples.append((*sampled(count, value), value[name]))
             simulation._go_on((np.inf, NEVER, simulation.events + step), LONGEST / LOOKS)
     late = np.array(samples[len(samples) // 2 :]).T
     apart = np.diff(late[0])
     if not apart.any():
-        raise ValueError("nothing happens here")
+        raise ValueError("nothing to measure: no collisions, or all of them at one moment")
     if name == "pressure":  # that is a mean since the start
-        one = pressure_between(*late[:3], count, value)
+        one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
         one = series_mean(gain, apart)
