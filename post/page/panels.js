@@ -265,8 +265,11 @@ function tellEnergies() {
 
 // ---------- numbers of a worker, with their errors, beside what theory says ----------
 
-const withError = ({ value, error }) => value === null ? '' : !error ? short(value)
-  : `${short(+value.toFixed(clamp(1 - Math.floor(Math.log10(error)), 0, 12)))} ± ${short(+error.toPrecision(2))}`;
+// To two digits of the error.
+function withError({ value, error }) {
+  const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
+  return value === null ? '' : !error ? short(value) : [value, error].map(Math.abs(last) > 7 ? short : rounded).join(' ± ');
+}
 
 function tellNumbers() {
   const { temperature, mean_speed: speed, mean_pressure: pressure } = source.numbers?.() ?? {};
