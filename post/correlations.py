@@ -185,8 +185,9 @@ def table(groups: list, results: list[Found]) -> tuple[list[dict], list[str]]:
                 row |= measured(name, None)
         plain = runs[0].nature <= PLAIN
         row["D_enskog"] = float(transport.enskog_of(runs[0])["D"]) if plain else None
-        _, *first = found.curves["g"]
-        rows.append(row | measured("g_first_bin", Estimate(*first), 0))
+        alike = "mixture" not in runs[0].nature  # else no distance is the first
+        first = Estimate(*found.curves["g"][1:]) if alike else None
+        rows.append(row | measured("g_first_bin", first, 0))
     return rows, notes
 
 

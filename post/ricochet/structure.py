@@ -25,7 +25,7 @@ def refuse(run: Run, *traits: str) -> None:
 def pair_correlation(
     run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
-    """g(r) in bins, `edges` in mean diameters; NaN without pairs.
+    """g(r) in bins, `edges` in mean diameters, over the mean density of the box; NaN without pairs.
 
     Between walls, which may move, only about disks far from them.  Of a `pair` of species: of disks
     of the second about those of the first.
