@@ -110,7 +110,7 @@ function take(buffer) {
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
   // Frames are so dense that no disk crosses half of the box between two.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
-  const isFirst = !past.length;
+  const isFirst = !past.length, follows = stream.asked || (stream.live && moment.time === past.at(-1)?.time);
   if (past.at(-1)?.time === frame.time) past.pop();  // as of the start, and of a change
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
@@ -124,7 +124,7 @@ function take(buffer) {
     begin();
     refresh();
     play(!parent.isPaused());
-  } else if (!state.playing && stream.asked) show(frame.time, true);
+  } else if (!state.playing && follows) show(frame.time, true);
   if (!state.playing) { drawn(); stream.asked = false; }
 }
 
@@ -133,7 +133,7 @@ function drawn() { for (; stream.fresh > 0; stream.fresh--) send({ do: 'got' });
 
 const fromWorker = {
   grows: true,
-  counted: () => stream.live ? 'now' : 'gone back',
+  counted: () => moment.time === last() ? 'now' : 'gone back',
   curves: () => stream.curves,
   numbers: () => stream.numbers,
   coming: () => stream.live ? stream.events : { next: [], happened: null },
@@ -148,7 +148,12 @@ const fromWorker = {
     stream.live = moment.time === last();
     if (stream.live) send({ do: 'play' });
   },
-  rest() { send({ do: 'pause' }); stream.live = moment.time === last(); },
+  // What the worker has made until it hears of the pause is shown, too.
+  rest() {
+    send({ do: 'pause' });
+    if (stream.live) show(last(), true);
+    stream.live = moment.time === last();
+  },
   // One step beyond what is there is the worker's.
   goOn(what) {
     play(false);

@@ -283,6 +283,7 @@ def test_what_is_clicked_is_downloaded_or_measured(opened, tmp_path):
         script.replace("    print(", "    state = simulation.time, simulation.position  # ("), space
     )
     time, position = space["state"]
+    assert inside(opened, "moment.time") == pytest.approx(time), "of the moment that is seen"
     with Simulation.load(tmp_path / "gas.h5.part") as there:
         assert there.time == time and np.array_equal(there.position, position)
     with Simulation(tmp_path / "gas.nml") as again:
