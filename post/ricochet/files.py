@@ -42,11 +42,11 @@ def hdf5_file(path: Path) -> h5py.File:
         raise RunError(f"{path}: is a {'folder' if path.is_dir() else 'device'}, not a run")
     try:
         return h5py.File(path, "r", locking=False)
-    except FileNotFoundError:  # it has just been removed, or renamed by the program
-        raise RunError(f"{path}: no such file") from None
     except PermissionError:
         raise RunError(f"{path}: no permission to read") from None
     except OSError:
+        if not path.exists():  # it has just been removed, or renamed by the program
+            raise RunError(f"{path}: no such file") from None
         state = "is empty" if path.stat().st_size == 0 else "is not an HDF5 file, or is cut short"
         raise RunError(f"{path}: {state}") from None
 

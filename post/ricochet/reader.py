@@ -315,7 +315,13 @@ class Run:
     def observable(self, name: str) -> Series:
         """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
-            return series_of(file, name)
+            return series_of(file, name, self.samples)
+
+    @cached_property
+    def samples(self) -> int:
+        """How many each observable has: as many as the first that is read, while a run goes on."""
+        with open_file(self.path) as file:
+            return committed(file, "observables")
 
     @cached_property
     def observables(self) -> tuple[str, ...]:
@@ -333,7 +339,7 @@ class Run:
 
         columns = {}
         with open_file(self.path) as file:
-            series = {name: series_of(file, name) for name in self.observables}
+            series = {name: series_of(file, name, self.samples) for name in self.observables}
         for name, (time, value) in series.items():
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T
@@ -553,12 +559,11 @@ def series_in(group: h5py.Group, path: str = "") -> Iterator[str]:
                 yield from series_in(item, f"{path}{name}/")
 
 
-def series_of(file: h5py.File, name: str) -> Series:
-    """An observable of an open file."""
+def series_of(file: h5py.File, name: str, count: int) -> Series:
+    """So many samples of an observable of an open file."""
     if f"observables/{name}/value" not in file:
         near = did_you_mean(name, series_in(file["observables"]))
         raise Unsound(f"has no observable '{name}'{near}")
-    count = committed(file, "observables")
     if count == 0:
         raise Unsound("holds no observables yet")
     group = file[f"observables/{name}"]

@@ -82,6 +82,16 @@ def test_a_run_in_progress_is_read_up_to_its_last_committed_frame(tmp_path):
             assert words in frames_seen_by_another_program(path)
 
 
+def test_observables_that_are_read_while_a_run_goes_on_are_of_one_moment(tmp_path):
+    path = tiny(tmp_path / "run.h5.part", 5)
+    run, seen = read_run(path), []
+    for count, name in ((3, "dissipated_energy"), (5, "all/kinetic_energy")):
+        with h5py.File(path, "r+") as writer:
+            writer["observables/committed"][...] = count
+        seen.append(len(run.observable(name).time))
+    assert seen == [3, 3] and len(read_run(path).observable(name).time) == 5
+
+
 def test_restitution_per_pair_of_species(tmp_path):
     for pairs, expected in (([0.5, 0.5, 0.5, 0.5], 0.5), ([0.5, 0.9, 0.9, 0.5], np.nan)):
         contact = {"restitution": 0.7, "pair_restitution": pairs}
