@@ -273,7 +273,7 @@ function hear(source, news) {
     const href = URL.createObjectURL(new Blob([filmOf(box).bytes(news.body)]));
     make('a', { href, download: news.name }).click();
     URL.revokeObjectURL(href);
-  } else if (news.is === 'gone') { ready(); tell(`${box.letter}: ${news.problems[0].text}`, true); }
+  } else if (news.is === 'gone') { ready(); tell(news.problems[0].text.replace('It ', `Run ${box.letter} `), true); }
 }
 
 function ready() { busy = 0; if (again) run(); }
