@@ -384,8 +384,7 @@ function beginScan() {
 
 function drawScan() { if (scan && isThere(current()) && filmOf(current()).inside().film) filmOf(current()).showScan(scan); }
 
-// A value with which nothing can be measured leaves a gap.
-function addToScan({ is, index, mean, error, problems }) {
+function addToScan({ is, index, mean, error, problems }) {  // a value with which nothing can be measured leaves a gap
   if (problems) scan.said = (is === 'scan' ? `${short(scan.values[index])}: ` : '') + problems[0].text;
   else scan.points.push([scan.values[index], mean, error]);
   drawScan();

@@ -265,8 +265,7 @@ function tellEnergies() {
 
 // ---------- numbers of a worker, with their errors, beside what theory says ----------
 
-// To two digits of the error.
-function withError({ value, error }) {
+function withError({ value, error }) {  // to two digits of the error
   const last = Math.floor(Math.log10(error)) - 1, rounded = one => (Math.round(one / 10 ** last) * 10 ** last).toFixed(Math.max(0, -last)).replace('-', '−');
   return value === null ? '' : !error ? short(value) : [value, error].map(Math.abs(last) > 7 ? short : rounded).join(' ± ');
 }

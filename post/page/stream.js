@@ -3,7 +3,7 @@
 // The page draws the newest frame; those before are kept, as far as there is room, to go back to. A film that has been gone
 // back in plays until it is where the worker is, which goes on then.
 const PAST_ROOM = 6e7, HEAD = 6, MOST_CURVE = 3000;  // bytes of frames; numbers before the places; samples of a plot
-const stream = { socket: null, scene: null, live: true, fresh: 0, asked: false, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
+const stream = { socket: null, scene: null, live: true, fresh: 0, sent: 0, ended: false, numbers: {}, events: { next: [], happened: null }, curves: null, run: 0, wish: null };
 
 function send(wish) { if (stream.socket.readyState === 1) stream.socket.send(JSON.stringify(wish)); }
 
@@ -74,8 +74,7 @@ const hear = {
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
-  problems() { starts(false); },
-  gone() { starts(false); },
+  problems: () => starts(false), gone: () => starts(false),
 };
 
 function open({ facts, blocks, run }) {
@@ -110,7 +109,7 @@ function take(buffer) {
   if (film.turning) frame.angle = new Float32Array(buffer, 8 * HEAD + 16 * disks, disks);
   // Frames are so dense that no disk crosses half of the box between two.
   cross(frame, ({ place }, k) => film.periodic[k % 2] ? Math.round((place[k] - frame.place[k]) / film.edges[k % 2]) : 0);
-  const isFirst = !past.length, follows = stream.asked || (stream.live && moment.time === past.at(-1)?.time);
+  const isFirst = !past.length, follows = stream.live && moment.time === past.at(-1)?.time;
   if (past.at(-1)?.time === frame.time) past.pop();  // as of the start, and of a change
   past.push(frame);
   while (past.length > 2 && past.length * buffer.byteLength > PAST_ROOM) past.shift();
@@ -125,7 +124,7 @@ function take(buffer) {
     refresh();
     play(!parent.isPaused());
   } else if (!state.playing && follows) show(frame.time, true);
-  if (!state.playing) { drawn(); stream.asked = false; }
+  if (!state.playing) drawn();
 }
 
 // Each frame is answered: the worker is never more than two ahead.
@@ -148,18 +147,13 @@ const fromWorker = {
     stream.live = moment.time === last();
     if (stream.live) send({ do: 'play' });
   },
-  // What the worker has made until it hears of the pause is shown, too.
-  rest() {
-    send({ do: 'pause' });
-    if (stream.live) show(last(), true);
-    stream.live = moment.time === last();
-  },
+  rest() { send({ do: 'pause' }); if (stream.live) show(last(), true); },  // and so with what comes until it is heard
   // One step beyond what is there is the worker's.
   goOn(what) {
     play(false);
     if (what === 'step' && moment.time !== last()) return false;
     show(last(), true);
-    stream.live = stream.asked = true;
+    stream.live = true;
     send({ do: what, time: paceNow() / 30 });
     return true;
   },
