@@ -9,7 +9,7 @@ module box_sides
   use side_motion, only: free, side_motion_t
   implicit none
   private
-  public :: bounds, keep_off_sides, next_side, rim_gap, side_time
+  public :: bounds, keep_off_sides, next_side, side_time
 
   real(real64), parameter :: rounding = 16*epsilon(1.0_real64)     !! relative, of a gap to a side that moves
 
@@ -40,12 +40,17 @@ contains
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
     integer(int32), intent(in) :: side          !! 0, -1, -2, -3: left, right, bottom, top
-    real(real64) :: t, gap, tau, v, since, after
+    real(real64) :: t, gap, inset, tau, v, since, after
     integer :: axis, sense
 
     axis = axis_of(side)
     sense = sense_of(side)
-    gap = rim_gap(box, disk, side)
+    inset = merge(0.0_real64, disk%radius, box%periodic(axis))
+    if (sense < 0) then
+      gap = disk%x(axis) - (box%lower(axis) + inset)
+    else
+      gap = (box%upper(axis) - inset) - disk%x(axis)
+    end if
     associate (motion => box%surface(1 - side)%motion)
       if (motion%travels()) then
         since = disk%clock
@@ -65,24 +70,6 @@ contains
       end if
     end associate
   end function side_time
-
-  !> How far the rim of a disk at its clock, or its centre at a periodic side, is from the place of a side.
-  pure function rim_gap(box, disk, side) result(gap)
-    type(box_t), intent(in) :: box
-    type(disk_t), intent(in) :: disk
-    integer(int32), intent(in) :: side          !! code
-    real(real64) :: gap                         !! [length]
-    real(real64) :: inset
-    integer :: axis
-
-    axis = axis_of(side)
-    inset = merge(0.0_real64, disk%radius, box%periodic(axis))
-    if (sense_of(side) < 0) then
-      gap = disk%x(axis) - (box%lower(axis) + inset)
-    else
-      gap = (box%upper(axis) - inset) - disk%x(axis)
-    end if
-  end function rim_gap
 
   !> The side met first; of two at the same moment the one named first.
   pure subroutine next_side(box, disk, t, side)

@@ -2,11 +2,11 @@
 module wall_hits
   use kinds, only: int32, never, real64
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
-  use box_sides, only: rim_gap, side_time
+  use box_sides, only: side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
-  use disks, only: disk_t, land, spin_column
-  use partners, only: is_side
-  use side_motion, only: free, side_motion_t
+  use disks, only: land, spin_column
+  use partners, only: axis_of, is_side, sense_of
+  use side_motion, only: free
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, gain, heat, impulse, work
@@ -48,10 +48,7 @@ contains
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
-    associate (motion => sim%box%surface(1 - code)%motion)
-      if (motion%kind == free) call push(motion, sim%disk(i), sim%mass_of(i), normal, v, u, t)
-      if (motion%kind == free) motion%at = rim_gap(sim%box, sim%disk(i), code)   ! else rounding lifts what rests
-    end associate
+    if (sim%box%surface(1 - code)%motion%kind == free) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
     if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
@@ -70,23 +67,29 @@ contains
 
   !> Lets a disk push a free side that it has hit as if it were of infinite mass. Both get the share of that impulse which
   !> their masses allow; for sums u becomes the mean of the velocities of the side, whose work the energy is.
-  pure subroutine push(motion, disk, mass, normal, before, u, t)
-    type(side_motion_t), intent(inout) :: motion
-    type(disk_t), intent(inout) :: disk
-    real(real64), intent(in) :: mass             !! of the disk [mass]
+  pure subroutine push(sim, i, code, normal, before, u, t)
+    type(simulation_t), intent(inout) :: sim
+    integer(int32), intent(in) :: i, code
     real(real64), intent(in) :: normal(2)        !! inwards
     real(real64), intent(in) :: before(2)        !! velocity of the disk before the hit [length/time]
     real(real64), intent(inout) :: u(2)          !! of the surface [length/time]
     real(real64), intent(in) :: t                !! since the epoch [time]
-    real(real64) :: tau, v, given
+    real(real64) :: mass, v, given
+    integer :: axis
 
-    tau = motion%moment(0.0_real64, t)
-    v = motion%velocity(tau)
-    given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
-    disk%v = disk%v - given*normal
-    motion%v = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
-    motion%clock = t
-    u = u + (0.5_real64*(motion%v - v))*normal
+    mass = sim%mass_of(i)
+    axis = axis_of(code)
+    associate (motion => sim%box%surface(1 - code)%motion, disk => sim%disk(i))
+      v = motion%velocity(motion%moment(0.0_real64, t))
+      given = dot_product(disk%v - before, normal)*mass/(mass + motion%mass)
+      disk%v = disk%v - given*normal
+      ! It touches, in the digits of `side_time`: else rounding lifts it off what rests.
+      motion%at = merge(disk%x(axis) - (sim%box%lower(axis) + disk%radius), &
+        (sim%box%upper(axis) - disk%radius) - disk%x(axis), sense_of(code) < 0)
+      motion%v = min(v - given, dot_product(disk%v, normal))       ! never ahead of it by rounding
+      motion%clock = t
+      u = u + (0.5_real64*(motion%v - v))*normal
+    end associate
   end subroutine push
 
   !> Gives disk i, at a thermal wall, a velocity as if it came out of a gas of that temperature: along the normal with the
