@@ -315,10 +315,10 @@ class Run:
     def observable(self, name: str) -> Series:
         """The observable `name`, such as 'total_energy' or 'sides/left/impulse'."""
         with open_file(self.path) as file:
-            return series_of(file, name, self.samples)
+            return series_of(file, name, self._samples)
 
     @cached_property
-    def samples(self) -> int:
+    def _samples(self) -> int:
         """How many each observable has: as many as the first that is read, while a run goes on."""
         with open_file(self.path) as file:
             return committed(file, "observables")
@@ -339,7 +339,7 @@ class Run:
 
         columns = {}
         with open_file(self.path) as file:
-            series = {name: series_of(file, name, self.samples) for name in self.observables}
+            series = {name: series_of(file, name, self._samples) for name in self.observables}
         for name, (time, value) in series.items():
             parts = {(): ("",), (2,): ("_x", "_y"), (4,): [f"_{side}" for side in SIDES]}
             values = value.reshape(len(time), -1).T

@@ -550,6 +550,8 @@ def test_a_worker_that_dies_is_told_and_the_next_takes_its_place(program, tmp_pa
                 for pid in pids:
                     os.kill(pid, signal.SIGKILL)
                 assert await one.until("closed") == module.DIED.decode()
+            while {*pids} & {*children(process.pid)}:  # the laboratory has not noticed it yet
+                await asyncio.sleep(0.01)
 
     with laboratory(program, tmp_path) as (process, address):
         asyncio.run(visit(process, address))
