@@ -261,9 +261,7 @@ function hear(source, news) {
     tell(Object.keys(state.waiting).length ? 'one value waits: see the form' : '');
     arrangeAll();
   } else if (news.is === 'problems') {
-    if (news.change) { run(); return; }  // it does not act on what runs
-    showProblems(news.problems);
-    ready();
+    if (!news.change) { showProblems(news.problems); ready(); } else if (!busy) run();  // it does not act on what runs
   } else if (news.is === 'state') {
     box.changes = news.changes;
     if (box === current()) for (const [, key, value] of news.changes) state.has[key] = value;

@@ -74,7 +74,8 @@ const hear = {
     stream.ended = ended;
     if (!playing && state.playing && stream.live && past.length) play(false);
   },
-  problems: () => starts(false), gone: () => starts(false),
+  problems({ change }) { if (!change) starts(false); },  // a change that cannot be was one of the run before
+  gone: () => starts(false),
 };
 
 function open({ facts, blocks, run }) {

@@ -202,7 +202,7 @@ class Simulation:
         origin: that is over at the next double.
         """
         if self.time != self._settled:
-            self._settled = math.nextafter(self.time, math.inf)
+            self._settled = math.nextafter(self.time, math.inf) if self.time > 0 else 0.0
             self.advance(time=self._settled)
         return self._settled
 

@@ -119,6 +119,18 @@ def slide(browser, number, place):
     browser.run(act, number, place)
 
 
+def test_changes_that_a_run_refuses_start_one_run_that_moves(opened):
+    """As of a run that has collapsed: what is said of it meanwhile does not stop the next."""
+    before = opened.run("return current().run")
+    opened.run("""const one = filmOf(current()), settings = { 'species.gas.count': '5' };
+        one.inside().stream.ended = true;
+        for (let k = 0; k < 3; k++) one.send({ do: 'change', settings });""")
+    moving(opened, before)
+    reached = inside(opened, "moment.time")
+    wait_for(lambda: inside(opened, "moment.time") > reached)
+    assert opened.run("return [current().run, again, state.paused]") == [before + 1, False, False]
+
+
 def test_what_acts_on_the_disks_acts_at_once_and_the_rest_starts_anew(opened):
     before, time = opened.run("return current().run"), inside(opened, "moment.time")
     slide(opened, 3, 0.5)  # restitution
