@@ -248,13 +248,12 @@ class Simulation:
     def parameters(self) -> dict:
         """All variables with their values, by groups, as `Run.parameters` has them."""
         found: dict = {}
-        for line in self._text("parameters").splitlines():
-            name, _, value = line.partition(" = ")
-            *groups, name = name.split(".")
+        for whole, value in self._values().items():
+            *groups, name = whole.split(".")
             place = found
             for group in groups:
                 place = place.setdefault(group, {})
-            place[name] = json.loads(value) if ", ... " not in value else value
+            place[name] = value
         for group in {"obstacle", "wall"} & found.keys():  # the file has columns of them
             rows = list(found[group].values())
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
@@ -263,6 +262,11 @@ class Simulation:
         if changes := self._text("changes"):
             found["changes"] = changes
         return found
+
+    def _values(self) -> dict[str, object]:
+        """The values of all variables that have one, by GROUP.NAME.VARIABLE."""
+        lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
+        return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
 
     @property
     def nature(self) -> Nature:

@@ -26,7 +26,7 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -134,7 +134,10 @@ class Bench:
         except (ProgramError, ValueError) as problem:
             refuse(problem, change=True)
             return
-        exact = values_now(self.simulation, value) if what == "change" else value
+        exact = value
+        if what == "change":
+            known = self.simulation._values()
+            exact = {name: known.get(name) for name in value}
         self.actions.append((now, what, value, exact))
         self.renew(changed=True)
 
@@ -263,9 +266,8 @@ class Bench:
     def speak(self) -> None:
         """The energies of now, and means with errors since something was changed."""
         self.spoken = time.perf_counter()
-        now, seen = self.simulation.time, self.simulation._observed()
-        run, value = self.run, {name: part[0].item() for name, part in seen.items()}
-        value["time"] = now
+        run, value = self.run, observed(self.simulation)
+        now = value["time"]
         energies = {
             kind: [value.get(f"{name}/{kind}_energy", 0.0) for name in run.names]
             for kind in ("kinetic", "potential", "rotational")
@@ -344,6 +346,12 @@ def pictured_run(simulation: Simulation) -> Pictured:
         parameters=parameters,
         provenance={},
     )
+
+
+def observed(simulation: Simulation) -> dict[str, float]:
+    """The time, and the observables of now; of those with several numbers the first."""
+    seen = simulation._observed().items()
+    return {name: part[0].item() for name, part in seen} | {"time": simulation.time}
 
 
 def sampled(count: int, value: dict) -> tuple[float, ...]:
@@ -426,12 +434,6 @@ def refuse(reason: Exception, change: bool = False) -> None:
     tell({"is": "problems", "change": change, "problems": problems(reason)})
 
 
-def values_now(simulation: Simulation, names: Iterable[str]) -> dict[str, object]:
-    """What variables are at present, None for those that have no value."""
-    lines = dict(line.split(" = ", 1) for line in simulation._text("parameters").splitlines())
-    return {name: json.loads(lines.get(name, "null")) for name in names}
-
-
 def speed_up(simulation: Simulation, factor: float) -> None:
     """Multiply all velocities."""
     simulation.velocity = factor * simulation.velocity
@@ -505,9 +507,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
         count, settles = simulation.count, simulation.nature.in_equilibrium
         step = max(count, SOME) // 4
         while len(samples) < LOOKS and time.perf_counter() < began + LONGEST:
-            seen = simulation._observed()
-            value = {key: float(np.sum(part)) for key, part in seen.items()}
-            value["time"] = simulation.time
+            value = observed(simulation)
             samples.append((*sampled(count, value), value[name]))
             simulation._go_on((np.inf, NEVER, simulation.events + step), LONGEST / LOOKS)
     late = np.array(samples[len(samples) // 2 :]).T
