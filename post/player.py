@@ -87,12 +87,12 @@ def sides(run: Run) -> list[dict]:
         for at, side in zip(places, run.sides, strict=True)
     ]
     for k, (time, place) in run.pushed.items():
-        some = evenly(len(time), MOST_FRAMES)
+        some = thinned(len(time), MOST_FRAMES)
         found[k]["way"] = [time[some].tolist(), np.ravel(place)[some].tolist()]
     return found
 
 
-def evenly(count: int, most: int) -> np.ndarray:
+def thinned(count: int, most: int) -> np.ndarray:
     """Numbers of at most so many of `count` samples."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
@@ -141,13 +141,12 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
     Events as their times and partners.  Of each gap between two frames the number of turns; of each
     turn its disk, and three numbers: when, as share of the gap, and the velocity afterwards.
     """
-    exact, known = run.count <= FEW_DISKS, run.collisions_per_disk_at(run.time)[frames]
-    facts = {"collisions": known.tolist(), "known": False, "events": False}
+    exact, facts = run.count <= FEW_DISKS, {"known": False, "events": False}
     try:
         log = run.events
     except RunError:  # that it is not there, or damaged, does not stop a film
-        facts["note"] = "output.event_log tells the paths between"
-        return facts, {}
+        facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
+        return facts | {"note": "output.event_log tells the paths between"}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
     facts["collisions"] = (2 / run.count * pairs[ends]).tolist()
     some = slice(ends[0], ends[-1])
@@ -207,7 +206,7 @@ def curves(run: Run) -> dict:
         with suppress(RunError):
             found["time"], series[name] = run.observable(name)
     time = found.get("time", run.time[[0, -1]])
-    some = evenly(len(time), MOST_SAMPLES)
+    some = thinned(len(time), MOST_SAMPLES)
 
     def rounded(name: str) -> list | None:
         values = series.get(name, np.full(len(time), np.nan))
