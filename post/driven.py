@@ -130,7 +130,8 @@ def width_law(run: Run) -> Room | None:
 
 def balances(run: Run) -> tuple[float, float]:
     """The largest changes of what disks and side have together: of enthalpy, and of momentum."""
-    k, side = next((k, run.sides[k]) for k in run.pushed)
+    k = min(run.pushed)
+    side = run.sides[k]
     time, energy = run.observable("total_energy")
     speed, impulse = (
         run.observable(f"sides/{SIDES[k]}/{what}").value for what in ("velocity", "impulse")
@@ -239,26 +240,28 @@ def by_input(runs: list[Run]) -> dict[str, list[Run]]:
     return groups
 
 
-def draw_curves(axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict, points: int):
+def draw_curves(
+    axes: plt.Axes, tracks: dict[tuple[str, str], list], laws: dict, fine: bool
+) -> None:
     """Solid what was measured, dashed what should last."""
     for (key, curves), colour in zip(tracks.items(), drawing.colours(len(tracks)), strict=True):
         label = ", ".join(filter(None, key)) or "measured"
         for k, (time, value) in enumerate(curves):
-            means = windows(time, value, (time[-1] - time[0]) / points)
+            means = windows(time, value, (time[-1] - time[0]) / (FINE if fine else POINTS))
             style = {"label": label * (k == 0)} | drawing.lone(means[0])
-            axes.plot(*means, color=colour, lw=1, alpha=1 if points == POINTS else 0.4, **style)
+            axes.plot(*means, color=colour, lw=1, alpha=0.4 if fine else 1, **style)
         for level in laws[key[0]]:
             over = curves[0][0] if np.ndim(level) else np.array([0, curves[0][0][-1]])
             axes.plot(over, np.broadcast_to(level, over.shape), color=colour, ls="--", lw=1.6)
     if any(laws.values()):
         axes.plot([], [], color="black", ls="--", label="theory")
-    bottom, top = 0 if points == POINTS else 0.9 * axes.dataLim.y0, 1.06 * axes.dataLim.y1
+    bottom, top = 0.9 * axes.dataLim.y0 if fine else 0, 1.06 * axes.dataLim.y1
     axes.set(xlabel="time (reduced units)", xlim=(0, None), ylim=(bottom, top))
     axes.legend()
 
 
 def draw(
-    groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str, points: int
+    groups: dict[str, list[Run]], tracks: dict, laws: dict, label: str, fine: bool
 ) -> plt.Figure:
     """The curves, and pictures."""
     runs = [run for own in groups.values() for run in own]
@@ -272,7 +275,7 @@ def draw(
         figsize=(1.5 * HEIGHT + width * len(pictures) + 1, HEIGHT + 1),
         width_ratios=[1.5 * HEIGHT, *[width] * len(pictures)],
     )
-    draw_curves(axes, tracks, laws, points)
+    draw_curves(axes, tracks, laws, fine)
     axes.set_ylabel(label)
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         drawing.draw_box(panel, run, run.time[frame])
@@ -325,8 +328,8 @@ def main() -> None:
         row |= {"theory": law} | measured("ratio", law and Estimate(mean / law, error / law))
         rows.append(row)
     laws = {name: levels(law, compared) for name, law in expected.items()}
-    points = FINE if args.show == "width" else POINTS
-    report(args, draw(groups, tracks, laws, label, points), rows, notes=notes)
+    figure = draw(groups, tracks, laws, label, fine=args.show == "width")
+    report(args, figure, rows, notes=notes)
 
 
 if __name__ == "__main__":

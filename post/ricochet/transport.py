@@ -200,6 +200,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     """Viscosities and, but of a mixture, conductivity."""
     each = [moments(run, start) for run, start in zip(runs, starts, strict=True)]
     theories = [enskog_of(run, reduced=True) for run in runs]
+    units = [enskog_of(run) for run in runs]
     for run, own in zip(runs, theories, strict=True):
         off = own["viscosity"] / theories[0]["viscosity"] - 1
         if own.keys() != theories[0].keys() or abs(off) > UNLIKE:
@@ -209,7 +210,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
         raise RunError(f"{runs[0].path}: samples of the others are not as far apart")
     per_free_time = 1 / float(np.mean(steps))
     shortest = min(len(one["viscosity"]) for _, one in each)
-    lives = enskog_of(runs[0]).get("memory", 0) / td.mean_free_time(runs[0])
+    lives = units[0].get("memory", 0) / td.mean_free_time(runs[0])
     memory = MEMORY * max(1.0, lives / HEAT)
     lag = min(round(memory * per_free_time), shortest // 8)
     if lag < max(2, per_free_time):
@@ -222,10 +223,10 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
     found = {}
     for name in each[0][1]:
         members, slopes = [], []
-        for run, (step, one) in zip(runs, each, strict=True):
+        for run, (step, one), own in zip(runs, each, units, strict=True):
             kt = td.kt_at_start(run)
             unit = float(np.prod(run.edges)) * (kt**2 if name == "conductivity" else kt)
-            unit = 1 / unit / enskog_of(run)[name]
+            unit = 1 / unit / own[name]
             members.append(coefficient(one[name], step, lag).scaled(unit))
             slopes.append(running(one[name], step, at) * unit)
         curve = Curve(middle, *estimate(slopes))
