@@ -45,12 +45,12 @@ function chip(kind, text) {
   return element;
 }
 
-const PATTERN = ['', ', with a hole', ', with a ring', ', with hole and ring'];
+const PATTERN_WORDS = ['', ', with a hole', ', with a ring', ', with hole and ring'];
 
 function drawLegend() {
   const scale = film.scales[state.colour], legend = $('legend');
   legend.replaceChildren();
-  if (!scale) legend.replaceChildren(...kinds.map((kind, s) => chip(kind, `${kind.name}, ${kind.sizes}${PATTERN[s % PATTERN.length]}`)));
+  if (!scale) legend.replaceChildren(...kinds.map((kind, s) => chip(kind, `${kind.name}, ${kind.sizes}${PATTERN_WORDS[s % PATTERN_WORDS.length]}`)));
   else {
     const stops = Array.from({ length: 17 }, (_, k) => css(scaleColour(255 * k / 16)));
     const middle = state.colour === 'collisions' ? Math.expm1(Math.log1p(scale[1]) / 2) : scale[1] / 2;
