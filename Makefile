@@ -290,7 +290,6 @@ lint-fortran:
 lint-python:
 	@$(venv) -m ruff check --quiet --output-format concise post tests docs
 	@$(venv) tests/support/check_style.py
-	@$(venv) tests/support/weigh.py
 lint-shell:
 	@shellcheck --format gcc $(wildcard .ci/* src/*.sh runs/*.sh tests/*.sh tests/support/*.sh docs/*.bash)
 
