@@ -5,7 +5,7 @@ module texts
   implicit none
   private
   public :: text_t, growing_text_t, written, written_exactly, lower_case, legible, shown, joined, place_of, nearest_word, suggestion
-  public :: about, counted, line_at, lines_of, size_text
+  public :: about, counted, line_at, lines_of, size_text, wrapped
 
   !> An element of a list of texts, each with its own length.
   type :: text_t
@@ -169,6 +169,26 @@ contains
     end do
     line = growing%text()
   end function joined
+
+  !> The text in lines of at most `width` characters, broken at blanks, with `margin` before all but the first line. A longer
+  !> word has a line of its own.
+  pure function wrapped(text, width, margin) result(lines)
+    character(len=*), intent(in) :: text, margin
+    integer, intent(in) :: width
+    character(len=:), allocatable :: lines
+    integer :: first, cut
+
+    lines = ""
+    first = 1
+    do while (len_trim(text) - first + 1 > width)
+      cut = index(text(first:first + width), " ", back=.true.)
+      if (cut == 0) cut = index(text(first:len_trim(text)), " ")
+      if (cut == 0) exit
+      lines = lines//text(first:first + cut - 2)//eol//margin
+      first = first + cut
+    end do
+    lines = lines//trim(text(first:))
+  end function wrapped
 
   !> The position of a word in a list; 0 if it is not there.
   pure function place_of(word, words) result(place)

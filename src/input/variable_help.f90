@@ -5,12 +5,13 @@ module variable_help
   use input_groups, only: group_t, json_text
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
     wall_groups, words_of
-  use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, written, written_exactly
+  use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
   implicit none
   private
   public :: defaults_text, explain, groups_text, input_of, variables_text
 
   integer, parameter :: comment_column = 40                !! of the reference file
+  integer, parameter :: help_width = 100                   !! of a line of help
 
 contains
 
@@ -40,21 +41,21 @@ contains
     if (any(wall_groups == group)) margin = "! "
   end function margin
 
-  !> A variable in the reference file; a choice has a second line that lists its words.
+  !> A variable in the reference file. Its help continues in comment lines, and a choice has one more that lists its words.
   pure function reference_line(row) result(line)
     type(variable_t), intent(in) :: row
     character(len=:), allocatable :: line
-    character(len=:), allocatable :: indent
+    character(len=:), allocatable :: indent, meaning, next
 
     indent = "  "
     if (row%status /= "default" .and. row%status /= "example") indent = "  ! "
     if (any(wall_groups == row%group)) indent = "!   "
-    line = padded(indent//trim(row%name)//" = "//trim(row%value))//" ! "
-    if (row%status == "example") line = line//"an example: "
-    line = line//trim(row%help)
-    if (row%unit /= "") line = line//" ["//trim(row%unit)//"]"
-    if (row%choices == "") return
-    line = line//eol//padded(margin(row%group))//" ! "//allowed(row)
+    next = padded(margin(row%group))//" ! "
+    meaning = trim(row%help)
+    if (row%status == "example") meaning = "an example: "//meaning
+    if (row%unit /= "") meaning = meaning//" ["//trim(row%unit)//"]"
+    line = padded(indent//trim(row%name)//" = "//trim(row%value))//" ! "//wrapped(meaning, help_width, next)
+    if (row%choices /= "") line = line//eol//next//allowed(row)
   end function reference_line
 
   !> A text with blanks up to the comments, if it is not longer.
@@ -95,7 +96,7 @@ contains
 
     text = trim(row%group)//"."//trim(row%name)
     if (row%unit /= "") text = text//"  ["//trim(row%unit)//"]"
-    text = text//indent//trim(row%help)//indent//"allowed: "//allowed(row)//indent
+    text = text//indent//wrapped(row%help, help_width, indent(2:))//indent//"allowed: "//allowed(row)//indent
     if (row%status == "default" .or. row%status == "fallback") then
       text = text//"default: "//trim(row%value)
     else

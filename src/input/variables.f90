@@ -12,7 +12,7 @@ module variables
   public :: free_to_change, may_change_at_work, full_names
   public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
-  integer, parameter :: name_length = 37
+  integer, parameter :: name_length = 37, help_length = 1000
   integer, parameter :: most_threads = 1024, most_disks = 100000000
   real(real64), parameter :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
   real(real64), parameter :: largest = 1.0e100_real64      !! squared or multiplied
@@ -48,7 +48,7 @@ module variables
     integer :: size                          !! number of values; 0: any number
     character(len=8) :: status               !! see below
     character(len=24) :: value               !! as written in a file
-    character(len=80) :: help
+    character(len=help_length) :: help       !! full sentences
     type(range_t) :: range = anything        !! of numbers
     character(len=16) :: unit = ""
     character(len=100) :: choices = ""        !! of texts, separated by blanks; none: free text
