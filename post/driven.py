@@ -9,10 +9,11 @@ that noise heats in a periodic box: where heating and collisions balance (van No
 for equal elastic disks in a box with one side that moves steadily: the adiabat from the equation of
 state, with the layers at the walls (`hard_disks.adiabat`), that slow strokes follow; take several
 runs, for one has no error of its own once the side stands.
---show width: of the box, a side of which disks push (motion = 'free').  Dashed, for equal elastic
-disks: its mean, and a standard deviation more and less, by the equation of state, at constant
-enthalpy (docs/theory.md).  Printed besides: the deviation; and the largest changes of the enthalpy,
-over its own, and of the side's momentum less what force and disks gave it, over what disks gave.
+--show width: of the box, one side of which is a piston (motion = 'piston').  Dashed, for equal
+elastic disks: its mean, and a standard deviation more and less, by the equation of state, at
+constant enthalpy (docs/theory.md).  Printed besides: the deviation; and the largest changes of the
+enthalpy, over its own, and of the side's momentum less what force and disks gave it, over what
+disks gave.
 --show share: of the disks in the left half of the box.  Dashed, for a dilute gas on a sawtooth
 floor, between halves with a hole above the floor: the shares that last (after Eggers 1999).
 --show height: of the disks of each species, on average.
@@ -71,7 +72,7 @@ def noise_law(run: Run) -> float | None:
 
 def temperature_law(run: Run) -> np.ndarray | float | None:
     """What lasts under noise, or the adiabat at the observables."""
-    side = only_moving(run, "steady")
+    side = only_moving(run, "constant_velocity")
     if side is None:
         return noise_law(run)
     kt = run.observable("all/temperature").value
@@ -100,7 +101,7 @@ def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
 def width(run: Run) -> Curves:
     """Of the box along the way of a side that disks push."""
     if not run.pushed:
-        raise Refused(f"{run.path}: has no side that disks push (motion = 'free')")
+        raise Refused(f"{run.path}: has no piston (side.motion = 'piston')")
     return {"": (run.observable("total_energy").time, widths(run, min(run.pushed)))}
 
 
@@ -113,7 +114,7 @@ class Room(NamedTuple):
 
 def width_law(run: Run) -> Room | None:
     """At constant enthalpy, of a fluid; the side is at rest at first."""
-    side = only_moving(run, "free")
+    side = only_moving(run, "piston")
     if side is None:
         return None
     along = bool(run.periodic[1 - side // 2])  # keeps its momentum

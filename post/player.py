@@ -41,7 +41,8 @@ from matplotlib.colors import to_hex
 PAGE = Path(__file__).with_name("page")  # what the page is made of
 INPUTS = Path(__file__).resolve().parents[1] / "input"
 SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
-SWING, STROKE = ("amplitude", "period", "phase"), ("velocity", "begin", "end")  # of a side
+SWING = ("amplitude", "period", "phase")  # of a side
+STROKE = ("velocity", "start_time", "end_time")
 LAWS = ("motion", *SWING, *STROKE, "temperature", "speed")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on

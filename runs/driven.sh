@@ -42,7 +42,7 @@ done <<'TABLE'
 leidenfrost height side.bottom.period_0.3_seed_1 side.bottom.period=0.3,2
 demon share side.bottom.velocity_0.5_seed_1 side.bottom.velocity=0.5,0.9
 nut height seed_1
-piston temperature seed_1
+compression temperature seed_1
 constant_pressure width seed_1
 heated temperature restitution_0.8_seed_1 contact.restitution=0.8,0.9
 active cluster speed_1_seed_1 drive.speed=1,0

@@ -109,7 +109,7 @@ HTML
   section leidenfrost_fields 'Leidenfrost: density and temperature above the floor' driven
   section demon "Maxwell's demon: grains gather in one of two chambers" driven
   section nut 'The Brazil nut: a large disk rises in a shaken bed' driven
-  section piston 'A piston heats a gas along its adiabat' driven
+  section compression 'Compression heats a gas along its adiabat' driven
   section constant_pressure 'A piston that disks push: width at constant enthalpy' driven
   section heated 'A granular gas held by random kicks' driven
   section active 'Active disks gather in clusters' driven

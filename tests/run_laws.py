@@ -150,15 +150,16 @@ def shift_of(found: Found, side: str, time: float) -> float:
         found.get(f"/parameters/side/{side}@{name}", 0)
         for name in ("motion", "amplitude", "period", "phase")
     )
-    if kind == b"free":
+    if kind == b"piston":
         k, (lower, edges, _) = SIDES.index(side), of_box(found)
         path, ends = f"/observables/sides/{side}/place", (lower, lower + edges)
         at = [place - ends[k % 2][k // 2] for place in found[f"{path}/value"]]
         known = found[f"{path}/time"] == time
         return float(np.ravel(at)[known][-1] * (-1) ** k) if np.any(known) else -np.inf
-    if kind == b"steady":
+    if kind == b"constant_velocity":
         speed, begin, end = (
-            found[f"/parameters/side/{side}@{name}"] for name in ("velocity", "begin", "end")
+            found[f"/parameters/side/{side}@{name}"]
+            for name in ("velocity", "start_time", "end_time")
         )
         return speed * (min(max(time, begin), end) - begin)
     if kind == b"sine":

@@ -108,12 +108,12 @@ function move(time) {
 
 // Where the sides are at a time: a picture only, events are those of the engine. Left, right, bottom, top.
 function sidesAt(time) {
-  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, begin, end, way }, k) => {
+  return past[moment.frame].sides ?? film.sides.map(({ place, motion, amplitude, period, phase, velocity, start_time: start, end_time: end, way }, k) => {
     if (way?.[0].length > 1) {
       const [times, places] = way, then = clamp(upTo(times, time), 1, times.length - 1), here = then - 1;
       return places[here] + clamp((time - times[here]) / (times[then] - times[here] || 1), 0, 1) * (places[then] - places[here]);
     }
-    if (motion === 'steady') return place + (k % 2 ? -1 : 1) * velocity * (Math.min(Math.max(time, begin), end) - begin);
+    if (motion === 'constant_velocity') return place + (k % 2 ? -1 : 1) * velocity * (Math.min(Math.max(time, start), end) - start);
     if (!period) return place;
     const s = time / period + phase, part = s - Math.floor(s);
     const f = motion === 'sine' ? Math.sin(2 * Math.PI * part) : 16 * (part < 0.5 ? part * (0.5 - part) : (part - 0.5) * (part - 1));

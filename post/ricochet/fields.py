@@ -96,7 +96,7 @@ def jackknife(
 
 def steady_frames(run: Run, skip: float | None) -> list[int]:
     """Frames after `skip` collisions per disk, else those of the second half."""
-    if any(side.get("motion") in ("steady", "free") for side in run.sides):
+    if any(side.get("motion") in ("constant_velocity", "piston") for side in run.sides):
         why = "has a side that leaves its place (motion), fields are those of cells that stay"
         raise RunError(f"{run.path}: {why}")
     start = run.time[-1] / 2 if skip is None else after_start(run, skip)

@@ -238,7 +238,7 @@ class Run:
     @cached_property
     def pushed(self) -> dict:
         """Places of the sides that disks push, by their numbers in `sides`."""
-        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "free"]
+        free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/place") for k in free}
 
     @cached_property
@@ -526,15 +526,16 @@ def run_of(path: Path, file: h5py.File) -> Run:
 
 def outmost(side: Mapping) -> float:
     """How far outwards of its place a side ever is; one that only strikes does not leave it."""
-    if side.get("motion") == "steady":
-        return max(0.0, -float(side["velocity"]) * float(side["end"] - side["begin"]))
+    if side.get("motion") == "constant_velocity":
+        return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
 def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
     """How far inwards of its place a side is at these times: see docs/theory.md."""
-    if side.get("motion") == "steady":
-        return side["velocity"] * (np.clip(time, side["begin"], side["end"]) - side["begin"])
+    if side.get("motion") == "constant_velocity":
+        start, end = side["start_time"], side["end_time"]
+        return side["velocity"] * (np.clip(time, start, end) - start)
     if outmost(side) == 0:
         return np.zeros(np.shape(time))
     s = (time / side["period"] + side["phase"]) % 1

@@ -6,7 +6,7 @@ module changes
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
-  use side_motion, only: free
+  use side_motion, only: piston
   use simulation_state, only: simulation_t, system_t
   use tally, only: work
   implicit none
@@ -31,9 +31,9 @@ contains
     call other%make_room(0_int32)
     other%row(mass_column) = sim%row(mass_column)
     other%box%epoch = sim%epoch
-    do k = 1, n_sides                                        ! of one that is free still, its mass and force may be others
+    do k = 1, n_sides                                        ! the mass and force of a piston may change
       associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
-        if (.not. (old%kind == free .and. new%kind == free)) cycle
+        if (.not. (old%kind == piston .and. new%kind == piston)) cycle
         tau = old%moment(sim%epoch, sim%now)
         new%at = old%place(tau)
         new%v = old%velocity(tau)

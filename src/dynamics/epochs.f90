@@ -6,7 +6,7 @@ module epochs
   use kinds, only: int32, int64, never, pi, real64
   use renumbering, only: renumber
   use shapes, only: magnitude
-  use side_motion, only: steady
+  use side_motion, only: constant_velocity
   use simulation_state, only: simulation_t
   implicit none
   private
@@ -133,7 +133,7 @@ contains
     logical :: yes
 
     associate (box => sim%box)
-      yes = any(box%surface%motion%kind == steady) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
+      yes = any(box%surface%motion%kind == constant_velocity) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
       if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
         + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
     end associate

@@ -16,7 +16,7 @@ module event_driven
   use evolution, only: evolution_t, limits_t
   use neighbour_search, only: event_t
   use partners, only: is_wall
-  use side_motion, only: free
+  use side_motion, only: piston
   use simulation_state, only: simulation_t
   use signals, only: stop_requested
   use tracks, only: tracks_t
@@ -207,7 +207,7 @@ contains
       else
         call collide_wall(sim, i, code, t, counts)
       end if
-      if (sim%box%surface(1 - code)%motion%kind == free) call follow_side(self, sim, code)
+      if (sim%box%surface(1 - code)%motion%kind == piston) call follow_side(self, sim, code)
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)
@@ -218,7 +218,7 @@ contains
     call predict(self, sim, i)
   end subroutine execute
 
-  !> Predicts the disks anew that expected to hit a free side, which now flies otherwise, and those that hit it sooner.
+  !> Predicts the disks anew that expected to hit a piston, which now flies otherwise, and those that hit it sooner.
   subroutine follow_side(self, sim, side)
     class(event_driven_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim

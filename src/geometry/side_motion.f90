@@ -11,8 +11,8 @@ module side_motion
   public :: motions, side_motion_t
 
   !> The motions by their names in the input; a motion is its number in this list.
-  character(len=*), parameter :: motions = "still sine parabolic sawtooth steady free"
-  integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, steady = 5, free = 6
+  character(len=*), parameter :: motions = "still sine parabolic sawtooth constant_velocity piston"
+  integer, parameter, public :: still = 1, sine = 2, parabolic = 3, sawtooth = 4, constant_velocity = 5, piston = 6
   real(real64), parameter :: small_angle = 0.5_real64       !! below which differences would cancel [radians]
   !> A part of a period: what bends the gap for so short a time does not change it by a bit.
   real(real64), parameter :: negligible = 1.0e-10_real64
@@ -20,13 +20,13 @@ module side_motion
 
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
-    real(real64) :: amplitude = 0.0_real64           !! of a steady one its way, of a free one the width of the box [length]
+    real(real64) :: amplitude = 0.0_real64           !! of constant velocity: its path; of a piston: the width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
-    real(real64) :: strike = 0.0_real64              !! velocity of a sawtooth or a steady side inwards [length/time]
-    real(real64) :: begin = 0.0_real64               !! of a steady one [time]
-    real(real64) :: end = 0.0_real64                 !! likewise
-    ! Of a free one, on which disks and a force act:
+    real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or a constant one [length/time]
+    real(real64) :: start_time = 0.0_real64          !! of one of constant velocity [time]
+    real(real64) :: end_time = 0.0_real64            !! likewise
+    ! Of a piston, on which disks and a force act:
     real(real64) :: mass = 1.0_real64                !! [mass]
     real(real64) :: pull = 0.0_real64                !! acceleration inwards by the force [length/time**2]
     real(real64) :: clock = 0.0_real64               !! of its last hit, since the epoch [time]
@@ -59,19 +59,19 @@ contains
     class(side_motion_t), intent(in) :: self
     logical :: yes
 
-    yes = self%kind == steady .or. self%kind == free
+    yes = self%kind == constant_velocity .or. self%kind == piston
   end function drifts
 
-  !> How far inwards of its own place it ever is; a free one yields.
+  !> How far inwards of its own place it ever is; a piston yields.
   elemental function inmost(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]
 
     x = self%amplitude
-    if (self%kind == free .or. (self%kind == steady .and. self%strike < 0)) x = 0
+    if (self%kind == piston .or. (self%kind == constant_velocity .and. self%strike < 0)) x = 0
   end function inmost
 
-  !> The highest speed of the side; of a free one, that of a fall through the box.
+  !> The highest speed of the side; of a piston, that of a fall through the box.
   elemental function top_speed(self) result(speed)
     class(side_motion_t), intent(in) :: self
     real(real64) :: speed                            !! [length/time]
@@ -79,20 +79,20 @@ contains
     speed = abs(self%strike)
     if (self%kind == sine) speed = 2*pi*self%amplitude/self%period
     if (self%kind == parabolic) speed = 8*self%amplitude/self%period
-    if (self%kind == free) speed = sqrt(2*abs(self%pull)*self%amplitude)
+    if (self%kind == piston) speed = sqrt(2*abs(self%pull)*self%amplitude)
   end function top_speed
 
-  !> Time since a period, a stroke or a free flight began, at the time epoch + t of the run. The remainders are exact, so
+  !> Time since a period, a stroke or the flight of a piston began, at the time epoch + t of the run. The remainders are exact, so
   !> that a late time is as sharp as an early one.
   elemental function moment(self, epoch, t) result(tau)
     class(side_motion_t), intent(in) :: self
     real(real64), intent(in) :: epoch, t             !! [time]
     real(real64) :: tau                              !! [time]
 
-    if (self%kind == free) then
+    if (self%kind == piston) then
       tau = t - self%clock
-    else if (self%kind == steady) then
-      tau = (epoch - self%begin) + t
+    else if (self%kind == constant_velocity) then
+      tau = (epoch - self%start_time) + t
     else
       tau = modulo(modulo(epoch, self%period) + modulo(t, self%period) + self%phase*self%period, self%period)
     end if
@@ -111,9 +111,9 @@ contains
       x = self%amplitude*sin(2*pi*s)
     else if (self%kind == parabolic) then
       x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
-    else if (self%kind == steady) then
-      x = self%strike*min(max(tau, 0.0_real64), self%end - self%begin)
-    else if (self%kind == free) then
+    else if (self%kind == constant_velocity) then
+      x = self%strike*min(max(tau, 0.0_real64), self%end_time - self%start_time)
+    else if (self%kind == piston) then
       x = flight(self%at, self%v, self%pull, tau)
     end if
   end function place
@@ -131,9 +131,9 @@ contains
       v = self%top_speed()*cos(2*pi*s)
     else if (self%kind == parabolic) then
       v = self%top_speed()*merge(1 - 4*s, 4*s - 3, s < 0.5_real64)
-    else if (self%kind == steady .and. (tau < 0 .or. tau >= self%end - self%begin)) then
+    else if (self%kind == constant_velocity .and. (tau < 0 .or. tau >= self%end_time - self%start_time)) then
       v = 0
-    else if (self%kind == free) then
+    else if (self%kind == piston) then
       v = flight_velocity(self%v, self%pull, tau)
     end if
   end function velocity
@@ -244,10 +244,10 @@ contains
     real(real64) :: s, from, to, above, entry
     integer :: pieces
 
-    if (self%kind == steady) then
+    if (self%kind == constant_velocity) then
       s = time_in_stroke(self, tau, gap, v, g)
       return
-    else if (self%kind == free) then
+    else if (self%kind == piston) then
       s = time_to_line(gap, self%velocity(tau) - v, self%pull - g)
       return
     end if
@@ -275,14 +275,14 @@ contains
     end do
   end function contact_time
 
-  !> The contact with a side that stands, moves steadily, and stands again.
+  !> The contact with a side that stands, moves with constant velocity, and stands again.
   pure function time_in_stroke(motion, tau, gap, v, g) result(s)
     class(side_motion_t), intent(in) :: motion
     real(real64), intent(in) :: tau, gap, v, g       !! as in `contact_time`
     real(real64) :: s, from, to(3), apart
     integer :: k
 
-    to = [-tau, (motion%end - motion%begin) - tau, never]
+    to = [-tau, (motion%end_time - motion%start_time) - tau, never]
     from = 0
     do k = 1, 3
       if (.not. to(k) > from) cycle

@@ -10,7 +10,7 @@ module input_settings
   use input_species, only: take_species
   use input_surfaces, only: check_least, take_grip, take_obstacles, take_wall_laws
   use settings, only: sampled, sampled_by, sampling_t, settings_t
-  use side_motion, only: free
+  use side_motion, only: piston
   use texts, only: counted, joined, place_of, shown, suggestion, written
   use variables, only: is_repeated, obstacle_groups, row_of, variables_of, words_of
   implicit none
@@ -232,8 +232,8 @@ contains
       call refuse(shear .and. any(groups%name == "obstacle"), "box.shear_rate", "&obstacle")
       call refuse(shear .and. any(groups%name == "wall"), "box.shear_rate", "&wall")
       call refuse(shear .and. settings%run%dynamics == "steps", "box.shear_rate", "run.dynamics = 'steps'")
-      call refuse(settings%run%dynamics == "steps" .and. any(box%surface%motion%kind == free), "run.dynamics", &
-        "side.motion = 'free'")
+      call refuse(settings%run%dynamics == "steps" .and. any(box%surface%motion%kind == piston), "run.dynamics", &
+        "side.motion = 'piston'")
       call refuse(settings%output%helfand .and. box%falling(), "output.helfand", "box.gravity: velocities change all the time")
       call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)

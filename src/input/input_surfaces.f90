@@ -10,7 +10,7 @@ module input_surfaces
   use variables, only: largest, table, words_of
   use partners, only: n_sides, side_name
   use segments, only: new_segment
-  use side_motion, only: free, motions, sawtooth, side_motion_t, steady
+  use side_motion, only: piston, motions, sawtooth, side_motion_t, constant_velocity
   use texts, only: place_of, written
   implicit none
   private
@@ -86,8 +86,8 @@ contains
         if (.not. box%surface(side)%motion%travels()) cycle
         ! Sides must not meet, whenever each is how far inwards.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
-          trim(merge("end      ", "amplitude", box%surface(side)%motion%kind == steady)), "leaves no room between the sides, " &
-          //"which are "//written(width)//" apart (box.upper)", problems)
+          trim(merge("end_time ", "amplitude", box%surface(side)%motion%kind == constant_velocity)), &
+          "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
@@ -134,15 +134,15 @@ contains
       motion%strike = group%real_of("velocity", 0.0_real64)
       if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
         "velocity", "must be > 0 with motion = 'sawtooth': it strikes inwards", problems)
-      if (motion%kind == steady) then
-        motion%begin = group%real_of("begin", 0.0_real64)
-        motion%end = group%real_of("end", 0.0_real64)
-        motion%amplitude = abs(motion%strike)*(motion%end - motion%begin)
-        if (group%given("end") .and. motion%end <= motion%begin) call group%complain( &
-          "end", "is not after begin, "//written(motion%begin), problems)
-        if (motion%amplitude > largest) call group%complain("end", "the side moves as far as "//written(motion%amplitude) &
+      if (motion%kind == constant_velocity) then
+        motion%start_time = group%real_of("start_time", 0.0_real64)
+        motion%end_time = group%real_of("end_time", 0.0_real64)
+        motion%amplitude = abs(motion%strike)*(motion%end_time - motion%start_time)
+        if (group%given("end_time") .and. motion%end_time <= motion%start_time) call group%complain( &
+          "end_time", "is not after start_time, "//written(motion%start_time), problems)
+        if (motion%amplitude > largest) call group%complain("end_time", "the side moves as far as "//written(motion%amplitude) &
           //"; allowed: up to "//written(largest), problems)
-      else if (motion%kind == free) then
+      else if (motion%kind == piston) then
         motion%mass = group%real_of("mass", 1.0_real64)
         motion%pull = group%real_of("force", 0.0_real64)/motion%mass
         motion%amplitude = width

@@ -4,6 +4,7 @@ module input_words
   use input_problems, only: most_problems, problem_list_t
   use input_text, only: assignment_t, content, token_t
   use input_groups, only: value_t, text_length
+  use old_names, only: new_name
   use variables, only: allowed, largest, variable_t, smallest, table, words_of
   use texts, only: counted, digits, lower_case, nearest_word, shown, written
   implicit none
@@ -148,6 +149,8 @@ contains
         meant = nearest_word(word, words_of(row%choices))
         if (meant /= "") meant = "did you mean """//meant//"""? "
         problem = shown(word)//" is not allowed; "//meant//"allowed: "//allowed(row)
+        meant = new_name(row%group, row%name, word)
+        if (meant /= "") problem = "'"//word//"' is called '"//meant//"' now"
       end if
     end subroutine check_text
   end subroutine store_values

@@ -4,6 +4,7 @@ module namelist_input
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
   use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
+  use old_names, only: new_name
   use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
   implicit none
@@ -350,12 +351,17 @@ contains
       end associate
     end subroutine take_assignment
 
-    !> The variable may be misspelt, or belong to another group.
+    !> The variable may be misspelt, have another name now, or belong to another group.
     subroutine report_unknown(group, name, line)
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: line
       character(len=:), allocatable :: advice
 
+      advice = new_name(group, name, "")
+      if (advice /= "") then
+        call problems%add(line, trim(group)//"."//plain(name), "is called "//advice//" now")
+        return
+      end if
       advice = suggestion(name, variables_of(group))
       if (full_names(name) /= "") advice = "did you mean "//full_names(name)//"?"
       call problems%add(line, trim(group)//"."//plain(name), "unknown variable; "//advice)

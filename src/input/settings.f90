@@ -5,7 +5,7 @@ module settings
   use disks, only: species_t
   use errors, only: error_t
   use input_groups, only: group_t, text_length
-  use side_motion, only: free
+  use side_motion, only: piston
   use simulation_state, only: system_t
   use stop_rules, only: stop_settings_t
   use texts, only: text_t
@@ -124,7 +124,7 @@ contains
     logical :: yes
 
     yes = self%run%dynamics == "events" .and. self%run%search == "cells" &
-      .and. .not. (self%box%is_sheared() .or. any(self%box%surface%motion%kind == free)) &
+      .and. .not. (self%box%is_sheared() .or. any(self%box%surface%motion%kind == piston)) &
       .and. (self%run%threads > 1 .or. self%n_disks() >= many_disks)
   end function wants_domains
 

@@ -3,6 +3,7 @@
 module variable_help
   use errors, only: error_t, exit_usage, fail
   use input_groups, only: group_t, json_text
+  use old_names, only: present_names
   use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
     wall_groups, words_of
   use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
@@ -84,6 +85,10 @@ contains
       text = text//explanation(table(k))
     end do
     if (text /= "") return
+    if (present_names(trim(wanted)) /= "") then
+      call fail(error, exit_usage, "--explain "//shown(name)//": is called "//present_names(trim(wanted))//" now")
+      return
+    end if
     call fail(error, exit_usage, "--explain "//shown(name)//": unknown variable; " &
       //suggestion(wanted, [character(len=len(full)) :: table%name, full, group_names], group_names))
   end subroutine explain

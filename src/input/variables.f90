@@ -95,7 +95,7 @@ module variables
     variable_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
       choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
-      "how it moves; sawtooth: it stays and strikes; steady: one stroke; free: pushed", choices=motions), &
+      "how it moves; sawtooth: it stays and strikes; piston: pushed by disks and force", choices=motions), &
     variable_t("side", "amplitude", "real", 1, "required", "0.05", "how far it moves from its place", positive, &
       "length", goes_with="motion sine parabolic"), &
     variable_t("side", "period", "real", 1, "required", "1", "of the motion", positive, "time", &
@@ -103,15 +103,15 @@ module variables
     variable_t("side", "phase", "real", 1, "fallback", "0", &
       "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
     variable_t("side", "velocity", "real", 1, "required", "1", "inwards: with which it strikes (> 0), or moves (< 0: outwards)", &
-      unit="length/time", goes_with="motion sawtooth steady"), &
-    variable_t("side", "begin", "real", 1, "fallback", "0", "when it starts to move; before, it is at its place", &
-      not_negative, "time", goes_with="motion steady"), &
-    variable_t("side", "end", "real", 1, "required", "1", "when it stops; it stays where it is then", positive, "time", &
-      goes_with="motion steady"), &
-    variable_t("side", "mass", "real", 1, "required", "10", "of a side that disks push", positive, "mass", &
-      goes_with="motion free"), &
-    variable_t("side", "force", "real", 1, "required", "1", "that pushes it inwards", positive, "energy/length", &
-      goes_with="motion free")]
+      unit="length/time", goes_with="motion sawtooth constant_velocity"), &
+    variable_t("side", "start_time", "real", 1, "fallback", "0", "time at which it starts to move; before, it is at its place", &
+      not_negative, "time", goes_with="motion constant_velocity"), &
+    variable_t("side", "end_time", "real", 1, "required", "1", "time at which it stops; it stays where it is then", positive, &
+      "time", goes_with="motion constant_velocity"), &
+    variable_t("side", "mass", "real", 1, "required", "10", "mass of the piston", positive, "mass", &
+      goes_with="motion piston"), &
+    variable_t("side", "force", "real", 1, "required", "1", "constant force that pushes the piston inwards", positive, &
+      "energy/length", goes_with="motion piston")]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
     variable_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &

@@ -19,7 +19,7 @@ module checkpoint
   use record, only: checksum, counting, reading, record_t, writing
   use run_files, only: is_file, source_of, unfinished
   use settings, only: run_input_t
-  use side_motion, only: free
+  use side_motion, only: piston
   use simulation_state, only: simulation_t
   use system, only: last_problem, synchronize
   use texts, only: eol, growing_text_t, legible, line_at, lower_case, text_t, written
@@ -360,7 +360,7 @@ contains
     call record%exchange(sim%kicks)
     call record%exchange(sim%changes)
     call exchange_tally()
-    if (any(sim%box%surface%motion%kind == free)) then
+    if (any(sim%box%surface%motion%kind == piston)) then
       call record%exchange(sim%box%surface%motion%clock)
       call record%exchange(sim%box%surface%motion%at)
       call record%exchange(sim%box%surface%motion%v)

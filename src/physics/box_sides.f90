@@ -6,7 +6,7 @@ module box_sides
   use free_flight, only: flight, flight_velocity, time_to_line
   use kinds, only: int32, never, real64
   use partners, only: axis_of, n_sides, sense_of
-  use side_motion, only: free, side_motion_t
+  use side_motion, only: piston, side_motion_t
   implicit none
   private
   public :: bounds, keep_off_sides, next_side, side_time
@@ -55,7 +55,7 @@ contains
       if (motion%travels()) then
         since = disk%clock
         v = -sense*disk%v(axis)
-        if (motion%kind == free) then             ! what flies was not hit before both clocks
+        if (motion%kind == piston) then             ! what flies was not hit before both clocks
           since = max(since, motion%clock)
           after = since - disk%clock
           gap = gap + flight(0.0_real64, v, -sense*box%gravity(axis), after)

@@ -6,7 +6,7 @@ module wall_hits
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
   use disks, only: land, spin_column
   use partners, only: axis_of, is_side, sense_of
-  use side_motion, only: free
+  use side_motion, only: piston
   use random_stream, only: random_stream_t, thermal_walls
   use simulation_state, only: simulation_t
   use tally, only: dissipated, gain, heat, impulse, work
@@ -48,7 +48,7 @@ contains
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
-    if (sim%box%surface(1 - code)%motion%kind == free) call push(sim, i, code, normal, v, u, t)
+    if (sim%box%surface(1 - code)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
     if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
@@ -65,7 +65,7 @@ contains
     if (left >= -dot_product(before - strike, normal)) v = v - left*normal
   end subroutine settle
 
-  !> Lets a disk push a free side that it has hit as if it were of infinite mass. Both get the share of that impulse which
+  !> Lets a disk push a piston that it has hit as if it were of infinite mass. Both get the share of that impulse which
   !> their masses allow; for sums u becomes the mean of the velocities of the side, whose work the energy is.
   pure subroutine push(sim, i, code, normal, before, u, t)
     type(simulation_t), intent(inout) :: sim

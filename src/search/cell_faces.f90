@@ -10,7 +10,7 @@ module cell_faces
   use free_flight, only: flight, flight_velocity, slowest, time_to_line
   use partners, only: crossing, is_wall, n_sides, nothing, sense_of, side_crossed
   use shapes, only: spare
-  use side_motion, only: free
+  use side_motion, only: piston
   implicit none
   private
   public :: all_cells, cell_faces_t, patch_t
@@ -226,7 +226,7 @@ contains
     real(real64) :: reach(2, 2)
 
     reach = self%box%reach()
-    where (transpose(reshape(self%box%surface(:n_sides)%motion%kind == free, [2, 2]))) reach = never
+    where (transpose(reshape(self%box%surface(:n_sides)%motion%kind == piston, [2, 2]))) reach = never
     low = self%width*(cell - 1) - 0.5_real64*self%overlap - merge(reach(:, 1), 0.0_real64, cell == 1)
     high = self%width*cell + 0.5_real64*self%overlap + merge(reach(:, 2), 0.0_real64, cell == n)
   end subroutine rectangle

@@ -13,7 +13,7 @@ module input_fit
   use radii, only: drawn_radii
   use regular_places, only: spans
   use settings, only: settings_t, species_settings_t
-  use side_motion, only: free, steady
+  use side_motion, only: piston, constant_velocity
   use starting_disks, only: read_disks, resolution
   use texts, only: place_of, written
   use variables, only: most_disks, obstacle_groups
@@ -75,17 +75,17 @@ contains
     real(real64) :: low(2), high(2), last
     integer :: o(2), k, side, axis
 
-    if (any(box%surface(:n_sides)%motion%kind == free)) return
+    if (any(box%surface(:n_sides)%motion%kind == piston)) return
     o = range_of(groups, ["side"])
     do k = o(1), o(2)
       side = place_of(trim(groups(k)%instance), side_name)
       axis = (side + 1)/2
       associate (motion => box%surface(side)%motion)
-        if (motion%kind /= steady .or. motion%strike < 0) cycle
-        call bounds(box, motion%end, low, high)
+        if (motion%kind /= constant_velocity .or. motion%strike < 0) cycle
+        call bounds(box, motion%end_time, low, high)
         if (product(high - low) > disks) cycle
-        last = motion%end - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
-        call groups(k)%complain("end", "the side would crush the disks, which need at least their own area, "// &
+        last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
+        call groups(k)%complain("end_time", "the side would crush the disks, which need at least their own area, "// &
           written(disks)//"; possible: before "//written(last), problems)
       end associate
     end do

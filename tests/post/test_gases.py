@@ -457,7 +457,8 @@ def test_driven_runs_are_told_apart_by_all_but_their_seed(simulated):
 
 
 def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
-    text = """&side name = 'top' motion = 'steady' velocity = 0.02 begin = 1 end = 16 /
+    text = """&side name = 'top' motion = 'constant_velocity' velocity = 0.02
+    start_time = 1 end_time = 16 /
     &species count = 100 packing_fraction = 0.3 temperature = 1 / &stop time = 17 /
     &output observables_every_time = 1 /"""
     run = simulated(text)
@@ -465,13 +466,13 @@ def test_a_slow_stroke_is_drawn_beside_its_adiabat(simulated):
     assert law[0] == law[1] == kt[0] and law[-1] == law[-2] > 1.6 * kt[0]
     assert kt == pytest.approx(law, rel=0.05)
     for change in ("contact.restitution=0.9", "box.gravity=0,-1", "side.top.motion=still"):
-        words = ["velocity", "begin", "end"] if "still" in change else []
+        words = ["velocity", "start_time", "end_time"] if "still" in change else []
         assert temperature_law(simulated(text, change, *(f"side.top.{w}=" for w in words))) is None
 
 
 @pytest.mark.parametrize("across", ["wall", "periodic"])
 def test_a_side_that_disks_push_is_drawn_beside_its_mean_and_deviation(simulated, tmp_path, across):
-    text = f"""&box boundary = '{across}', 'wall' / &side name = 'top' motion = 'free' mass = 5
+    text = f"""&box boundary = '{across}', 'wall' / &side name = 'top' motion = 'piston' mass = 5
     force = 70 / &species count = 50 packing_fraction = 0.2 speed = 1 / &stop time = 300 /
     &output observables_every_time = 0.02 /"""
     runs = [simulated(text, f"run.seed={seed}", name=f"{seed}") for seed in (1, 2, 3)]
@@ -769,7 +770,7 @@ def test_fields_are_those_of_the_disks_in_each_cell(tmp_path):
     assert found["flow_x"] == pytest.approx(1) and found["flow_y"] == pytest.approx(2)
     assert 3 / 4 * found["temperature"] == pytest.approx([0, 2]) == found["stress_xx"] / 8
     assert found["stress_yy"] == pytest.approx(0) and found["heat_x"] == pytest.approx(0)
-    leaves = {"side/top": {"motion": "free"}}
+    leaves = {"side/top": {"motion": "piston"}}
     gone = written(tmp_path / "b.h5", position, velocity, parameters=leaves)
     with pytest.raises(RunError, match="leaves its place"):
         fields.fields([gone], None, (2, 1))

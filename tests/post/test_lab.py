@@ -271,7 +271,7 @@ def test_an_added_group_is_run_and_in_what_is_kept(address):
 def test_a_side_that_disks_push_is_where_the_engine_has_it(address):
     async def visit():
         async with film(address) as one:
-            names = {"motion": "'free'", "mass": "5", "force": "0.1"}
+            names = {"motion": "'piston'", "mass": "5", "force": "0.1"}
             free = {f"side.right.{name}": value for name, value in names.items()}
             await one.start(settings=free, added=[["side", "right"]], pace=1)
             places = []

@@ -398,12 +398,14 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     text = f"&run seed = {seed} /\n&box lower = -3, 2 upper = -1.8, 3.1 /\n" + FEW
     for name in rng.choice(SIDES, rng.integers(1, 4), replace=False):
         size, period, phase = rng.uniform((0.02, 0.3, 0), (0.1, 1, 1))
-        kind = rng.choice(["sine", "parabolic", "steady", "free"])
+        kind = rng.choice(["sine", "parabolic", "constant_velocity", "piston"])
         words = f"amplitude = {size} "
         words += f"period = {period} phase = {phase}"
-        if kind == "steady":
-            words = f"velocity = {(phase - 0.5) * size} begin = {period / 9} end = {period}"
-        if kind == "free":
+        if kind == "constant_velocity":
+            words = (
+                f"velocity = {(phase - 0.5) * size} start_time = {period / 9} end_time = {period}"
+            )
+        if kind == "piston":
             words = f"mass = {period} force = {30 * size}"
         text += f"&side name = '{name}' motion = '{kind}' {words} /\n"
     samples = ("frames", "observables")

@@ -37,7 +37,7 @@ def test_pairs_are_counted_in_the_box_of_the_moment(tmp_path, rng):
     """Where a side presses the disks together; nothing is known of frames with none far from it."""
     time, stroke = (
         np.arange(60.0),
-        {"motion": "steady", "velocity": 0.01, "begin": 0.0, "end": 50.0},
+        {"motion": "constant_velocity", "velocity": 0.01, "start_time": 0.0, "end_time": 50.0},
     )
     x = rng.uniform(size=(60, 1000, 2))
     x[..., 0] *= 1 - 0.01 * np.minimum(time, 50)[:, None]

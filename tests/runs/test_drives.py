@@ -264,7 +264,8 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
     """Between the packing at which they jam and 1, which is refused at once."""
     write_input(
         tmp_path,
-        """&side name = 'right' motion = 'steady' velocity = 0.5 end = 1 / &stop time = 3 /
+        """&side name = 'right' motion = 'constant_velocity' velocity = 0.5 end_time = 1 /
+        &stop time = 3 /
         &species count = 40 packing_fraction = 0.45 temperature = 1 /""",
     )
     run = ricochet("gas.nml", "-o", "gas.h5")
@@ -274,7 +275,8 @@ def test_a_side_that_crushes_disks_ends_the_run(ricochet, tmp_path):
 def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
     """A disk hits it before the stroke, and in flight; the side takes all its speed, and leaves."""
     found = observed(
-        """&side name = 'right' motion = 'steady' velocity = -0.5 begin = 1 end = 4 /
+        """&side name = 'right' motion = 'constant_velocity' velocity = -0.5
+        start_time = 1 end_time = 4 /
         &species radius = 0.1 position = 0.5, 0.5 velocity = 1, 0 / &stop time = 12 /
         &output frames_every_events = 1 observables_every_time = 2 /"""
     )
@@ -289,8 +291,8 @@ def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
     cells, pairs = (
         observed(
             f"""&run search = '{search}' /
-            &side name = 'right' motion = 'free' mass = 20 force = 1 /
-            &side name = 'left' motion = 'steady' velocity = 0.01 end = 50 /
+            &side name = 'right' motion = 'piston' mass = 20 force = 1 /
+            &side name = 'left' motion = 'constant_velocity' velocity = 0.01 end_time = 50 /
             &species count = 40 radius = 0.03 speed = 1 / &stop time = 50 /
             &species count = 2 radius = 0.1 speed = 1 / &output frames_every_time = 1 /"""
         )["/particles/disks/position/value"]
@@ -302,7 +304,7 @@ def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
 def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
     """Its own, that of the force, and what is lost, added to those of the disks."""
     found = observed(
-        """&box upper = 2, 1 / &side name = 'right' motion = 'free' mass = 20 force = 300 /
+        """&box upper = 2, 1 / &side name = 'right' motion = 'piston' mass = 20 force = 300 /
         &species count = 200 packing_fraction = 0.2 temperature = 1 / &stop time = 4 /
         &contact restitution = 0.99 wall_restitution = 1 /
         &output observables_every_time = 0.02 /"""
@@ -352,7 +354,7 @@ def test_disks_rest_on_what_has_restitution_0(observed, on, lossy):
 
 FLOOR = "gravity = 0, -1 / &side name = 'bottom' period = 1 motion = '{}"
 PRESSED = """lower = -1.5, 10 upper = 1.5, 11 /
-&side name = 'left' motion = 'free' mass = {} force = {} restitution = 0.6"""
+&side name = 'left' motion = 'piston' mass = {} force = {} restitution = 0.6"""
 
 
 @pytest.mark.parametrize(

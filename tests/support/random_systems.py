@@ -151,17 +151,23 @@ class Draw:
             words = self.law()
             if "temperature" not in words and "speed" not in words and self.chance(0.6):
                 self.worked = True
-                kinds = ["steady", "parabolic", "sawtooth", "sine", *["free"] * (not self.steps)]
+                kinds = [
+                    "constant_velocity",
+                    "parabolic",
+                    "sawtooth",
+                    "sine",
+                    *["piston"] * (not self.steps),
+                ]
                 kind = rng.choice(kinds)
                 words += f" motion = '{kind}'"
                 if kind == "sawtooth":
                     words += f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
-                elif kind == "steady":
+                elif kind == "constant_velocity":
                     speed = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-2, 0.5)
                     begin = rng.choice([0, rng.random()]) * min(self.edges) / self.speed
                     end = begin + rng.uniform(0, 0.1) * min(self.edges) / abs(speed)
-                    words += f" velocity = {speed!r} begin = {begin!r} end = {end!r}"
-                elif kind == "free":
+                    words += f" velocity = {speed!r} start_time = {begin!r} end_time = {end!r}"
+                elif kind == "piston":
                     mass = 10.0 ** rng.uniform(-1, 3)
                     force = mass * self.speed**2 / min(self.edges)
                     words += f" mass = {mass!r} force = {force * 10.0 ** rng.uniform(-2, 1)!r}"

@@ -83,13 +83,13 @@ def adiabats(run: Run) -> list[float]:
     return list((kt * area / (kt[0] * area[0]))[1:])
 
 
-# --- a dense gas that a side presses together, to half its width: `piston.nml`, but slowly ---
+# --- a dense gas that a side presses together, to half its width: `compression.nml`, but slowly ---
 
 SLOW, PRESSED_DISKS = 0.0125, 500
 PRESSED = ensemble(
     16,
     box={"upper": (2, 1)},
-    side={"name": "right", "motion": "steady", "velocity": SLOW, "end": 80.0},
+    side={"name": "right", "motion": "constant_velocity", "velocity": SLOW, "end_time": 80.0},
     species={"name": "gas", "count": PRESSED_DISKS, "packing_fraction": 0.2, "temperature": 1.0,
              "exact_temperature": 1.0},
     stop={"time": 80},
@@ -117,7 +117,7 @@ FORCE, PUSHING, WIDE = 130.0, 100, 1.5
 PUSHED = ensemble(
     4,
     box={"upper": (WIDE, 1)},
-    side={"name": "right", "motion": "free", "mass": 20.0, "force": FORCE},
+    side={"name": "right", "motion": "piston", "mass": 20.0, "force": FORCE},
     species={"name": "gas", "count": PUSHING, "packing_fraction": 0.3, "speed": sqrt(2)},
     stop={"time": 1000},
     output={"observables_every_time": 0.1},
@@ -126,7 +126,7 @@ ROD = 0.05  # radius of disks of masses 1, 2, 3 on a line
 RODS = Member(
     namelist(
         box={"upper": (2, 1)},
-        side={"name": "right", "motion": "free", "mass": 1.5, "force": 1.0},
+        side={"name": "right", "motion": "piston", "mass": 1.5, "force": 1.0},
         species=[
             {"name": f"m{k}", "mass": float(k), "radius": ROD, "position": (0.4 * k, 0.5),
              "velocity": ((-1.0) ** k, 0.0)} for k in (1, 2, 3)

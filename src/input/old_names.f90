@@ -1,0 +1,51 @@
+!> Names of earlier versions, and the names that took their places. An input that uses an old name is answered with the new one.
+module old_names
+  use variables, only: name_length
+  implicit none
+  private
+  public :: new_name, present_names
+
+  type :: old_name_t
+    character(len=8) :: group
+    character(len=name_length) :: name        !! of the variable; of a choice, the variable's present name
+    character(len=20) :: choice               !! word of a text variable; blank: the variable itself has another name
+    character(len=name_length) :: now
+  end type old_name_t
+
+  type(old_name_t), parameter :: list(*) = [ &
+    old_name_t("side", "begin", "", "start_time"), &
+    old_name_t("side", "end", "", "end_time"), &
+    old_name_t("side", "motion", "steady", "constant_velocity"), &
+    old_name_t("side", "motion", "free", "piston")]
+
+contains
+
+  !> The present name of a variable, or of one of its choices, that is known by an old one; else empty.
+  pure function new_name(group, name, choice) result(now)
+    character(len=*), intent(in) :: group, name
+    character(len=*), intent(in) :: choice     !! blank: of the variable
+    character(len=:), allocatable :: now
+    integer :: k
+
+    now = ""
+    do k = 1, size(list)
+      if (list(k)%group == group .and. list(k)%name == name .and. list(k)%choice == choice) now = trim(list(k)%now)
+    end do
+  end function new_name
+
+  !> The variables that have taken the place of an old one, which is known with or without its group; else empty.
+  pure function present_names(name) result(names)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: names
+    integer :: k
+
+    names = ""
+    do k = 1, size(list)
+      if (list(k)%choice /= "") cycle
+      if (all([character(len=name_length + 9) :: list(k)%name, trim(list(k)%group)//"."//list(k)%name] /= name)) cycle
+      if (names /= "") names = names//" or "
+      names = names//trim(list(k)%group)//"."//trim(list(k)%now)
+    end do
+  end function present_names
+
+end module old_names
