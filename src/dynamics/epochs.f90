@@ -4,6 +4,7 @@ module epochs
   use box_sides, only: keep_off_sides
   use disks, only: columns
   use kinds, only: int32, int64, never, pi, real64
+  use partners, only: n_sides
   use renumbering, only: renumber
   use shapes, only: magnitude
   use side_motion, only: constant_velocity
@@ -110,8 +111,10 @@ contains
       sim%epoch = sim%epoch + shift
       sim%last_advance = sim%last_advance - shift
       sim%box%epoch = sim%epoch
-      sim%box%surface%motion%clock = sim%box%surface%motion%clock - shift
-      if (.not. any(sim%box%surface%motion%travels())) return
+      associate (motion => sim%box%surface(:n_sides)%motion)    ! only sides move
+        motion%clock = motion%clock - shift
+        if (.not. any(motion%travels())) return
+      end associate
       do i = 1, sim%n_disks()
         call keep_off_sides(sim%box, sim%disk(i), sim%now)
       end do
@@ -133,7 +136,8 @@ contains
     logical :: yes
 
     associate (box => sim%box)
-      yes = any(box%surface%motion%kind == constant_velocity) .and. .not. (sim%drive%is_on() .or. box%highest_temperature() > 0)
+      yes = any(box%surface(:n_sides)%motion%kind == constant_velocity) .and. .not. (sim%drive%is_on() &
+        .or. box%highest_temperature() > 0)
       if (yes) yes = sim%kinetic_energy() > crushing*(sim%start_energy &
         + sum(sim%masses())*(box%highest_speed()**2 + sum(abs(box%gravity)*box%edges())))
     end associate

@@ -7,12 +7,12 @@ module box_geometry
   use images, only: images_t, sliding_images
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, sense_of, side_name
-  use shapes, only: shape_t
+  use shapes, only: shape_t, spare
   use side_motion, only: side_motion_t, still
   implicit none
   private
   public :: box_t, surface_t
-  public :: next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
+  public :: meet_image, next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
 
   !> What a disk bounces off: a side of the box, or an obstacle.
   type :: surface_t
@@ -39,8 +39,10 @@ module box_geometry
     procedure :: is_sheared
     procedure :: slip
     procedure :: stream
+    procedure :: without_obstacles
     procedure :: add_obstacles
     procedure :: has_obstacles
+    procedure :: n_obstacles
     procedure :: is_wall
     procedure :: has_lossy_walls
     procedure :: has_rough_walls
@@ -66,6 +68,24 @@ contains
       box%surface(k)%name = trim(side_name(k))
     end do
   end function new_box
+
+  !> The same box without its obstacles, of which there may be many.
+  pure function without_obstacles(self) result(box)
+    class(box_t), intent(in) :: self
+    type(box_t) :: box
+    integer :: k
+
+    box%lower = self%lower
+    box%upper = self%upper
+    box%periodic = self%periodic
+    box%gravity = self%gravity
+    box%shear_rate = self%shear_rate
+    box%epoch = self%epoch
+    allocate (box%surface(n_sides))
+    do k = 1, n_sides
+      box%surface(k) = self%surface(k)
+    end do
+  end function without_obstacles
 
   !> Makes room for n obstacles more.
   subroutine add_obstacles(self, n)
@@ -149,6 +169,14 @@ contains
     yes = size(self%surface) > n_sides
   end function has_obstacles
 
+  !> The number of obstacles.
+  pure function n_obstacles(self) result(n)
+    class(box_t), intent(in) :: self
+    integer :: n
+
+    n = size(self%surface) - n_sides
+  end function n_obstacles
+
   !> Whether disks bounce off surface k.
   pure function is_wall(self, k) result(yes)
     class(box_t), intent(in) :: self
@@ -211,8 +239,8 @@ contains
   end function reach
 
   !> The earlier of a known event and the contacts with the obstacles listed. A disk stays in the box until it
-  !> passes a periodic side, so the images of an obstacle one period away are enough; what encloses the disks has none.
-  !> What is met from outside is convex: a disk that leaves it on a straight line does not return, whatever rounding says.
+  !> passes a periodic side, so the images of an obstacle one period away are enough; an obstacle that encloses the disks
+  !> has none.
   pure subroutine next_obstacle(box, disk, last, list, t, code)
     type(box_t), intent(in) :: box
     type(disk_t), intent(in) :: disk
@@ -221,28 +249,64 @@ contains
     real(real64), intent(inout) :: t
     integer(int32), intent(inout) :: code
     type(images_t) :: images
-    real(real64) :: t_m, d(2), left(2)
     integer :: k, image
 
     do k = 1, size(list)
-      associate (shape => box%surface(1 - list(k))%shape)
-        images = merge(images_t(), box%images(), shape%encloses)
-        t_m = never
-        left = never                            ! the image that it leaves
-        if (last == list(k) .and. .not. (shape%encloses .or. box%falling())) &
-          left = shape%from_nearest(disk%x, images, heading=disk%v)
-        do image = 1, images%count()
-          d = disk%x - (shape%middle + images%shift(images%around(image)))
-          if (all(abs(d - left) < 0.5_real64*box%edges())) cycle
-          t_m = min(t_m, disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius))
-        end do
-      end associate
-      if (t_m < t) then
-        t = t_m
-        code = list(k)
-      end if
+      images = merge(images_t(), box%images(), box%surface(1 - list(k))%shape%encloses)
+      do image = 1, images%count()
+        call meet_image(box, disk, last, list(k), images%shift(images%around(image)), t, code)
+      end do
     end do
   end subroutine next_obstacle
+
+  !> The earlier of a known event and the contact with one image of an obstacle. An obstacle that disks meet from outside is
+  !> convex: a disk that leaves it on a straight line does not return, whatever rounding says.
+  pure subroutine meet_image(box, disk, last, obstacle, shift, t, code)
+    type(box_t), intent(in) :: box
+    type(disk_t), intent(in) :: disk
+    integer(int32), intent(in) :: last          !! code of the obstacle that it left last, if nothing has happened since
+    integer(int32), intent(in) :: obstacle      !! its code
+    real(real64), intent(in) :: shift(2)        !! from the obstacle to its image [length]
+    real(real64), intent(inout) :: t
+    integer(int32), intent(inout) :: code
+    real(real64) :: t_image, d(2)
+
+    associate (shape => box%surface(1 - obstacle)%shape)
+      d = disk%x - (shape%middle + shift)
+      if (last == obstacle .and. .not. (shape%encloses .or. box%falling())) then
+        if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
+      end if
+      if (box%falling()) then
+        if (passes_by(d, disk%v, box%gravity, t - disk%clock, shape%extent + disk%radius)) return
+      end if
+      t_image = disk%clock + shape%contact_time(d, disk%v, box%gravity, disk%radius)
+    end associate
+    if (.not. t_image < t) return
+    t = t_image
+    code = obstacle
+  end subroutine meet_image
+
+  !> Whether a point that falls for a while remains outside of a rectangle around the origin; no, if in doubt. The rectangle
+  !> around the path is a rough bound, but takes few operations; the roots of a quartic are many.
+  pure function passes_by(d, v, g, s, half) result(yes)
+    real(real64), intent(in) :: d(2)            !! [length]
+    real(real64), intent(in) :: v(2)            !! [length/time]
+    real(real64), intent(in) :: g(2)            !! [length/time**2]
+    real(real64), intent(in) :: s               !! [time]
+    real(real64), intent(in) :: half(2)         !! half its sides [length]
+    logical :: yes
+    real(real64) :: low, high, slack
+    integer :: axis
+
+    yes = .false.
+    if (s > sqrt(never)) return                 ! the path may be too long for a number
+    do axis = 1, 2
+      low = s*min(v(axis), v(axis) + g(axis)*s, 0.0_real64)
+      high = s*max(v(axis), v(axis) + g(axis)*s, 0.0_real64)
+      slack = spare*(abs(d(axis)) + max(-low, high))
+      yes = yes .or. d(axis) + high < -(half(axis) + slack) .or. d(axis) + low > half(axis) + slack
+    end do
+  end function passes_by
 
   !> Distance between surface k, an obstacle, and the rim of a disk at x; negative if they overlap.
   pure function obstacle_gap(box, k, x, radius) result(length)
@@ -293,14 +357,15 @@ contains
     integer(int32), intent(in) :: code
     real(real64), intent(in) :: x(2)            !! [length]
     real(real64), intent(in) :: v(2)            !! [length/time]
-    real(real64) :: normal(2)
+    real(real64) :: normal(2), d(2)
 
     if (is_side(code)) then
       normal = 0
       normal(axis_of(code)) = -sense_of(code)
     else
       associate (shape => box%surface(1 - code)%shape)
-        normal = shape%normal(shape%from_nearest(x, box%images(), heading=-v))
+        d = shape%from_nearest(x, box%images(), heading=-v)
+        normal = shape%normal(d)
       end associate
     end if
   end function wall_normal

@@ -31,10 +31,12 @@ module cell_contents
   contains
     procedure :: number
     procedure :: empty
+    procedure :: clear
     procedure :: mark
     procedure :: insert
     procedure :: remove
     procedure :: chain
+    procedure :: is_crowded_around
     procedure :: read_ahead
     procedure, private :: count_crowd
   end type cell_contents_t
@@ -65,6 +67,26 @@ contains
       self%cell(c)%slot = 0
     end do
   end subroutine empty
+
+  !> Takes all disks out of cell c, and counts them.
+  pure subroutine clear(self, c, n)
+    class(cell_contents_t), intent(inout) :: self
+    integer(int32), intent(in) :: c
+    integer(int32), intent(inout) :: n             !! number of disks taken out of cells so far
+    integer(int32) :: link, in_slots
+
+    in_slots = self%cell(c)%in_slots()
+    n = n + in_slots
+    link = self%chain(c)
+    if (link > 0) then
+      call self%count_crowd(c, -1)
+      do while (self%next(link) > 0)
+        n = n + 1
+        link = self%next(link)
+      end do
+    end if
+    self%cell(c)%slot(count_slot) = self%cell(c)%slot(count_slot) - in_slots
+  end subroutine clear
 
   !> Marks cell c, or takes its mark away.
   pure subroutine mark(self, c, yes)
@@ -155,6 +177,15 @@ contains
 
     yes = self%slot(count_slot) >= crowd
   end function needs_care
+
+  !> Whether a cell is crowded among the nine around c.
+  pure function is_crowded_around(self, c) result(yes)
+    class(cell_contents_t), intent(in) :: self
+    integer(int32), intent(in) :: c
+    logical :: yes
+
+    yes = iand(self%cell(c)%slot(count_slot), marked - crowd) > 0
+  end function is_crowded_around
 
   !> The first disk in the chain of cell c, which is the last one in its slots; 0 if the cell is not crowded.
   pure function chain(self, c) result(i)

@@ -36,6 +36,7 @@ module cell_faces
     procedure :: at_seam
     procedure :: covers
     procedure :: step
+    procedure :: equals
   end type patch_t
 
   !> A face of a column or row of cells, or the side of the box there: lines that disks reach.
@@ -164,6 +165,17 @@ contains
     end associate
   end subroutine step
 
+  !> Whether two patches are made of the same cells for the same disks.
+  pure function equals(self, other) result(yes)
+    class(patch_t), intent(in) :: self
+    type(patch_t), intent(in) :: other
+    logical :: yes
+
+    yes = all(self%whole == other%whole) .and. all(self%first == other%first) .and. all(self%n == other%n) &
+      .and. abs(self%small - other%small) <= 0 .and. abs(self%reach - other%reach) <= 0 &
+      .and. all(abs(self%lower - other%lower) <= 0) .and. all(abs(self%width - other%width) <= 0)
+  end function equals
+
   !> Finds the faces of the cells of a patch.
   subroutine set(self, box, patch)
     class(cell_faces_t), intent(out) :: self
@@ -172,9 +184,9 @@ contains
 
     self%width = patch%width
     self%overlap = max(self%width - patch%reach, 0.0_real64)
-    self%moving = any(box%surface%motion%travels())
+    self%moving = any(box%surface(:n_sides)%motion%travels())
     self%falling = box%falling() .or. self%moving
-    self%box = box
+    self%box = box%without_obstacles()
     call cut(1, self%column)
     call cut(2, self%row)
     call find_struck(1, self%column)

@@ -3,7 +3,7 @@
 !> overlap (see `cell_faces`).
 module cell_grid
   use kinds, only: int16, int32, never, real64
-  use box_geometry, only: next_obstacle
+  use box_geometry, only: meet_image, next_obstacle
   use box_sides, only: next_side
   use cell_contents, only: cell_contents_t, gather
   use cell_faces, only: all_cells, cell_faces_t, patch_t
@@ -35,6 +35,7 @@ module cell_grid
     type(cell_contents_t), public :: cells                 !! numbered row by row, with a ring of empty ones around
     type(reach_lists_t) :: reach                   !! obstacles, and disks much larger than those that the cells are made for
     type(images_t) :: images                       !! of the box, in this epoch
+    integer(int32) :: n_listed = 0                 !! disks in cells, since they were filled
   contains
     procedure :: build
     procedure :: predict
@@ -48,27 +49,34 @@ module cell_grid
 
 contains
 
-  !> Chooses the cells, sorts the disks into them and finds what reaches into each.
+  !> Chooses the cells, sorts the disks into them and finds what reaches into each. Where there are obstacles and the cells
+  !> are the same as before, only the disks are listed again: a few disks among many obstacles begin epochs often.
   subroutine build(self, sim)
     class(cell_grid_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
+    type(place_t), allocatable :: rims(:)
+    logical :: kept                                ! obstacles remain listed
     integer(int32) :: i
-    integer(int16) :: cell(2), ix, iy
+    integer(int16) :: ix, iy
 
     if (.not. self%is_part) self%patch = whole_box(sim, self%undivided)
+    self%images = sim%images()
+    call self%faces%set(sim%box, self%patch)
+    self%roomy = any(self%faces%width > spacious*self%patch%reach)
+    kept = sim%box%has_obstacles() .and. self%reach%serves(self%patch, self%faces)
+    if (kept) call clear_cells(self, sim, kept)
     associate (patch => self%patch)
-      self%images = sim%images()
-      call self%faces%set(sim%box, patch)
-      self%roomy = any(self%faces%width > spacious*patch%reach)
-      call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
-      do i = 1, sim%n_disks()
-        if (sim%disk(i)%radius > patch%small) then
-          sim%tag(i)%cell = 1                      ! one that is marked in any case
-        else if (sim%tag(i)%id > 0) then
-          cell = int(patch%cell_at(sim%position(i)), int16)
-          call self%insert(sim%tag(i), i, cell)
-        end if
-      end do
+      if (.not. kept) call self%cells%empty(patch%n(1) + 2, patch%n(2) + 2, sim%n_disks())
+      call fill_cells(self, sim)
+      if (kept) then
+        rims = self%reach%rims()
+        call self%reach%renew_big(sim, patch, self%faces)
+        rims = [rims, self%reach%rims()]
+        do i = 1, size(rims, kind=int32)
+          call mark(self, int(rims(i)%cell, int16))
+        end do
+        return
+      end if
       call self%reach%renew(sim, patch, self%faces)
       if (.not. (any(sim%box%periodic) .or. allocated(self%reach%first) .or. self%is_part)) return
       do iy = 0, int(patch%n(2) + 1, int16)
@@ -79,7 +87,46 @@ contains
     end associate
   end subroutine build
 
-  !> The cells that suit all disks of a simulation.
+  !> Takes all disks out of the cells where their tags say that they are. `all_found`: no disk remains in any cell.
+  subroutine clear_cells(self, sim, all_found)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    logical, intent(out) :: all_found
+    integer(int32) :: i, n
+
+    all_found = .false.
+    if (sim%n_disks() /= size(self%cells%next)) return
+    n = 0
+    do i = 1, sim%n_disks()
+      if (any(sim%tag(i)%cell < 1 .or. sim%tag(i)%cell > self%patch%n)) cycle
+      call self%cells%clear(self%cells%number(sim%tag(i)%cell), n)
+    end do
+    all_found = n == self%n_listed
+  end subroutine clear_cells
+
+  !> Sorts the disks into the cells.
+  subroutine fill_cells(self, sim)
+    class(cell_grid_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    integer(int32) :: i
+    integer(int16) :: cell(2)
+
+    self%n_listed = 0
+    associate (patch => self%patch)
+      do i = 1, sim%n_disks()
+        if (sim%disk(i)%radius > patch%small) then
+          sim%tag(i)%cell = 1                      ! one that is marked in any case
+        else if (sim%tag(i)%id > 0) then
+          cell = int(patch%cell_at(sim%position(i)), int16)
+          call self%insert(sim%tag(i), i, cell)
+          self%n_listed = self%n_listed + 1
+        end if
+      end do
+    end associate
+  end subroutine fill_cells
+
+  !> The cells that suit all disks of a simulation, and its obstacles: each counts as much as a disk, as a disk has to be
+  !> tested against those that reach into its cell.
   pure function whole_box(sim, undivided) result(patch)
     type(simulation_t), intent(in) :: sim
     logical, intent(in) :: undivided
@@ -88,7 +135,7 @@ contains
 
     small = merge(maxval(sim%disk%radius), largest_small_radius(sim%disk), undivided .or. sim%box%is_sheared())
     reach = 2*small*(1 + spare)
-    width = max(sqrt(disks_per_cell*product(sim%box%edges())/sim%n_disks()), reach)
+    width = max(sqrt(disks_per_cell*product(sim%box%edges())/(sim%n_disks() + sim%box%n_obstacles())), reach)
     if (undivided) width = never
     patch = all_cells(sim%box, int(min(max(sim%box%edges()/width, 1.0_real64), 32000.0_real64), int32), reach)
     patch%small = small
@@ -340,7 +387,7 @@ contains
         else
           call gather(self%cells%cell, near%cell, self%cells%stride, i, near%list, near%n)
           call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, merge(0, no_gravity, self%faces%falling))
-          call scan_chains_around(self%cells, sim, near)
+          if (self%cells%is_crowded_around(near%cell)) call scan_chains_around(self%cells, sim, near)
         end if
       end associate
     end subroutine find_event_of_small
@@ -349,6 +396,7 @@ contains
     subroutine scan_reach(first)
       integer(int32), intent(in) :: first            !! entry in the list of the cell
       integer(int32) :: e
+      real(real64) :: number(2), shift(2)            ! of the image of an obstacle; to it [length]
 
       e = first
       do while (e > 0)
@@ -356,7 +404,9 @@ contains
           if (entry%code > 0) then
             call scan_one(sim, entry%code, self%images%image(real(entry%image, real64)), near)
           else
-            call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [entry%code], near%time, near%partner)
+            number = entry%image
+            shift = self%images%shift(number)
+            call meet_image(sim%box, sim%disk(i), sim%tag(i)%met, entry%code, shift, near%time, near%partner)
           end if
           e = entry%next
         end associate

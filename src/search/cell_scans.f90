@@ -42,7 +42,7 @@ contains
       crowded = max(crowded, cells%chain(c(k)))
     end do
     near%n = int(n, int32)
-    call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
+    if (n > 0) call earliest_contact(sim%disk, sim%tag, near, sim%now, sim%box%gravity, 0, image)
     if (crowded == 0) return
     do k = 1, size(c, kind=int32)
       call scan_chain(cells, sim, c(k), near, image)

@@ -42,8 +42,13 @@ module reach_lists
     integer(int32), allocatable :: first(:, :)   !! (columns,rows) first entry of a cell; 0: none. Not there if nothing reaches
     type(entry_t), allocatable :: entry(:)
     integer(int32), private :: vacant = 0        !! first of the entries not in use
+    type(patch_t), private :: patch              !! the cells for which obstacles are listed
+    real(real64), private :: span(2, 2) = 0.0_real64     !! of these cells together [length]
   contains
+    procedure :: serves
     procedure :: renew
+    procedure :: renew_big
+    procedure :: rims
     procedure :: has_any
     procedure :: number_of
     procedure :: follow
@@ -66,30 +71,85 @@ contains
     end do
   end function largest_small_radius
 
+  !> Whether obstacles are listed, for these cells.
+  pure function serves(self, patch, faces) result(yes)
+    class(reach_lists_t), intent(in) :: self
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
+    logical :: yes
+
+    yes = allocated(self%entry)
+    if (yes) yes = self%patch%equals(patch) .and. all(abs(span_of(patch, faces) - self%span) <= 0)
+  end function serves
+
+  !> The lower left and upper right corner of all cells.
+  pure function span_of(patch, faces) result(span)
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
+    real(real64) :: span(2, 2), other(2)           !! [length]
+
+    call faces%rectangle([1, 1], patch%whole, span(:, 1), other)
+    call faces%rectangle(patch%whole, patch%whole, other, span(:, 2))
+  end function span_of
+
   !> Lists the obstacles, and the disks bigger than those that the cells are made for.
   subroutine renew(self, sim, patch, faces)
     class(reach_lists_t), intent(out) :: self
     type(simulation_t), intent(in) :: sim
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
+    type(place_t), allocatable :: places(:)
+    integer(int32) :: k
+
+    if (sim%box%has_obstacles() .or. any(sim%disk%radius > patch%small)) then
+      self%margin = 0.5_real64*minval(faces%width)
+      allocate (self%first(patch%n(1), patch%n(2)), source=0_int32)
+      allocate (self%entry(0))
+      self%patch = patch
+      self%span = span_of(patch, faces)
+    end if
+    do k = n_sides + 1, size(sim%box%surface, kind=int32)
+      call find_places(sim%box%surface(k)%shape, 0.0_real64, patch, faces, places)
+      call enter(self, 1 - k, places)
+    end do
+    call self%renew_big(sim, patch, faces)
+  end subroutine renew
+
+  !> Lists the big disks anew, whose numbers may have changed.
+  subroutine renew_big(self, sim, patch, faces)
+    class(reach_lists_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: sim
+    type(patch_t), intent(in) :: patch
+    type(cell_faces_t), intent(in) :: faces
     integer(int32) :: i, k
 
+    if (allocated(self%big)) then
+      do k = 1, size(self%big, kind=int32)
+        call leave(self, self%big(k)%disk, self%big(k)%rim)
+      end do
+      deallocate (self%big)
+    end if
     associate (disks => pack([(i, i=1, sim%n_disks())], sim%disk%radius > patch%small))
       allocate (self%big(size(disks)))
       self%big%disk = disks
     end associate
-    if (.not. sim%box%has_obstacles() .and. size(self%big) == 0) return
-    self%margin = 0.5_real64*minval(faces%width)
-    allocate (self%first(patch%n(1), patch%n(2)), source=0_int32)
-    allocate (self%entry(0))
-    do k = n_sides + 1, size(sim%box%surface, kind=int32)
-      call enter(self, 1 - k, in_reach(sim%box%surface(k)%shape, 0.0_real64, patch, faces))
-    end do
     do k = 1, size(self%big, kind=int32)
       allocate (self%big(k)%rim(0))
       call self%follow(sim, k, patch, faces)
     end do
-  end subroutine renew
+  end subroutine renew_big
+
+  !> The cells in which small disks may touch big ones.
+  pure function rims(self) result(places)
+    class(reach_lists_t), intent(in) :: self
+    type(place_t), allocatable :: places(:)
+    integer :: k
+
+    allocate (places(0))
+    do k = 1, size(self%big)
+      places = [places, self%big(k)%rim]
+    end do
+  end function rims
 
   !> Whether anything reaches into a cell.
   pure function has_any(self, cell) result(yes)
@@ -123,20 +183,20 @@ contains
     associate (big => self%big(k))
       call leave(self, big%disk, big%rim)
       big%centre = sim%position(big%disk)
-      big%rim = in_reach(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, patch, faces)
+      call find_places(new_circle(big%centre, sim%disk(big%disk)%radius, .false.), self%margin, patch, faces, big%rim)
       call enter(self, big%disk, big%rim)
     end associate
   end subroutine follow
 
-  !> The cells in which a small disk can be that touches an outline, wherever it has moved within a margin.
-  pure function in_reach(shape, margin, patch, faces) result(places)
+  !> Finds the cells in which a small disk can be that touches an outline, wherever it has moved within a margin.
+  subroutine find_places(shape, margin, patch, faces, places)
     class(shape_t), intent(in) :: shape
     real(real64), intent(in) :: margin             !! [length]
     type(patch_t), intent(in) :: patch
     type(cell_faces_t), intent(in) :: faces
-    type(place_t), allocatable :: places(:)
-    real(real64) :: middle(2), room(2), corner(2, 2), half(2)
-    integer(int32) :: low(2), high(2), cell(2), ix, iy, n
+    type(place_t), allocatable, intent(out) :: places(:)
+    real(real64) :: middle(2), room(2)
+    integer(int32) :: low(2), high(2), n
 
     middle = shape%middle - patch%lower
     room = (0.5_real64*(faces%width + faces%overlap) + shape%extent + patch%small + margin)*(1 + spare)
@@ -148,23 +208,41 @@ contains
       low = min(max(low, 1), patch%whole)
       high = min(max(high, 1), patch%whole)
     end where
-    allocate (places(product(max(high - low + 1, 0))))
+    allocate (places(32))
     n = 0
-    do iy = low(2), high(2)
-      do ix = low(1), high(1)
-        cell = modulo([ix, iy] - patch%first, patch%whole) + 1
-        if (any(cell > patch%n)) cycle
-        call faces%rectangle([ix, iy], patch%whole, corner(:, 1), corner(:, 2))
-        half = 0.5_real64*(corner(:, 2) - corner(:, 1))*(1 + spare) + margin
-        associate (d => 0.5_real64*(corner(:, 1) + corner(:, 2)) - middle)
-          if (.not. shape%reaches(d, half, patch%small) .or. shape%covers(d, half, 0.0_real64)) cycle
-        end associate
-        n = n + 1
-        places(n) = place_t(cell, -floor(real([ix, iy] - 1, real64)/patch%whole))
-      end do
-    end do
+    if (all(low <= high)) call search_block(low, high)
     places = places(:n)
-  end function in_reach
+
+  contains
+
+    !> Finds the cells in a block of them, which is halved until the outline does not pass through it, or it is one cell.
+    recursive subroutine search_block(low, high)
+      integer(int32), intent(in) :: low(2), high(2)  !! first and last column and row
+      real(real64) :: lower(2), upper(2), beyond(2), half(2), d(2)
+      integer(int32) :: cell(2), last(2), first(2), axis
+
+      call faces%rectangle(low, patch%whole, lower, beyond)
+      call faces%rectangle(high, patch%whole, beyond, upper)
+      half = 0.5_real64*(upper - lower)*(1 + spare) + margin
+      d = 0.5_real64*(lower + upper) - middle
+      if (.not. shape%reaches(d, half, patch%small) .or. shape%covers(d, half, 0.0_real64)) return
+      if (any(high > low)) then
+        axis = merge(1, 2, high(1) - low(1) >= high(2) - low(2))
+        last = high
+        last(axis) = low(axis) + (high(axis) - low(axis))/2
+        first = low
+        first(axis) = last(axis) + 1
+        call search_block(low, last)
+        call search_block(first, high)
+        return
+      end if
+      cell = modulo(low - patch%first, patch%whole) + 1
+      if (any(cell > patch%n)) return
+      if (n == size(places)) places = [places, places]
+      n = n + 1
+      places(n) = place_t(cell, -floor(real(low - 1, real64)/patch%whole))
+    end subroutine search_block
+  end subroutine find_places
 
   !> Enters something into the lists of some cells, behind what is there: obstacles come first, in their order.
   pure subroutine enter(self, code, places)
