@@ -36,17 +36,14 @@ contains
     class(random_stream_t), intent(inout) :: self
     integer(int64), intent(in) :: number        !! the user's seed; any value
     integer, intent(in) :: key(:)               !! the purpose of the stream; may be empty
-    integer(int64) :: state, word
+    integer(int64) :: state
     integer :: k
 
     state = number
     do k = 1, size(key)
-      call draw_seed(state, word)
-      state = ieor(word, int(key(k), int64))
+      call add_key(state, key(k))
     end do
-    do k = 1, size(self%word)
-      call draw_seed(state, self%word(k))
-    end do
+    call fill(self, state)
   end subroutine seed
 
   !> Starts the stream of one draw in a run: whoever asks, in whatever order, gets the same numbers.
@@ -57,8 +54,36 @@ contains
     integer(int32), intent(in) :: id            !! of the disk
     integer(int64), intent(in) :: count         !! of draws before, or of what calls for them
 
-    call self%seed(number, [purpose, int(id), int(ibits(count, 0, 31)), int(ibits(count, 31, 31))])
+    integer(int64) :: state
+
+    state = number
+    call add_key(state, purpose)
+    call add_key(state, int(id))
+    call add_key(state, int(ibits(count, 0, 31)))
+    call add_key(state, int(ibits(count, 31, 31)))
+    call fill(self, state)
   end subroutine seed_draw
+
+  !> Makes the state of the generator of seeds depend on one part of a key.
+  pure subroutine add_key(state, part)
+    integer(int64), intent(inout) :: state
+    integer, intent(in) :: part
+    integer(int64) :: word
+
+    call draw_seed(state, word)
+    state = ieor(word, int(part, int64))
+  end subroutine add_key
+
+  !> Fills the state of a stream from the generator of seeds.
+  pure subroutine fill(self, state)
+    class(random_stream_t), intent(inout) :: self
+    integer(int64), intent(inout) :: state
+    integer :: k
+
+    do k = 1, size(self%word)
+      call draw_seed(state, self%word(k))
+    end do
+  end subroutine fill
 
   !> The next 64 random bits.
   pure subroutine draw_word(self, word)
@@ -151,16 +176,13 @@ contains
     word = ieor(word, ishft(word, -31))
   end subroutine draw_seed
 
-  !> A number modulo 2**64, as a signed word. A product of two words is in size at most 2**126.
+  !> A number modulo 2**64, as a signed word: the lower half of its bits, the uppermost of which becomes the sign. A product
+  !> of two words is in size at most 2**126.
   pure function wrapped(number) result(word)
     integer(int128), intent(in) :: number
     integer(int64) :: word
-    integer(int128), parameter :: upper_bit = 2_int128**63
-    integer(int128) :: lower
 
-    lower = iand(number, 2*upper_bit - 1)
-    if (lower >= upper_bit) lower = lower - 2*upper_bit
-    word = int(lower, int64)
+    word = int(shifta(shiftl(number, 64), 64), int64)
   end function wrapped
 
 end module random_stream
