@@ -18,29 +18,32 @@ contains
   subroutine kick(sim, kicked)
     type(simulation_t), intent(inout) :: sim
     integer(int32), allocatable, intent(out) :: kicked(:)
+    real(real64), allocatable :: draws(:, :)     ! (2,n) of the disks that were kicked, kept where they are needed again
+    real(real64) :: z(2)
     integer(int32) :: i, n
     logical :: is_hit
 
     sim%kicks = sim%kicks + 1
-    allocate (kicked(sim%n_disks()))
+    n = sim%n_disks()
+    allocate (kicked(n), draws(2, merge(n, 0_int32, sim%drive%keep_momentum)))
     n = 0
     do i = 1, sim%n_disks()
       if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
-      call kick_disk(sim, i, is_hit)
+      call kick_disk(sim, i, is_hit, z)
       if (.not. is_hit) cycle
       n = n + 1
       kicked(n) = i
+      if (sim%drive%keep_momentum) draws(:, n) = z
     end do
     kicked = kicked(:n)
     if (sim%drive%keep_momentum) call restore_momentum()
   contains
 
-    !> Takes from the disks that were kicked by noise the common velocity that it gave them. The kicks are drawn once more,
-    !> which needs no memory, and summed exactly, so that the order of the disks leaves no trace.
+    !> Subtracts the mean velocity that noise has given to the disks. The sums are exact, so that the order of the disks
+    !> leaves no trace.
     subroutine restore_momentum()
       type(exact_sum_t) :: momentum(2), mass
-      type(random_stream_t) :: stream
-      real(real64) :: z(2), scale, heaviest
+      real(real64) :: scale, heaviest
       integer(int32) :: k
 
       heaviest = maxval(sim%species%mass)
@@ -49,9 +52,7 @@ contains
       call mass%choose_unit(heaviest)
       do k = 1, size(kicked, kind=int32)
         associate (i => kicked(k))
-          call stream%seed_draw(sim%seed, draws_of_kicks, sim%tag(i)%id, sim%kicks)
-          call stream%draw_normals(z)
-          call momentum%add(sim%mass_of(i)*scale*z)
+          call momentum%add(sim%mass_of(i)*scale*draws(:, k))
           call mass%add(sim%mass_of(i))
         end associate
       end do
@@ -63,13 +64,15 @@ contains
 
   !> Gives disk i a new velocity, in a sheared box relative to the profile: what it met last, it may meet again at once.
   !> This is no contact.
-  subroutine kick_disk(sim, i, is_hit)
+  subroutine kick_disk(sim, i, is_hit, z)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i
     logical, intent(out) :: is_hit               !! 'andersen' may leave it alone
+    real(real64), intent(out) :: z(2)            !! Gaussian random numbers of variance 1 that were drawn for its velocity
     type(random_stream_t) :: stream
-    real(real64) :: u, z(2), spin(2), v(2)
+    real(real64) :: u, spin(2), v(2)
 
+    z = 0
     associate (drive => sim%drive, id => sim%tag(i)%id)
       call stream%seed_draw(sim%seed, draws_of_kicks, id, sim%kicks)
       is_hit = .true.
