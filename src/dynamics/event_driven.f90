@@ -4,7 +4,7 @@
 !> An event becomes stale when the partner collides with another disk first. Stale events are not searched for: the
 !> partner's stamp reveals them when they come up, and the disk only predicts again.
 module event_driven
-  use kinds, only: int32, int64, real64
+  use kinds, only: int32, int64, never, real64
   use box_sides, only: side_time
   use calendar, only: most_coming, stages
   use cell_grid, only: cell_grid_t
@@ -71,11 +71,41 @@ contains
     integer(int32) :: k
 
     self%idle = .false.
+    if (size(changed) == sim%n_disks()) then
+      call renew_all(self, sim)
+      return
+    end if
     do k = 1, size(changed, kind=int32)
       if (stop_requested()) return                 ! see `advance`
       call predict(self, sim, changed(k))
     end do
   end subroutine renew
+
+  !> Predicts all disks, whose clocks are equal. An event later than the next kick of all disks will never happen, so it is
+  !> not filed, unless it is the earliest of all: the queue is never empty.
+  subroutine renew_all(self, sim)
+    class(event_driven_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: sim
+    real(real64) :: last                           ! since the epoch [time]
+    integer(int32) :: i, n
+
+    n = sim%n_disks()
+    do i = 1, n - 1, 2
+      if (stop_requested()) return                 ! see `advance`
+      call self%search%predict_both(sim, i, i + 1)
+    end do
+    if (mod(n, 2_int32) == 1) call self%search%predict(sim, n)
+    last = never
+    if (sim%drive%reaches_all()) last = sim%drive%time_of(sim%kicks + 1) - sim%epoch
+    last = max(last, minval(sim%disk%event_time))
+    do i = 1, n
+      if (sim%disk(i)%event_time <= last) then
+        call self%queue%schedule(sim%disk, sim%tag, i)
+      else
+        call self%queue%withhold(sim%tag(i))
+      end if
+    end do
+  end subroutine renew_all
 
   !> Executes events until a limit is met. None after a stop has been requested: many predictions take long and are
   !> then left unfinished; the state itself is whole.

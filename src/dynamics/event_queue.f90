@@ -36,6 +36,7 @@ module event_queue
   contains
     procedure :: fill
     procedure :: schedule
+    procedure :: withhold
     procedure :: first
     procedure :: drop_first
     procedure :: forget
@@ -137,6 +138,14 @@ contains
       call self%calendar%put_far(i, window)
     end if
   end subroutine schedule
+
+  !> Leaves the event of a disk unfiled. An earlier entry becomes invalid by itself.
+  pure subroutine withhold(self, tag)
+    class(event_queue_t), intent(in) :: self
+    type(tag_t), intent(inout) :: tag
+
+    tag%window = window_none
+  end subroutine withhold
 
   !> Into the current window: the sorted list, or the heap once the list has overflowed.
   subroutine insert_near(self, disk, tag, i)

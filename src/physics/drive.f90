@@ -22,6 +22,7 @@ module drive
   contains
     procedure :: is_on
     procedure :: reaches
+    procedure :: reaches_all
     procedure :: time_of
     procedure :: speed2
   end type drive_t
@@ -44,6 +45,14 @@ contains
 
     yes = self%is_on() .and. (self%species == 0 .or. self%species == species)
   end function reaches
+
+  !> Whether each kick changes the velocities of all disks.
+  pure function reaches_all(self) result(yes)
+    class(drive_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%is_on() .and. self%species == 0 .and. .not. (self%kind == andersen .and. self%fraction < 1)
+  end function reaches_all
 
   !> When kick k comes: a product, not a sum, so that it does not drift.
   pure function time_of(self, k) result(t)
