@@ -46,7 +46,7 @@ Q := $(if $(V),,@)
 sources := $(wildcard src/*.f90 src/*/*.f90)
 vpath %.f90 $(sort $(dir $(sources))) $(BUILD)
 vpath %.c src/base
-modules := $(filter-out main library library_files,$(notdir $(sources:.f90=))) build_info
+modules := $(filter-out main library library_files %_without_hdf5,$(notdir $(sources:.f90=))) build_info
 objects := $(modules:%=$(BUILD)/%.o) $(patsubst src/base/%.c,$(BUILD)/%_c.o,$(wildcard src/base/*.c))
 
 # Unit tests: the same .pf files under pFUnit or the substitute, each in its own folder, with all checks on.

@@ -7,25 +7,18 @@ module library_files
   use h5md_layout, only: changes_at_work, parameters_group
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
-  use last_frame, only: read_last_frame
   use library, only: answer, begin, session_of, session_t, text_of
   use output, only: output_t
   use run_files, only: output_of, source_of
   use run_setup, only: input_from_text, new_simulation
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
-  use starting_disks, only: read_run
   use status_line, only: status_line_t
   use texts, only: lines_of, text_t
   implicit none
   private
 
 contains
-
-  !> See ricochet.h.
-  subroutine enable_files() bind(C, name="ricochet_enable_files")
-    read_run => read_last_frame
-  end subroutine enable_files
 
   !> See ricochet.h. The file has the first samples of a run of this input, and the state of now.
   function save(handle, path, force, message, room) bind(C, name="ricochet_save") result(code)
@@ -42,7 +35,6 @@ contains
     type(error_t), allocatable :: error
 
     session => session_of(handle)
-    call enable_files()
     call input_from_text(session%input%text, session%input%path, session%input%overrides, input, error)
     if (.not. allocated(error)) call new_simulation(input, silent, first, error)
     first%changes = session%sim%changes               ! which makes work an observable
@@ -73,7 +65,6 @@ contains
     allocate (session)
     output = output_of(text_of(path))
     if (output == "") output = text_of(path)
-    call enable_files()
     call file%open(source_of(output), writable=.false.)
     call file%fetch_text(parameters_group//"input", text)
     call file%fetch_text(parameters_group//"overrides", overrides)

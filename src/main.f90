@@ -3,11 +3,9 @@ program main
   use, intrinsic :: iso_fortran_env, only: error_unit
   use command_line, only: answer, command_t, read_command_line
   use errors, only: error_t, exit_finished
-  use last_frame, only: read_last_frame
   use run, only: perform_run
   use run_setup, only: read_input
   use settings, only: run_input_t
-  use starting_disks, only: read_run
   use system, only: end_program, fill_standard_streams
   implicit none
   call serve()
@@ -23,7 +21,6 @@ contains
     integer :: code
 
     code = exit_finished
-    read_run => read_last_frame
     call fill_standard_streams()
     call read_command_line(command, error)
     if (.not. allocated(error)) then

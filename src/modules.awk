@@ -1,5 +1,5 @@
-# Who uses whom, for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, and the list of objects that need no HDF5.
-# Objects of src/ go to one folder, all others to another.
+# Who uses whom, for make: `x.o: y.mod` for every `use y` in x.f90 or x.pf, `x.o: y.o` for a submodule x of y, and the list
+# of objects that need no HDF5. Objects of src/ go to one folder, all others to another.
 # usage: awk -v build=FOLDER -v tests=FOLDER -f src/modules.awk FILE...
 FNR == 1 {
   me = FILENAME
@@ -9,6 +9,11 @@ FNR == 1 {
 tolower($1) == "use" {
   sub(/,.*/, "", $2)
   uses[me " " $2]
+}
+tolower($1) ~ /^submodule/ {
+  gsub(/.*\(|\).*/, "")
+  uses[me " " $0]
+  parts[me " " $0]
 }
 END {
   home["build_info"] = build "/build_info"
@@ -25,7 +30,7 @@ END {
   } while (grown)
   for (pair in uses) {
     split(pair, name, " ")
-    if (name[2] in home && name[1] != name[2]) print home[name[1]] ".o: " home[name[2]] ".mod"
+    if (name[2] in home && name[1] != name[2]) print home[name[1]] ".o: " home[name[2]] (pair in parts ? ".o" : ".mod")
   }
   for (me in home)
     if (!(me in needs) && home[me] == build "/" me) print "without_hdf5 += " build "/" me ".o"

@@ -5,8 +5,8 @@
    to `room` bytes with the zero at its end; a code is 0 or the program's exit code: 2 bad input, 3 files, 4 broken off.
    Lengths, times and energies are in the units of the input. Disks are in the order of the input.
 
-   libricochet.so needs no HDF5; libricochet_files.so has the same functions, and those at the end of this page. A handle
-   of the one is good for the other. */
+   libricochet.so needs no HDF5. libricochet_files.so has the same functions, its ricochet_open accepts species that start
+   from the file of a run, and it has the functions at the end of this page. A handle of the one is good for the other. */
 #ifndef RICOCHET_H
 #define RICOCHET_H
 #include <stdint.h>
@@ -51,9 +51,6 @@ int ricochet_text(ricochet *, const char *what, char *text, int room);
 int ricochet_next_events(ricochet *, int most, double records[][6]);
 
 /* --- libricochet_files.so --- */
-
-/* From now on species of ricochet_open of this library may come from the file of a run. */
-void ricochet_enable_files(void);
 
 /* Writes OUT.h5.part, as a run of this input would have left it that was stopped now, but with samples of its start only:
    `ricochet INPUT -o OUT.h5 --resume` goes on from it. `path` is OUT.h5. */

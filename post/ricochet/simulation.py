@@ -456,11 +456,8 @@ def library(files: bool = False) -> ctypes.CDLL:
         kinds |= {
             "save": (n, p, text, n, *answer),
             "load": (p, text, n, *answer, p),
-            "enable_files": (None,),
         }
     for function, (result, *arguments) in kinds.items():
         it = getattr(engine, f"ricochet_{function}")
         it.restype, it.argtypes = result, arguments
-    if files:
-        engine.ricochet_enable_files()
     return engine

@@ -1,30 +1,22 @@
 !> Disks from the last complete frame of a run, finished or not.
-module last_frame
-  use kinds, only: int64, real64
-  use box_geometry, only: box_t
-  use errors, only: exit_usage, fail
+submodule(starting_disks) last_frame
   use h5md_layout, only: box_group, disk_species, frame_counter, species_names
   use hdf5_objects, only: hdf5_file_t
   use hdf5_series, only: series_t
-  use variables, only: largest, most_disks, smallest
-  use position_file, only: mass_row, radius_row, spin_row
-  use settings, only: disks_in_file_t
-  use starting_disks, only: datasets
-  use texts, only: joined, written
+  use variables, only: most_disks
+  use texts, only: joined
   implicit none
-  private
-  public :: read_last_frame
 
   integer, parameter :: name_length = 64
 
 contains
 
-  !> Reads the disks of the species with this name.
-  subroutine read_last_frame(path, name, disks, box)
+  !> See `starting_disks`.
+  module subroutine read_last_frame(path, name, disks, box)
     character(len=*), intent(in) :: path
-    character(len=*), intent(in) :: name                    !! of the species
+    character(len=*), intent(in) :: name
     type(disks_in_file_t), intent(inout) :: disks
-    type(box_t), intent(in), optional :: box                !! to which the positions are stretched
+    type(box_t), intent(in), optional :: box
     type(hdf5_file_t) :: file
     character(len=name_length), allocatable :: names(:)
     integer(int64), allocatable :: species(:)
@@ -92,4 +84,4 @@ contains
     end subroutine read_rows
   end subroutine read_last_frame
 
-end module last_frame
+end submodule last_frame

@@ -13,26 +13,23 @@ module starting_disks
   use variables, only: largest, smallest
   implicit none
   private
-  public :: datasets, origin, read_disks, read_run, resolution
+  public :: origin, read_disks, resolution
 
   real(real64), parameter :: resolution = 1.0e-10_real64      !! of a radius at its coordinates, in double
   !> Where each of `position_file: column_names` is in the file of a run; what stands before the radius is in frames.
   character(len=48), parameter :: datasets(*) = [character(len=48) :: position//value_of, position//value_of, &
     velocity//value_of, velocity//value_of, angular_velocity//value_of, orientation//value_of, disk_radius, disk_mass]
 
-  abstract interface
-    !> Reads the disks of the species with this name from the file of a run.
-    subroutine read_run_disks(path, name, disks, box)
-      import :: box_t, disks_in_file_t
+  interface
+    !> Reads the disks of the species with this name from the last frame of a run. The submodule `last_frame` does that,
+    !> `last_frame_without_hdf5` refuses: the linker gets one of them.
+    module subroutine read_last_frame(path, name, disks, box)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: name                    !! of the species
       type(disks_in_file_t), intent(inout) :: disks
       type(box_t), intent(in), optional :: box                !! to which the positions are stretched
-    end subroutine read_run_disks
+    end subroutine read_last_frame
   end interface
-
-  !> Set by who has HDF5 at hand: the engine needs none to run.
-  procedure(read_run_disks), pointer :: read_run => null()
 
 contains
 
@@ -54,10 +51,8 @@ contains
 
     associate (me => species(s))
       if (me%scale_positions) new_box = box
-      if (is_run(me%file) .and. .not. associated(read_run)) then
-        call refuse(me, me%file//": files of runs cannot be read here")
-      else if (is_run(me%file)) then
-        call read_run(me%file, me%name, me%in_file, new_box)
+      if (is_run(me%file)) then
+        call read_last_frame(me%file, me%name, me%in_file, new_box)
       else if (me%scale_positions) then
         call refuse(me, me%file//": is not the file of a run (.h5), which scale_positions needs: it says how large the box was")
       else

@@ -19,7 +19,7 @@ MOST_LINES_OF_PROCEDURE = 60
 MOST_ARGUMENTS = 7
 MOST_FILES_OF_FOLDER = 15
 ARROWS = re.compile(r"^ *(\w+) *--> *(\w+(?: *& *\w+)*) *$", re.MULTILINE)
-UNIT = re.compile(r"\s*(?:module|program)\s+(\w+)\s*$")
+UNIT = re.compile(r"\s*(?:module|program|(submodule)\s*\(\w+\))\s+(\w+)\s*$")
 USE = re.compile(r"\s*use(?:\s*,\s*intrinsic\s*::)?\s+(\w+)\s*(,\s*only\s*:)?")
 PREFIX = r"(?:(?:pure|impure|elemental|recursive|module)\s+|(?:\w+(?:\([^)]*\))?)\s+)*?"
 PROCEDURE = re.compile(rf"\s*{PREFIX}(?:subroutine|function)\s+(\w+)\s*\(")
@@ -72,13 +72,15 @@ def arrow_problems(
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
-    """A file is one module of its own name, closed by default, and not too long."""
+    """A file is one module or submodule of its own name, not too long; a module is private."""
     if len(lines) > MOST_LINES_OF_FILE:
         yield Problem(path, len(lines), f"more than {MOST_LINES_OF_FILE} lines")
-    units = [unit[1] for line in lines if (unit := UNIT.match(line))]
-    if units != [path.stem]:
-        yield Problem(path, 1, f"holds {', '.join(units) or 'nothing'} instead of {path.stem}")
-    if path.stem != "main" and "private" not in map(str.strip, lines):
+    units = [unit for line in lines if (unit := UNIT.match(line))]
+    if [unit[2] for unit in units] != [path.stem]:
+        names = ", ".join(unit[2] for unit in units) or "nothing"
+        yield Problem(path, 1, f"holds {names} instead of {path.stem}")
+    is_part = any(unit[1] for unit in units)
+    if path.stem != "main" and not is_part and "private" not in map(str.strip, lines):
         yield Problem(path, 1, "no private statement")
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):

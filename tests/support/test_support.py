@@ -260,6 +260,12 @@ def test_a_module_in_order_has_no_style_problem(tmp_path):
     assert style_problems(tmp_path, MODULE) == []
 
 
+def test_a_submodule_is_a_file_of_its_name_that_needs_no_private(tmp_path):
+    part = MODULE.replace("module upper", "submodule(lower) upper", 1).replace("  private\n", "")
+    part = part.replace("end module", "end submodule")
+    assert style_problems(tmp_path, part) == []
+
+
 @pytest.mark.parametrize(
     ("before", "after", "line", "words"),
     [

@@ -9,7 +9,6 @@ module test_systems
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use initial_state, only: create_simulation
-  use last_frame, only: read_last_frame
   use neighbour_search, only: earliest_contact, prospect_t, no_gravity
   use partners, only: n_sides
   use random_stream, only: random_stream_t
@@ -17,7 +16,6 @@ module test_systems
   use settings, only: run_input_t
   use shapes, only: shape_t
   use simulation_state, only: simulation_t
-  use starting_disks, only: read_run
   use status_line, only: status_line_t
   use tally, only: dissipated
   use texts, only: text_t, written
@@ -57,7 +55,6 @@ contains
     type(status_line_t) :: line
     type(error_t), allocatable :: error
     allocate (changes(0))
-    read_run => read_last_frame
     if (present(overrides)) changes = overrides
     call input_from_text(text//merge("                 ", " &stop time = 1 /", index(text, "&stop") > 0), "f", changes, read, error)
     if (.not. allocated(error)) call create_simulation(read, line, sim, error)
