@@ -209,9 +209,9 @@ contains
       now = seconds()
       call advance_once(run%evolution, run%sim, limits, error, run%log)
       turns = adapted(turns, seconds() - now, run%evolution%turns_left > 0)
-      if (allocated(run%log)) call run%output%write_events(run%sim, run%log)
+      if (allocated(run%log)) call run%output%take_events(run%sim, run%log)
       if (allocated(error)) exit
-      call run%output%write_what_is_due(run%sim, error)
+      call run%output%take_due_samples(run%sim, error)
       if (allocated(error)) exit
       now = seconds()
       stopping = stop_requested()

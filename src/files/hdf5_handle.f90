@@ -13,7 +13,7 @@ module hdf5_handle
     h5lcreate_hard_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
-  use system, only: free_bytes, last_problem, move_file, opening_problem
+  use system, only: free_bytes, last_problem, move_file, opening_problem, remove_file
   use texts, only: written
   implicit none
   private
@@ -35,6 +35,7 @@ module hdf5_handle
     procedure :: rename => rename_file
     procedure :: flush => flush_file
     procedure :: close => close_file
+    procedure :: discard
     procedure :: make_group
     procedure :: link
     procedure :: check
@@ -53,12 +54,15 @@ module hdf5_handle
 contains
 
   !> Remembers what could not be done if `status` says so and it is the first time.
-  subroutine check(self, status, action)
+  subroutine check(self, status, action, needed)
     class(hdf5_handle_t), intent(inout) :: self
     integer, intent(in) :: status                 !! of an HDF5 call; negative: it failed
     character(len=*), intent(in) :: action        !! what it was to do, in words that follow "cannot "
+    integer(int64), intent(in), optional :: needed      !! for it, if not what is unsaved [bytes]
 
-    if (status < 0 .and. .not. allocated(self%failure)) self%failure = action
+    if (status >= 0 .or. allocated(self%failure)) return
+    self%failure = action
+    if (present(needed)) self%unsaved = needed
   end subroutine check
 
   !> The failure, if there was one, as an error: the file, what could not be done, the space on its disk.
@@ -196,6 +200,14 @@ contains
     call self%check(status, "be closed")
     self%id = -1
   end subroutine close_file
+
+  !> Closes the file and removes it; its failure can still be reported.
+  subroutine discard(self)
+    class(hdf5_handle_t), intent(inout) :: self
+
+    call self%close()
+    call remove_file(self%path)
+  end subroutine discard
 
   !> Makes a group and those that lead to it.
   subroutine make_group(self, name)

@@ -30,7 +30,7 @@ module hdf5_objects
     procedure :: make_dataset
     procedure :: extents
     procedure :: length
-    procedure :: exchange_part
+    procedure :: transfer
     generic :: put => put_reals, put_integers, put_longs, put_text, put_texts
     generic :: fetch => fetch_reals, fetch_longs
     procedure :: fetch_text
@@ -169,7 +169,7 @@ contains
   end function product_of
 
   !> Writes or reads a part of a dataset from or to the memory at an address.
-  subroutine exchange_part(self, name, first, counts, type, address, writing)
+  subroutine transfer(self, name, first, counts, type, address, writing)
     class(hdf5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer(int64), intent(in) :: first           !! along the last dimension, from 1
@@ -180,10 +180,13 @@ contains
     integer(hid_t) :: dataset, in_file, in_memory
     integer(hsize_t) :: start(size(counts))
     integer(hsize_t), allocatable :: extents(:)
+    integer(size_t) :: bytes                      ! of a value
     type(c_ptr) :: place
     integer :: status, closed
 
     if (allocated(self%failure)) return
+    call h5tget_size_f(type, bytes, status)
+    if (writing) self%unsaved = self%unsaved + bytes*product(counts)
     start = 0
     start(size(start)) = first - 1
     place = address
@@ -198,7 +201,7 @@ contains
     call h5sclose_f(in_memory, closed)
     call h5dclose_f(dataset, status)              ! writes what has been buffered
     call self%check(status, "write "//name)
-  end subroutine exchange_part
+  end subroutine transfer
 
   !> Writes reals as doubles.
   subroutine put_reals(self, name, extents, values)

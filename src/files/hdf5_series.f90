@@ -27,14 +27,13 @@ module hdf5_series
   contains
     procedure :: make
     procedure :: find
-    procedure :: write => write_samples
-    procedure :: read => read_sample
+    procedure :: store
+    procedure :: load
     procedure :: copy
     procedure :: width
     procedure :: holds
     procedure :: room
-    procedure, private :: exchange
-    procedure, private :: storage_type
+    procedure, private :: extents, storage_type
   end type series_t
 
 contains
@@ -74,6 +73,15 @@ contains
     type = types(self%storage)
   end function storage_type
 
+  !> Extents of a dataset of `count` samples.
+  pure function extents(self, count)
+    class(series_t), intent(in) :: self
+    integer(int64), intent(in) :: count
+    integer(int64) :: extents(self%rank + 1)
+
+    extents = [int(self%shape(:self%rank), int64), count]
+  end function extents
+
   !> Makes the series with room for `capacity` samples.
   subroutine make(self, file, capacity)
     class(series_t), intent(inout) :: self
@@ -81,8 +89,7 @@ contains
     integer(int64), intent(in) :: capacity
 
     self%capacity = capacity
-    call file%make_dataset(trim(self%name), self%storage_type(), &
-      int([int(self%shape(:self%rank), int64), capacity], hsize_t))
+    call file%make_dataset(trim(self%name), self%storage_type(), int(self%extents(capacity), hsize_t))
   end subroutine make
 
   !> Finds the series in a file that has it; its samples must have the shape that is expected, integers may be longer.
@@ -101,9 +108,9 @@ contains
     call file%check(merge(0, -1, there), "be read: there is no "//trim(self%name)//" of the expected shape")
   end subroutine find
 
-  !> Writes samples, converted to what is stored: HDF5 would take ten times as long to shorten reals. A
-  !> single sample of doubles is written from where it is, as it may be large.
-  subroutine write_samples(self, file, first, values)
+  !> Stores samples, converted to the type in the file: HDF5 would take ten times as long to shorten reals. A single sample
+  !> of doubles is not copied, as it may be large.
+  subroutine store(self, file, first, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: first           !! number of the first of these samples, from 1
@@ -139,19 +146,20 @@ contains
       longs = int(values, int64)
       address = c_loc(longs)
     end select
-    call self%exchange(file, first, count, type, address, writing=.true.)
-  end subroutine write_samples
+    call file%transfer(trim(self%name), first, self%extents(count), type, address, writing=.true.)
+  end subroutine store
 
-  !> Reads one sample as doubles.
-  subroutine read_sample(self, file, number, values)
+  !> Loads one sample as doubles.
+  subroutine load(self, file, number, values)
     class(series_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(in) :: number          !! from 1
     real(real64), intent(inout), target :: values(*)
 
     if (number < 1 .or. number > self%capacity) call file%check(-1, "be read: "//trim(self%name))
-    call self%exchange(file, number, 1_int64, h5kind_to_type(real64, h5_real_kind), c_loc(values), writing=.false.)
-  end subroutine read_sample
+    call file%transfer(trim(self%name), number, self%extents(1_int64), h5kind_to_type(real64, h5_real_kind), c_loc(values), &
+      writing=.false.)
+  end subroutine load
 
   !> Copies the first `count` samples from the same series in another file.
   subroutine copy(self, file, source, count)
@@ -165,22 +173,9 @@ contains
     allocate (buffer(min(step, count)*self%room()))
     do first = 1, count, step
       n = min(step, count - first + 1)
-      call self%exchange(source, first, n, self%storage_type(), c_loc(buffer), writing=.false.)
-      call self%exchange(file, first, n, self%storage_type(), c_loc(buffer), writing=.true.)
+      call source%transfer(trim(self%name), first, self%extents(n), self%storage_type(), c_loc(buffer), writing=.false.)
+      call file%transfer(trim(self%name), first, self%extents(n), self%storage_type(), c_loc(buffer), writing=.true.)
     end do
   end subroutine copy
-
-  !> Writes or reads some samples of the file from or to the memory at an address.
-  subroutine exchange(self, file, first, count, type, address, writing)
-    class(series_t), intent(in) :: self
-    type(hdf5_file_t), intent(inout) :: file
-    integer(int64), intent(in) :: first, count
-    integer(hid_t), intent(in) :: type            !! HDF5 type in memory
-    type(c_ptr), intent(in) :: address
-    logical, intent(in) :: writing
-
-    if (writing) file%unsaved = file%unsaved + count*self%room()
-    call file%exchange_part(trim(self%name), first, [int(self%shape(:self%rank), int64), count], type, address, writing)
-  end subroutine exchange
 
 end module hdf5_series

@@ -1,5 +1,5 @@
-!> A record: numbers one after the other in one dataset. They are counted, written or read, each by one line for all
-!> three; a checksum behind the last one tells whether they are right.
+!> A record: numbers one after the other in one dataset of an open file. They are counted, written or read, each by one line
+!> for all three; a checksum behind the last one tells whether they are right.
 module record
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_int8_t, c_loc, c_long, c_ptr
   use, intrinsic :: iso_fortran_env, only: int8
@@ -16,7 +16,6 @@ module record
 
   !> All numbers are words of 64 bits.
   type :: record_t
-    type(hdf5_file_t) :: file
     character(len=:), allocatable :: name         !! path of the dataset
     integer :: way = counting
     integer(int64) :: words = 0                   !! so far
@@ -51,12 +50,13 @@ contains
   end function checksum
 
   !> Makes the dataset of a record that has been counted.
-  subroutine make(self)
-    class(record_t), intent(inout) :: self
+  subroutine make(self, file)
+    class(record_t), intent(in) :: self
+    type(hdf5_file_t), intent(inout) :: file
     type(series_t) :: words
 
     words = series_t(self%name, long_integer)
-    call words%make(self%file, self%words)
+    call words%make(file, self%words)
   end subroutine make
 
   !> Begins anew, to count, write or read.
@@ -70,59 +70,64 @@ contains
   end subroutine begin
 
   !> The next number is a real.
-  subroutine exchange_real(self, value)
+  subroutine exchange_real(self, file, value)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(inout), target :: value
 
-    call self%pass(c_loc(value), 1)
+    call self%pass(file, c_loc(value), 1)
   end subroutine exchange_real
 
   !> The next numbers are reals.
-  subroutine exchange_reals(self, values)
+  subroutine exchange_reals(self, file, values)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(inout), target, contiguous :: values(:)
 
-    call self%pass(c_loc(values), size(values))
+    call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_reals
 
   !> The next number is an integer.
-  subroutine exchange_long(self, value)
+  subroutine exchange_long(self, file, value)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(inout), target :: value
 
-    call self%pass(c_loc(value), 1)
+    call self%pass(file, c_loc(value), 1)
   end subroutine exchange_long
 
   !> The next numbers are integers.
-  subroutine exchange_longs(self, values)
+  subroutine exchange_longs(self, file, values)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     integer(int64), intent(inout), target, contiguous :: values(:)
 
-    call self%pass(c_loc(values), size(values))
+    call self%pass(file, c_loc(values), size(values))
   end subroutine exchange_longs
 
   !> Ends a record with its checksum, or fails if that which is there is another.
-  subroutine seal(self)
+  subroutine seal(self, file)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     integer(int64) :: crc, there
 
     crc = self%crc
     there = crc
-    call self%exchange(there)
-    if (there /= crc) call self%file%check(-1, "be read: the checksum of "//self%name//" is wrong")
+    call self%exchange(file, there)
+    if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
   end subroutine seal
 
   !> Writes or reads the next n numbers from or to the memory at an address.
-  subroutine pass(self, address, n)
+  subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
+    type(hdf5_file_t), intent(inout) :: file
     type(c_ptr), intent(in) :: address
     integer, intent(in) :: n
     integer(int8), pointer :: bytes(:)
 
     if (n == 0) return
     if (self%way /= counting) then
-      if (self%way == writing) self%file%unsaved = self%file%unsaved + bytes_of_word*n
-      call self%file%exchange_part(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
+      call file%transfer(self%name, self%words + 1, [int(n, int64)], h5kind_to_type(int64, h5_integer_kind), &
         address, self%way == writing)
       call c_f_pointer(address, bytes, [bytes_of_word*n])
       self%crc = crc32(int(self%crc, c_long), bytes, size(bytes, kind=c_int))

@@ -36,12 +36,12 @@ module sample_track
     procedure :: widen
     procedure :: make
     procedure :: resume
-    procedure :: commit
+    procedure :: put_counter
     procedure :: move
     procedure :: append
-    procedure :: write_buffer
+    procedure :: flush => flush_buffer
     procedure :: verify
-    procedure, private :: batch, write_samples, link_step_and_time
+    procedure, private :: batch, commit, link_step_and_time
   end type track_t
 
 contains
@@ -123,7 +123,7 @@ contains
       call self%series(k)%make(file, capacity)
     end do
     call self%link_step_and_time(file)
-    call self%commit(file)
+    call self%put_counter(file)
   end subroutine make
 
   !> Gives all elements the step and time of the first, as H5MD wants it for what is sampled together.
@@ -164,12 +164,12 @@ contains
   end subroutine resume
 
   !> Tells readers which samples are complete: after `resume`, no more than those it went back to.
-  subroutine commit(self, file)
+  subroutine put_counter(self, file)
     class(track_t), intent(in) :: self
     type(hdf5_file_t), intent(inout) :: file
 
     call file%put(self%counter, scalar, [self%committed])
-  end subroutine commit
+  end subroutine put_counter
 
   !> Makes the track in a new file with another capacity, and copies all samples that are written.
   subroutine move(self, file, source, capacity)
@@ -202,7 +202,7 @@ contains
     end do
   end subroutine verify
 
-  !> Takes over the next samples, for which there must be room. They are written at once if they fill a batch.
+  !> Takes over the next samples, for which there must be room. They are committed at once if they fill a batch.
   subroutine append(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
@@ -210,32 +210,32 @@ contains
     integer(int64) :: count
 
     count = size(samples, 2)
-    if (self%waiting + count > self%batch()) call self%write_buffer(file, 0.0_real64)
+    if (self%waiting + count > self%batch()) call self%flush(file, 0.0_real64)
     if (count >= self%batch()) then
-      call self%write_samples(file, samples)
+      call self%commit(file, samples)
       return
     end if
     if (.not. allocated(self%buffer)) allocate (self%buffer(size(samples, 1), self%batch()))
     if (self%waiting == 0) self%waiting_since = seconds()
     self%buffer(:, self%waiting + 1:self%waiting + count) = samples
     self%waiting = self%waiting + count
-    if (self%waiting == self%batch()) call self%write_buffer(file, 0.0_real64)
+    if (self%waiting == self%batch()) call self%flush(file, 0.0_real64)
   end subroutine append
 
-  !> Writes the buffer if its oldest sample has waited for some time.
-  subroutine write_buffer(self, file, least_wait)
+  !> Commits the samples in the buffer if the oldest has waited for some time.
+  subroutine flush_buffer(self, file, least_wait)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(in) :: least_wait              !! [s]
 
     if (self%waiting == 0) return
     if (seconds() - self%waiting_since < least_wait) return
-    call self%write_samples(file, self%buffer(:, :self%waiting))
+    call self%commit(file, self%buffer(:, :self%waiting))
     self%waiting = 0
-  end subroutine write_buffer
+  end subroutine flush_buffer
 
-  !> Writes samples behind those that are committed, and commits them: first the values, then the counter.
-  subroutine write_samples(self, file, samples)
+  !> Stores samples behind those that are complete, and then counts them: their values reach the disk first.
+  subroutine commit(self, file, samples)
     class(track_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file
     real(real64), intent(in) :: samples(:, :)           !! (width,count)
@@ -243,14 +243,14 @@ contains
 
     first = 1
     do k = 1, size(self%series)
-      call self%series(k)%write(file, self%committed + 1, samples(first:first + self%series(k)%width() - 1, :))
+      call self%series(k)%store(file, self%committed + 1, samples(first:first + self%series(k)%width() - 1, :))
       first = first + self%series(k)%width()
     end do
     call file%flush()
     if (allocated(file%failure)) return
     self%committed = self%committed + size(samples, 2)
-    call self%commit(file)
+    call self%put_counter(file)
     call file%flush()
-  end subroutine write_samples
+  end subroutine commit
 
 end module sample_track

@@ -216,10 +216,11 @@ contains
   function checkpoint_bytes(sim) result(bytes)
     type(simulation_t), intent(inout) :: sim      !! stays as it is
     integer(int64) :: bytes
+    type(hdf5_file_t) :: no_file
     type(record_t) :: record
     type(progress_t) :: progress
 
-    call exchange_all(record, sim, progress)
+    call exchange_all(no_file, record, sim, progress)
     bytes = 8*record%words
   end function checkpoint_bytes
 
@@ -232,16 +233,14 @@ contains
     type(record_t) :: record
     type(progress_t) :: copy
 
-    record%file = file
     record%name = name
     copy = progress
     if (file%length(name) < 0) then
-      call exchange_all(record, sim, copy)
-      call record%make()
+      call exchange_all(file, record, sim, copy)
+      call record%make(file)
     end if
     call record%begin(writing)
-    call exchange_all(record, sim, copy)
-    file = record%file
+    call exchange_all(file, record, sim, copy)
   end subroutine put_slot
 
   !> Restores a run from its output, finished or not, which goes on with what `progress` says.
@@ -252,7 +251,7 @@ contains
     type(progress_t), intent(out) :: progress
     logical, intent(out) :: finished            !! the run had come to its end
     type(error_t), allocatable, intent(out) :: error
-    type(record_t) :: record
+    type(hdf5_file_t) :: file
     character(len=:), allocatable :: source
 
     source = source_of(output)
@@ -262,14 +261,14 @@ contains
       return
     end if
     progress = progress_t(input%settings)
-    call record%file%open(source, writable=.false.)
-    if (checkpoint_number(record%file) == none) then
+    call file%open(source, writable=.false.)
+    if (checkpoint_number(file) == none) then
       call fail(error, exit_files, source//": its run broke off and cannot go on; without --resume it starts over")
     else
-      call check_origin(record%file, input%groups, error)
+      call check_origin(file, input%groups, error)
     end if
-    if (.not. allocated(error)) call read_slot(record, sim, progress, error)
-    call record%file%close()
+    if (.not. allocated(error)) call read_slot(file, sim, progress, error)
+    call file%close()
     if (allocated(error)) return
     if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
     call sim%choose_units()
@@ -277,39 +276,40 @@ contains
   end subroutine read_checkpoint
 
   !> Reads the checkpoint that counts; if it is damaged the other one.
-  subroutine read_slot(record, sim, progress, error)
-    type(record_t), intent(inout) :: record
+  subroutine read_slot(file, sim, progress, error)
+    type(hdf5_file_t), intent(inout) :: file
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(inout) :: progress
     type(error_t), allocatable, intent(out) :: error
+    type(record_t) :: record
     type(simulation_t) :: blank
     character(len=:), allocatable :: failure      ! of the first trial
     integer(int64) :: words
     integer :: number, trial
 
-    number = checkpoint_number(record%file)
+    number = checkpoint_number(file)
     call sim%make_room(sum(sim%species%count))
     blank = sim
     do trial = 1, 2
       sim = blank
       record%name = slots(merge(2, 1, number == 2 .eqv. trial == 1))
       call record%begin(counting)
-      call exchange_all(record, sim, progress)
-      words = record%file%length(record%name)
+      call exchange_all(file, record, sim, progress)
+      words = file%length(record%name)
       if (words > 0 .and. words /= record%words) then
-        call fail(error, exit_files, record%file%path//": has other disks than the input describes now: a starting file " &
+        call fail(error, exit_files, file%path//": has other disks than the input describes now: a starting file " &
           //"(species.file) is not what it was; --resume needs it as it was, --force instead starts over")
         return
       end if
       call record%begin(reading)
-      call exchange_all(record, sim, progress)
+      call exchange_all(file, record, sim, progress)
       if (any(sim%tag%species < 1 .or. sim%tag%species > size(sim%species) .or. sim%tag%id < 1 .or. sim%tag%id > size(sim%tag))) &
-        call record%file%check(-1, "be read: "//record%name//" has disks that are none")
-      if (.not. allocated(record%file%failure)) return
-      if (trial == 1) call move_alloc(record%file%failure, failure)
+        call file%check(-1, "be read: "//record%name//" has disks that are none")
+      if (.not. allocated(file%failure)) return
+      if (trial == 1) call move_alloc(file%failure, failure)
     end do
-    call move_alloc(failure, record%file%failure)
-    call record%file%report(error)
+    call move_alloc(failure, file%failure)
+    call file%report(error)
   end subroutine read_slot
 
   !> Refuses the checkpoint of another program or another input.
@@ -336,57 +336,58 @@ contains
   end subroutine check_origin
 
   !> Writes or reads a checkpoint. When read, a simulation must know its box and species.
-  subroutine exchange_all(record, sim, progress)
+  subroutine exchange_all(file, record, sim, progress)
+    type(hdf5_file_t), intent(inout) :: file      !! not used while the record is counted
     type(record_t), intent(inout) :: record
     type(simulation_t), intent(inout) :: sim
     type(progress_t), intent(inout) :: progress
     integer(int64) :: settled
     integer :: k
 
-    call record%exchange(sim%epoch)
+    call record%exchange(file, sim%epoch)
     sim%box%epoch = sim%epoch
-    call record%exchange(sim%now)
+    call record%exchange(file, sim%now)
     settled = merge(1, 0, sim%settled)
-    call record%exchange(settled)
+    call record%exchange(file, settled)
     sim%settled = settled == 1
-    call record%exchange(sim%epoch_begin)
-    call record%exchange(sim%epoch_end)
-    call record%exchange(sim%epoch_events)
-    call record%exchange(sim%blink)
-    call record%exchange(sim%last_advance)
-    call record%exchange(sim%events_then)
-    call record%exchange(sim%start_energy)
-    call record%exchange(sim%most_energy)
-    call record%exchange(sim%kicks)
-    call record%exchange(sim%changes)
+    call record%exchange(file, sim%epoch_begin)
+    call record%exchange(file, sim%epoch_end)
+    call record%exchange(file, sim%epoch_events)
+    call record%exchange(file, sim%blink)
+    call record%exchange(file, sim%last_advance)
+    call record%exchange(file, sim%events_then)
+    call record%exchange(file, sim%start_energy)
+    call record%exchange(file, sim%most_energy)
+    call record%exchange(file, sim%kicks)
+    call record%exchange(file, sim%changes)
     call exchange_tally()
     if (any(sim%box%surface%motion%kind == piston)) then
-      call record%exchange(sim%box%surface%motion%clock)
-      call record%exchange(sim%box%surface%motion%at)
-      call record%exchange(sim%box%surface%motion%v)
+      call record%exchange(file, sim%box%surface%motion%clock)
+      call record%exchange(file, sim%box%surface%motion%at)
+      call record%exchange(file, sim%box%surface%motion%v)
     end if
     call exchange_disks()
     do k = 1, size(progress%cadence)
       associate (cadence => progress%cadence(k))      ! its steps are part of the input; when it is due follows from them
-        call record%exchange(cadence%count)
-        call record%exchange(cadence%last_events)
-        call record%exchange(cadence%last_time)
+        call record%exchange(file, cadence%count)
+        call record%exchange(file, cadence%last_events)
+        call record%exchange(file, cadence%last_time)
       end associate
     end do
-    call record%exchange(progress%events)
-    call record%seal()
+    call record%exchange(file, progress%events)
+    call record%seal(file)
   contains
 
     !> What collisions have gathered.
     subroutine exchange_tally()
       call sim%tally%make_room(size(sim%box%surface))
       associate (tally => sim%tally)
-        call record%exchange(tally%events)
-        call record%exchange(tally%collisions)
-        call record%exchange(tally%stuck)
-        call record%exchange(tally%collapse)
+        call record%exchange(file, tally%events)
+        call record%exchange(file, tally%collisions)
+        call record%exchange(file, tally%stuck)
+        call record%exchange(file, tally%collapse)
         call exchange_sums(tally%sum)
-        call record%exchange(tally%hits)
+        call record%exchange(file, tally%hits)
         do k = 1, size(tally%at_surface, 1)
           call exchange_sums(tally%at_surface(k, :))
         end do
@@ -402,7 +403,7 @@ contains
       do i = 1, size(sums)
         halves(2*i - 1:2*i) = transfer(sums(i)%units, halves)
       end do
-      call record%exchange(halves)
+      call record%exchange(file, halves)
       do i = 1, size(sums)
         sums(i)%units = transfer(halves(2*i - 1:2*i), sums(i)%units)
       end do
@@ -413,23 +414,23 @@ contains
       real(real64), allocatable :: mass(:)
 
       associate (disk => sim%disk, tag => sim%tag)
-        call record%exchange(disk%x(1))
-        call record%exchange(disk%x(2))
-        call record%exchange(disk%v(1))
-        call record%exchange(disk%v(2))
-        call record%exchange(disk%clock)
+        call record%exchange(file, disk%x(1))
+        call record%exchange(file, disk%x(2))
+        call record%exchange(file, disk%v(1))
+        call record%exchange(file, disk%v(2))
+        call record%exchange(file, disk%clock)
         call exchange_short(tag%species)
         call exchange_short(tag%id)
-        call record%exchange(tag%collisions)
+        call record%exchange(file, tag%collisions)
         call exchange_short(tag%met)
-        if (sim%with%own_sizes) call record%exchange(disk%radius)      ! else sizes follow from the input
+        if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! else sizes follow from the input
       end associate
       do k = 1, n_columns
-        if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(sim%extra(sim%row(k), :))
+        if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(file, sim%extra(sim%row(k), :))
       end do
       if (.not. sim%with%own_sizes) return
       mass = sim%masses()                       ! there is no column of them if they turn out to be equal
-      call record%exchange(mass)
+      call record%exchange(file, mass)
       if (record%way /= reading) return
       sim%extra(sim%row(mass_column), :) = mass
       call sim%settle_masses()
@@ -441,7 +442,7 @@ contains
       integer(int64) :: words(size(values))
 
       words = values
-      call record%exchange(words)
+      call record%exchange(file, words)
       values = int(words, int32)
     end subroutine exchange_short
   end subroutine exchange_all

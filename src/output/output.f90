@@ -37,7 +37,7 @@ module output
     type(progress_t) :: progress
     character(len=:), allocatable :: path         !! of the finished file
     type(run_input_t) :: input                    !! described in the file
-    type(hdf5_file_t), private :: file
+    type(hdf5_file_t), allocatable, private :: file
     type(track_t), allocatable, private :: track(:)      !! frames, observables, and the event log if there is one
     type(frame_column_t), allocatable, private :: columns(:)  !! of the frames
     type(lock_t), private :: lock
@@ -49,13 +49,13 @@ module output
     procedure :: open => open_output
     procedure :: resume
     procedure :: tighten
-    procedure :: write_what_is_due
-    procedure :: write_events
+    procedure :: take_due_samples
+    procedure :: take_events
     procedure :: finish
     procedure :: break_off
     procedure :: save
     procedure :: release
-    procedure, private :: check_start, plan, create_file, append, rebuild, write_buffers, write_end, write_sample
+    procedure, private :: check_start, plan, create_file, take_sample, add, flush_buffers, rebuild, write_end
   end type output_t
 
 contains
@@ -69,6 +69,7 @@ contains
     logical :: made
 
     call record_signals()                         ! from here on there is something to lose
+    self%file = hdf5_file_t()
     self%path = path
     self%opened = seconds()
     call make_folders_of(path, made)
@@ -110,14 +111,14 @@ contains
     do k = 1, size(self%track)
       call self%track(k)%make(self%file, self%track(k)%first_capacity())
     end do
-    call self%write_sample(frames, sim)
-    call self%write_sample(values, sim)
-    call self%write_buffers()
+    call self%take_sample(frames, sim)
+    call self%take_sample(values, sim)
+    call self%flush_buffers()
     call make_checkpoints(self%file, input%groups, sim, self%progress)
     call self%file%flush()
     call self%file%rename()
     call self%file%report(error)
-    call remove_file(self%path//unfinished_new)   ! still there only after a failure, and useless
+    if (allocated(error)) call self%file%discard()
   end subroutine open_output
 
   !> Fails if a new run would replace an output, or delete what another run has left; but that of one that broke off.
@@ -174,7 +175,7 @@ contains
       call self%rebuild([(max(self%track(k)%first_capacity(), counts(k)), k=1, size(self%track))], sim, anew)
     else
       do k = 1, size(self%track)
-        call self%track(k)%commit(self%file)
+        call self%track(k)%put_counter(self%file)
       end do
       call self%file%flush()
     end if
@@ -239,8 +240,8 @@ contains
     call self%progress%cadence(values)%tighten(limits)
   end subroutine tighten
 
-  !> Writes the samples that are due; to be called whenever the simulation pauses.
-  subroutine write_what_is_due(self, sim, error)
+  !> Takes the samples that are due; to be called whenever the simulation pauses.
+  subroutine take_due_samples(self, sim, error)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(error_t), allocatable, intent(out) :: error
@@ -249,39 +250,39 @@ contains
     due = self%progress%cadence%is_due(sim)
     if (any(due)) call check_counts(sim, error)
     if (allocated(error)) return
-    if (due(frames)) call self%write_sample(frames, sim)
-    if (due(values)) call self%write_sample(values, sim)
-    call self%write_buffers(longest_wait)
+    if (due(frames)) call self%take_sample(frames, sim)
+    if (due(values)) call self%take_sample(values, sim)
+    call self%flush_buffers(longest_wait)
     call self%file%report(error)
-  end subroutine write_what_is_due
+  end subroutine take_due_samples
 
-  !> Writes a frame, or a sample of the observables.
-  subroutine write_sample(self, track, sim)
+  !> Takes a frame, or a sample of the observables.
+  subroutine take_sample(self, track, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track                  !! frames or values
     type(simulation_t), intent(inout) :: sim
 
     associate (cadence => self%progress%cadence(track))
-      if (track == frames) call self%append(track, frame_sample(sim, cadence%count, self%columns), sim)
-      if (track == values) call self%append(track, observable_sample(sim, cadence%count), sim)
+      if (track == frames) call self%add(track, frame_sample(sim, cadence%count, self%columns), sim)
+      if (track == values) call self%add(track, observable_sample(sim, cadence%count), sim)
       call cadence%take(sim)
     end associate
-  end subroutine write_sample
+  end subroutine take_sample
 
-  !> Takes over the collisions that the log holds, and empties it; `write_what_is_due` tells of a failure.
-  subroutine write_events(self, sim, log)
+  !> Takes over the collisions that the log holds, and empties it; `take_due_samples` reports a failure.
+  subroutine take_events(self, sim, log)
     class(output_t), intent(inout) :: self
     type(simulation_t), intent(inout) :: sim
     type(event_log_t), intent(inout) :: log
 
     if (log%n == 0) return
-    call self%append(events, log%record(:sum(self%track(events)%series%width()), :log%n), sim)
+    call self%add(events, log%record(:sum(self%track(events)%series%width()), :log%n), sim)
     self%progress%events = self%progress%events + log%n
     log%n = 0
-  end subroutine write_events
+  end subroutine take_events
 
-  !> Appends samples to a track, in another file if there is no room for them in this one.
-  subroutine append(self, track, samples, sim)
+  !> Adds samples to a track, in another file if there is no room for them in this one.
+  subroutine add(self, track, samples, sim)
     class(output_t), intent(inout) :: self
     integer, intent(in) :: track
     real(real64), intent(in) :: samples(:, :)     !! (width,count)
@@ -294,10 +295,10 @@ contains
     call self%track(track)%widen(samples, widened)
     if (widened .or. any(capacities > self%track%capacity)) call self%rebuild(capacities, sim, kept)
     call self%track(track)%append(self%file, samples)
-  end subroutine append
+  end subroutine add
 
-  !> Writes the samples that have waited in a buffer for some time; without `least_wait` all.
-  subroutine write_buffers(self, least_wait)
+  !> Commits the samples that have waited in a buffer for some time; without `least_wait` all.
+  subroutine flush_buffers(self, least_wait)
     class(output_t), intent(inout) :: self
     real(real64), intent(in), optional :: least_wait      !! [s]
     real(real64) :: wait
@@ -306,9 +307,9 @@ contains
     wait = 0
     if (present(least_wait)) wait = least_wait
     do k = 1, size(self%track)
-      call self%track(k)%write_buffer(self%file, wait)
+      call self%track(k)%flush(self%file, wait)
     end do
-  end subroutine write_buffers
+  end subroutine flush_buffers
 
   !> Replaces the file by one with other capacities.
   subroutine rebuild(self, capacities, sim, checkpoints)
@@ -316,17 +317,15 @@ contains
     integer(int64), intent(in) :: capacities(:)
     type(simulation_t), intent(inout) :: sim
     integer, intent(in) :: checkpoints            !! those of the new file: `kept`, made `anew` of this moment, or `dropped`
-    type(hdf5_file_t) :: new
+    type(hdf5_file_t), allocatable :: new
     integer(int64) :: needed
     integer :: k
 
-    call self%write_buffers()
+    call self%flush_buffers()
     needed = sum(self%track%appended()*self%track%room())
-    if (needed > free_bytes(self%path)) then
-      self%file%unsaved = needed
-      call self%file%check(-1, "be copied to a file of the right size")
-    end if
+    if (needed > free_bytes(self%path)) call self%file%check(-1, "be copied to a file of the right size", needed)
     if (allocated(self%file%failure)) return
+    allocate (new)
     call self%create_file(new, sim)
     do k = 1, size(self%track)
       call self%track(k)%move(new, self%file, capacities(k))
@@ -335,17 +334,14 @@ contains
     if (checkpoints == anew) call make_checkpoints(new, self%input%groups, sim, self%progress)
     if (checkpoints == dropped) call mark_as_broken(new)
     call new%flush()
-    if (allocated(self%file%failure)) call new%check(-1, self%file%failure)
-    call new%rename()
-    if (allocated(new%failure)) then
-      self%file%failure = new%failure
-      self%file%unsaved = new%unsaved
-      call new%close()
-      call remove_file(new%path)
-    else
-      call self%file%close()
-      self%file = new
+    if (allocated(self%file%failure)) then        ! it cannot be read
+      call new%discard()
+      return
     end if
+    call new%rename()
+    call self%file%close()
+    call move_alloc(new, self%file)
+    if (allocated(self%file%failure)) call self%file%discard()
   end subroutine rebuild
 
   !> Makes a checkpoint of this moment.
@@ -354,7 +350,7 @@ contains
     type(simulation_t), intent(inout) :: sim      !! stays as it is
     type(error_t), allocatable, intent(out) :: error
 
-    call self%write_buffers()
+    call self%flush_buffers()
     call self%file%put(wall_time, scalar, [self%spent + seconds() - self%opened])
     call put_checkpoint(self%file, sim, self%progress)
     call self%file%report(error)
@@ -399,9 +395,9 @@ contains
 
     before = self%progress
     do track = frames, values
-      if (self%progress%cadence(track)%is_new(sim)) call self%write_sample(track, sim)
+      if (self%progress%cadence(track)%is_new(sim)) call self%take_sample(track, sim)
     end do
-    call self%write_buffers()
+    call self%flush_buffers()
     if (broken .or. any(self%track%appended() /= self%track%capacity)) &
       call self%rebuild(self%track%appended(), sim, merge(dropped, kept, broken))
     call describe_end(self%file, self%input%settings%run%threads, self%spent + cost(1), cost(2:), note)
@@ -424,8 +420,8 @@ contains
   subroutine release(self)
     class(output_t), intent(inout) :: self
 
-    if (allocated(self%track)) call self%write_buffers()
-    call self%file%close()
+    if (allocated(self%track)) call self%flush_buffers()
+    if (allocated(self%file)) call self%file%close()
     call self%lock%release()
   end subroutine release
 

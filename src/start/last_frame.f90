@@ -78,7 +78,7 @@ contains
         call series%find(file)
         if (frames(1) < 1 .or. frames(1) > series%capacity) call file%check(-1, "be read: "//frame_counter//" is " &
           //written(frames(1)))
-        call series%read(file, frames(1), values)
+        call series%load(file, frames(1), values)
       end if
       disks%table(first:last, :) = values(:, disks%rows)
     end subroutine read_rows
