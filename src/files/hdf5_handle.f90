@@ -187,15 +187,18 @@ contains
     if (status >= 0) self%unsaved = 0
   end subroutine flush_file
 
-  !> Closes the file if it is open; its failure, if any, can still be reported.
+  !> Closes the file if it is open, and frees its properties, which it has even if it could not be opened; its failure, if
+  !> any, can still be reported.
   subroutine close_file(self)
     class(hdf5_handle_t), intent(inout) :: self
     integer :: status
 
+    if (self%links >= 0) call h5pclose_f(self%links, status)
+    if (self%storage >= 0) call h5pclose_f(self%storage, status)
+    self%links = -1
+    self%storage = -1
     if (self%id < 0) return
     call self%flush()
-    call h5pclose_f(self%links, status)
-    call h5pclose_f(self%storage, status)
     call h5fclose_f(self%id, status)
     call self%check(status, "be closed")
     self%id = -1
