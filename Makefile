@@ -230,6 +230,7 @@ test:  ## sets up, then unit tests and whole runs (four minutes)
 	@$(MAKE) $(jobs) $(unit_build) $(BUILD)/tests/unit_tests $(BUILD)/tests/four_disks
 	@$(MAKE) $(jobs) checked all
 	@$(MAKE) library
+	@$(MAKE) $(unit_build) library
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto --dist worksteal tests
 
 .PHONY: checked

@@ -211,14 +211,17 @@ contains
           if (.not. value%is_set() .or. value%name == "relative_to") cycle
           if (.not. (value%given .or. (relative .and. any(value%name == ["mass  ", "radius"])))) cycle
           call growing%add("  "//trim(value%name)//" = ")
-          if (allocated(value%reals)) call growing%add(written_exactly(value%reals(1)))
-          do i = 2, merge(size(value%reals), 0, allocated(value%reals))
-            call growing%add(", "//written_exactly(value%reals(i)))
-          end do
-          do i = 1, merge(size(value%texts), 0, allocated(value%texts))
-            if (i > 1) call growing%add(", ")
-            call growing%add(word(value%kind, value%texts(i)))
-          end do
+          if (allocated(value%reals)) then
+            do i = 1, size(value%reals)
+              if (i > 1) call growing%add(", ")
+              call growing%add(written_exactly(value%reals(i)))
+            end do
+          else
+            do i = 1, size(value%texts)
+              if (i > 1) call growing%add(", ")
+              call growing%add(word(value%kind, value%texts(i)))
+            end do
+          end if
           call growing%add(eol)
         end associate
       end do
