@@ -1,7 +1,9 @@
 !> The engine for other programs, in C: `ricochet.h` is the contract, and says what each function does. A handle is a
 !> simulation at work. Nothing here prints, ends the process, or is shared by two handles.
 module library
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
+    c_null_char, c_null_ptr, c_ptr
   use changes, only: change_system, change_velocities
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
@@ -54,7 +56,7 @@ contains
 
     allocate (session)
     call lines_of(text_of(overrides), lines)
-    call input_from_text(text_of(text), "input", lines, session%input, error)
+    call input_from_text(text_of(text), "input", lines, session%input, error, stepped=.true.)
     if (.not. allocated(error)) call new_simulation(session%input, silent, session%sim, error)
     handle = begin(session, threads, error)
     code = answer(error, message, room)
@@ -89,6 +91,7 @@ contains
     type(c_ptr), value :: handle
     type(session_t), pointer :: session
 
+    if (.not. c_associated(handle)) return
     session => session_of(handle)
     deallocate (session)
   end subroutine close_simulation
@@ -109,6 +112,11 @@ contains
 
     session => session_of(handle)
     rule = session%rule
+    if (ieee_is_nan(time)) then
+      call fail(error, exit_usage, "time: nan is not a time")
+      code = answer(error, message, room)
+      return
+    end if
     if (time < never .or. min(collisions, events) < huge(events)) then
       rule = stop_rule_t()
       rule%limits%time = min(time, never)
@@ -120,7 +128,7 @@ contains
     code = going_on
     do while (.not. rule%is_over(session%sim, session%evolution))
       looked = seconds()
-      if (looked - began > patience) return
+      if (.not. looked - began <= patience) return
       limits = rule%limits
       limits%turns = session%turns
       call advance_once(session%evolution, session%sim, limits, error)
@@ -163,7 +171,8 @@ contains
         list = list//written_exactly(session%sim%time())//" "//line//eol
       end associate
     end do
-    if (.not. allocated(error)) call input_from_text(text, session%input%path, [session%input%overrides, lines], input, error)
+    if (.not. allocated(error)) call input_from_text(text, session%input%path, [session%input%overrides, lines], input, error, &
+      stepped=.true.)
     if (.not. allocated(error)) then
       changed = session%sim
       call change_system(changed, input%settings%system_t, problem)
@@ -186,6 +195,11 @@ contains
 
     session => session_of(handle)
     changed = session%sim
+    if (.not. all(ieee_is_finite(values(:2*changed%n_disks())))) then
+      call fail(error, exit_usage, "velocity: has values that are no numbers")
+      code = answer(error, message, room)
+      return
+    end if
     call change_velocities(changed, reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())]))
     call renew(session, changed, input_of(session%input%groups), &
       changes_of(session)//written_exactly(changed%time())//" velocity"//eol, error)
@@ -215,7 +229,7 @@ contains
     call problems%report(session%input%path, none, error)
     if (allocated(error)) return
     session%sim = sim
-    call input_from_text(text, session%input%path, none, input, error)
+    call input_from_text(text, session%input%path, none, input, error, stepped=.true.)
     input%settings%run%threads = session%input%settings%run%threads
     input%changes = changes
     session%input = input
@@ -359,7 +373,7 @@ contains
     ahead = session%sim
     allocate (evolution, source=session%evolution)
     call evolution%start(ahead)
-    log%most = most
+    log%most = max(most, 0)
     looked = 0
     do while (log%n < most .and. looked < longest_look + 100_int64*most)
       limits%turns = 1000
@@ -367,7 +381,7 @@ contains
       if (allocated(error) .or. evolution%idle) exit
       looked = looked + max(limits%turns - evolution%turns_left, int(ahead%n_disks(), int64))
     end do
-    n = min(log%n, most)
+    n = min(log%n, log%most)
     if (n > 0) records(:, :n) = log%record(:, :n)
   end function next_events
 
@@ -400,6 +414,7 @@ contains
     integer(c_int), intent(in) :: room                !! with the end mark [bytes]
     integer :: k
 
+    if (room < 1) return
     do k = 1, min(len(text), room - 1)
       buffer(k) = text(k:k)
     end do

@@ -9,7 +9,7 @@ module library_files
   use initial_state, only: describe_system
   use library, only: answer, begin, session_of, session_t, text_of
   use output, only: output_t
-  use run_files, only: output_of, source_of
+  use run_files, only: check_name, output_of, source_of
   use run_setup, only: input_from_text, new_simulation
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
@@ -35,7 +35,9 @@ contains
     type(error_t), allocatable :: error
 
     session => session_of(handle)
-    call input_from_text(session%input%text, session%input%path, session%input%overrides, input, error)
+    call check_name(text_of(path), error)
+    if (.not. allocated(error)) call input_from_text(session%input%text, session%input%path, session%input%overrides, input, &
+      error, stepped=.true.)
     if (.not. allocated(error)) call new_simulation(input, silent, first, error)
     first%changes = session%sim%changes               ! which makes work an observable
     if (first%changes > 0) input%changes = session%input%changes
@@ -72,7 +74,7 @@ contains
     call file%close()
     call file%report(error)
     call lines_of(overrides, lines)
-    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines, session%input, error)
+    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines, session%input, error, stepped=.true.)
     if (.not. allocated(error)) then
       call describe_system(session%input%settings, session%sim)
       call read_checkpoint(output, session%input, session%sim, progress, finished, error)

@@ -3,6 +3,7 @@
    A handle is a simulation at work. Any number may be open; each belongs to one thread at a time. No function prints,
    ends the process (but for memory that the system refuses), or handles signals. A message is the program's own, of up
    to `room` bytes with the zero at its end; a code is 0 or the program's exit code: 2 bad input, 3 files, 4 broken off.
+   A count or a room below 0 counts as 0.
    Lengths, times and energies are in the units of the input. Disks are in the order of the input.
 
    libricochet.so needs no HDF5. libricochet_files.so has the same functions, its ricochet_open accepts species that start
@@ -13,14 +14,17 @@
 
 typedef struct ricochet ricochet;
 
-/* A simulation at its start: the text of an input file, and overrides GROUP.VARIABLE=VALUE, a line for each. `threads`: 0
-   takes what the input says, or one. NULL after a failure. */
+/* A simulation at its start: the text of an input file, which needs no &stop, and overrides GROUP.VARIABLE=VALUE, a line for
+   each. `threads`: 0 takes what the input says, or one. NULL after a failure. */
 ricochet *ricochet_open(const char *text, const char *overrides, int threads, char *message, int room, int *code);
+
+/* Frees a simulation; NULL is allowed. */
 void ricochet_close(ricochet *);
 
 /* Goes on until the first of these values is reached, counted from the start of the run: those not wanted are INFINITY
-   and INT64_MAX, and without any the stop rule of the input counts. After `patience` seconds it returns 1: call it again.
-   In what parts a simulation advances leaves no trace in it. After a code above 1 it cannot go on. */
+   and INT64_MAX, and without any the stop rule of the input counts, if it has one. After `patience` seconds it returns 1: call
+   it again. In what parts a simulation advances leaves no trace in it. A time that is NAN is refused with 2; after another
+   code above 1 it cannot go on. */
 int ricochet_advance(ricochet *, double time, int64_t collisions, int64_t events, double patience, char *message, int room);
 
 double ricochet_time(ricochet *);

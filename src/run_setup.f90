@@ -44,13 +44,14 @@ contains
   end subroutine read_input
 
   !> The same for a text; `path` only names it in messages. All problems become one error.
-  subroutine input_from_text(text, path, overrides, input, error, printed)
+  subroutine input_from_text(text, path, overrides, input, error, printed, stepped)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: path
     type(text_t), intent(in) :: overrides(:)
     type(run_input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: printed
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
     type(problem_list_t) :: problems
     logical :: complete
 
@@ -61,7 +62,7 @@ contains
     if (present(printed)) call print_text(groups_text(input%groups), error)
     if (allocated(error)) return
     if (complete) then                                    ! else what would be missing is there, in parts that were skipped
-      call resolve_settings(input%groups, input%settings, problems)
+      call resolve_settings(input%groups, input%settings, problems, stepped)
       call fit_together(input%settings, input%groups, problems)
     end if
     call problems%report(path, overrides, error)

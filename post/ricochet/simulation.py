@@ -16,6 +16,7 @@ import os
 import sys
 import threading
 import weakref
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
@@ -27,8 +28,6 @@ from .nature import Nature, nature_of
 from .program import ProgramError, named, settings_of, unseen, whole_threads
 
 ROOM = 100_000  # bytes for a message
-ENDLESS = "stop.time=1e100"
-NO_STOP = "stop: no rule ends the run"
 PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
@@ -77,20 +76,9 @@ class Simulation:
 
     def _begin(self, text: str, settings: list[str], threads: int | None = None) -> None:
         """With overrides GROUP.VARIABLE=VALUE."""
-        words = text.encode(), "\n".join(settings).encode()
-        for word in words:
-            if b"\0" in word:
-                raise ValueError("an input has no zero bytes")
+        words = c_text(text), c_text("\n".join(settings))
         engine = library(files=b".h5" in b"".join(words))
-        try:
-            handle = opened(engine.ricochet_open, *words, whole_threads(threads))
-        except ProgramError as problem:
-            if NO_STOP not in problem.message:
-                raise
-            settings = [*settings, ENDLESS]  # who steps it knows when to stop
-            words = words[0], "\n".join(settings).encode()
-            handle = opened(engine.ricochet_open, *words, whole_threads(threads))
-        self._take(handle)
+        self._take(opened(engine.ricochet_open, *words, whole_threads(threads)))
 
     def _take(self, handle: int) -> None:
         self._handle, self._lock = handle, threading.RLock()
@@ -102,21 +90,24 @@ class Simulation:
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
         """The simulation of the last checkpoint of a run, finished or not."""
         self = cls.__new__(cls)
-        where = os.fsencode(Path(path))
-        self._take(opened(library(files=True).ricochet_load, where, whole_threads(threads)))
+        load = library(files=True).ricochet_load
+        self._take(opened(load, c_text(Path(path)), whole_threads(threads)))
         return self
 
     def save(self, path: str | Path, force: bool = False, input: str | Path | None = None) -> Path:
         """Write `path`.part, from which `ricochet INPUT -o path --resume` goes on; its path.
 
         It has the samples of the start, and the state of now.  After a change INPUT is another than
-        that of the start: the file `input`, which this writes, too.
+        that of the start: the file `input`, which this writes, too.  That is a new file, or one
+        that `save` has written and nobody has edited since.
         """
         path = Path(path)
-        with self._open() as handle:
-            called(library(files=True).ricochet_save, handle, os.fsencode(path), int(force))
         if input is not None:
-            Path(input).write_text(self.input, encoding="utf-8", errors="surrogateescape")
+            check_input_place(Path(input), path)
+        with self._open() as handle:
+            called(library(files=True).ricochet_save, handle, c_text(path), int(force))
+        if input is not None:
+            write_input(Path(input), self.input)
         return path.with_name(f"{path.name}.part")
 
     def close(self) -> None:
@@ -187,8 +178,8 @@ class Simulation:
         return self
 
     def _endless(self) -> bool:
-        """Whether the input has no rule that stops it."""
-        return self.parameters["stop"] == {"time": 1e100}
+        """Whether the input has no rule that stops it, wall clock aside."""
+        return self.parameters.get("stop", {}).keys() <= {"wall_clock"}
 
     def _go_on(self, limits: tuple[float, int, int], patience: float) -> bool:
         """Towards these limits for some seconds; whether they are still ahead."""
@@ -217,7 +208,7 @@ class Simulation:
 
     def _change(self, settings: list[str]) -> Self:
         with self._open() as handle:
-            called(library().ricochet_change, handle, "\n".join(settings).encode())
+            called(library().ricochet_change, handle, c_text("\n".join(settings)))
         return self
 
     def _text(self, what: str) -> str:
@@ -398,6 +389,46 @@ class Held:
 # --- the library ---
 
 
+def head_of(text: str) -> str:
+    """The first line of an input that `save` writes: it says what the rest was."""
+    crc = zlib.crc32(text.encode(errors="surrogateescape"))
+    return f"! Saved by ricochet.Simulation, which may replace it unless it is edited: {crc:08x}\n"
+
+
+def check_input_place(path: Path, output: Path) -> None:
+    """Refuse a place where `save` would write its input over something else."""
+    c_text(path)
+    try:
+        if path.parent.resolve() == output.parent.resolve() and path.name in [
+            output.name + end for end in ("", ".part", ".part_new", ".lock")
+        ]:
+            raise ProgramError(f"{path}: is a file of the output; choose another for the input", 3)
+        if not path.parent.is_dir():
+            raise ProgramError(f"{path}: there is no folder {path.parent}", 3)
+        if not os.path.lexists(path):
+            return
+        if path.is_file() and not path.is_symlink():
+            text = path.read_text(encoding="utf-8", errors="surrogateescape")
+            head, end, rest = text.partition("\n")
+            if head + end == head_of(rest):
+                return
+    except OSError as error:
+        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
+    raise ProgramError(
+        f"{path}: exists already, and save has not written it; choose another file for the input", 3
+    )
+
+
+def write_input(path: Path, text: str) -> None:
+    """Write an input, in place of one that `save` has written; never through a link."""
+    try:
+        path.unlink(missing_ok=True)
+        with path.open("x", encoding="utf-8", errors="surrogateescape") as file:
+            file.write(head_of(text) + text)
+    except OSError as error:
+        raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
+
+
 def read_input(system: str | Path | Mapping) -> str:
     """The text of an input, of whatever kind."""
     if (text := unseen(system)) is not None:
@@ -406,6 +437,14 @@ def read_input(system: str | Path | Mapping) -> str:
         return Path(system).read_text(encoding="utf-8", errors="surrogateescape")
     except OSError as error:
         raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
+
+
+def c_text(text: str | Path) -> bytes:
+    """A text or a path for the library, for which a zero byte is the end."""
+    words = os.fsencode(text) if isinstance(text, Path) else text.encode(errors="surrogateescape")
+    if b"\0" in words:
+        raise ValueError(f"{text!r} has a zero byte")
+    return words
 
 
 def opened(make, *arguments: object) -> int:

@@ -1,12 +1,13 @@
 !> The files of a run, all named after its output OUT.h5, and what of it may be replaced or removed: only what a run
 !> has written, and of that nothing that somebody may still want.
 module run_files
-  use errors, only: error_t, exit_files, fail
+  use errors, only: error_t, exit_files, exit_usage, fail
   use kinds, only: int64
   use system, only: identity_of, last_problem, move_file, read_bytes, synchronize, what_is
+  use texts, only: shown
   implicit none
   private
-  public :: output_of, is_file, source_of, check_places, check_replaced, take_final_name
+  public :: output_of, is_file, source_of, check_name, check_places, check_replaced, take_final_name
 
   ! What the name of a file ends with.
   character(len=*), parameter, public :: &
@@ -47,6 +48,15 @@ contains
     path = output
     if (is_file(output//unfinished)) path = output//unfinished
   end function source_of
+
+  !> Refuses an output that would have the name of another file of a run.
+  pure subroutine check_name(output, error)
+    character(len=*), intent(in) :: output        !! path of the output
+    type(error_t), allocatable, intent(out) :: error
+
+    if (output_of(output) /= "") call fail(error, exit_usage, "the output "//shown(output)//" would have a name that is kept " &
+      //"for files of the run with the output "//shown(output_of(output))//"; choose another name")
+  end subroutine check_name
 
   !> Fails if something that no run has written stands where the run is to write.
   subroutine check_places(output, error)

@@ -4,7 +4,7 @@ module command_line
   use build_info, only: build_flags, git_commit
   use errors, only: error_t, exit_usage, fail
   use hdf5_handle, only: hdf5_version
-  use run_files, only: output_of
+  use run_files, only: check_name
   use system, only: print_text
   use texts, only: eol, nearest_word, shown, text_t
   use version, only: program_version
@@ -82,8 +82,7 @@ contains
     if (command%input == "") call refuse("no input file is given; usage: ricochet INPUT.nml, see --help")
     if (command%resume .and. command%force) call refuse("--resume goes on with a run, --force starts it over; give one of them")
     if (command%output == "") command%output = default_output(command%input)
-    if (output_of(command%output) /= "") call refuse("the output "//shown(command%output)//" would have a name that is kept for " &
-      //"files of the run with the output "//shown(output_of(command%output))//"; choose another with -o")
+    if (.not. allocated(error)) call check_name(command%output, error)
 
   contains
 

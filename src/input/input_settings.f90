@@ -23,13 +23,17 @@ contains
 
   !> Fills the settings. Values that follow from others are also put back into the groups, so that these hold every
   !> value as it is used.
-  subroutine resolve_settings(groups, settings, problems)
+  subroutine resolve_settings(groups, settings, problems, stepped)
     type(group_t), intent(inout) :: groups(:)             !! those of one name side by side
     type(settings_t), intent(out) :: settings
     type(problem_list_t), intent(inout) :: problems
+    logical, intent(in), optional :: stepped              !! the caller decides when the run ends, and `&stop` may be empty
+    logical :: must_end
     type(wall_law_t) :: wall_law                          ! of `&contact`
     integer :: o(2), s(2), w(2), k
 
+    must_end = .true.
+    if (present(stepped)) must_end = .not. stepped
     o = range_of(groups, obstacle_groups)
     w = range_of(groups, ["side"])
     s = range_of(groups, ["species"])
@@ -55,7 +59,7 @@ contains
       with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor &
         .or. with%helfand
     end associate
-    call check_conflicts(settings, groups, problems)
+    call check_conflicts(settings, groups, must_end, problems)
 
   contains
 
@@ -153,7 +157,7 @@ contains
       end associate
     end subroutine take_drive
 
-    !> What ends the run; at least one rule is needed.
+    !> The rules that end the run.
     subroutine take_stop(group)
       type(group_t), intent(in) :: group
 
@@ -164,8 +168,8 @@ contains
         rule%events = group%integer_of("events", unlimited)
         rule%energy_fraction = group%real_of("energy_fraction", 0.0_real64)
         rule%wall_clock = group%real_of("wall_clock", never)
-        if (.not. any(group%values%given)) call problems%add(group%line, "stop", "no rule ends the run; give at least " &
-          //"one of "//joined(variables_of("stop"), ", "))
+        if (must_end .and. .not. any(group%values%given)) call problems%add(group%line, "stop", &
+          "no rule ends the run; give at least one of "//joined(variables_of("stop"), ", "))
       end associate
     end subroutine take_stop
 
@@ -211,9 +215,10 @@ contains
 
   !> The table of what cannot be together in an input, across its groups, and of intervals that are too short. What excludes
   !> each other within a group is in the table of variables.
-  subroutine check_conflicts(settings, groups, problems)
+  subroutine check_conflicts(settings, groups, must_end, problems)
     type(settings_t), intent(in) :: settings
     type(group_t), intent(in) :: groups(:)
+    logical, intent(in) :: must_end                       !! by a rule of the input
     type(problem_list_t), intent(inout) :: problems
     character(len=*), parameter :: other_rule = "; give another rule", energy = "stop.energy_fraction"
     logical :: shear, timed, counted, by_energy, single, alone
@@ -221,7 +226,7 @@ contains
     associate (box => settings%box, law => settings%law, rule => settings%stop, kicks => settings%drive%is_on())
       shear = box%is_sheared()
       by_energy = rule%energy_fraction > 0
-      timed = min(rule%time, rule%wall_clock) < never
+      timed = min(rule%time, rule%wall_clock) < never .or. .not. must_end
       counted = rule%collisions < unlimited .or. rule%collisions_per_disk < never
       single = settings%n_disks() == 1
       alone = single .and. all(box%periodic) .and. .not. box%has_obstacles()

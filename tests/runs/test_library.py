@@ -5,6 +5,7 @@ That slices of time, a save and a load leave no trace in any random system is on
 """
 
 import copy
+import ctypes
 import gc
 import os
 import re
@@ -15,6 +16,7 @@ import threading
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -160,6 +162,12 @@ def kept(system) -> Simulation:
         (lambda _: Simulation("&box /\0"), ValueError, "zero"),
         (lambda _: Simulation.load("no.h5"), ProgramError, "no.h5"),
         (lambda _: Simulation.load("/dev/null"), ProgramError, "/dev/null"),
+        (lambda _: Simulation.load("a\0.h5"), ValueError, "zero"),
+        (lambda gas: gas.save("a\0.h5"), ValueError, "zero"),
+        (lambda gas: gas.save("a.h5", input="b\0.nml"), ValueError, "zero"),
+        (lambda gas: gas.change({"box.gravity": "0, -2\0\nrun.seed=1"}), ValueError, "zero"),
+        (lambda gas: gas.save("x.h5.part"), ProgramError, "name that is kept"),
+        (lambda _: Simulation("&species count = 1 radius = .1 /").advance(), ValueError, "&stop"),
     ],
 )
 def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch):
@@ -230,6 +238,115 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
     assert whole.nature == gas.nature
     assert Simulation.load("gas.h5").changes == gas.changes
     assert [name for _, name, _ in gas.changes][-2:] == ["contact.restitution", "velocity"]
+
+
+def test_numbers_that_c_may_give_are_refused_or_count_as_none():
+    """As the header says; Python itself does not give them."""
+    engine, gas, room = library(), Simulation(GAS), 200
+    message = ctypes.create_string_buffer(room)
+    with gas._open() as handle:
+        for bad in (np.nan, np.inf, -np.inf):
+            velocity = gas.velocity
+            velocity[7, 1] = bad
+            code = engine.ricochet_set_velocities(handle, velocity.ctypes.data, message, room)
+            assert code == 2 and b"velocity" in message.value
+        assert engine.ricochet_advance(handle, np.nan, 9, 9, 1.0, message, room) == 2
+        assert b"time" in message.value
+        for room in (0, -5):
+            message.raw = b"#" * 200
+            assert engine.ricochet_advance(handle, np.nan, 9, 9, 1.0, message, room) == 2
+            assert message.raw == b"#" * 200
+        assert engine.ricochet_next_events(handle, -3, None) == 0
+    engine.ricochet_close(None)
+    assert gas.advance(events=9).events == 9 and np.isfinite(gas.velocity).all()
+
+
+def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
+    """Nothing at the place, no HDF5, HDF5 of others, a run of another program, a damaged one."""
+    places = [tmp_path / name for name in ("none.h5", "text.h5", "other.h5", "old.h5", "cut.h5")]
+    places[1].write_text("not HDF5")
+    with h5py.File(places[2], "w") as file:
+        file["x"] = 1.0
+    for path in places[3:]:
+        Simulation(GAS).save(path)
+    with h5py.File(f"{places[3]}.part", "r+") as file:
+        del file["checkpoint/program"]
+        file["checkpoint/program"] = np.bytes_("ricochet 0")
+    whole = Path(f"{places[4]}.part").read_bytes()
+    Path(f"{places[4]}.part").write_bytes(whole[: len(whole) // 2])
+    sizes = []
+    for _ in range(3):
+        for _ in range(300):
+            for path in places:
+                with pytest.raises(ProgramError):
+                    Simulation.load(path)
+        gc.collect()
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        sizes.append(pages * os.sysconf("SC_PAGE_SIZE"))
+    assert sizes[-1] - sizes[0] < 1e6
+
+
+@pytest.mark.parametrize(
+    "groups",
+    [
+        {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}},
+        {"drive": {"kind": "active", "interval": 1e-4, "temperature": 1, "speed": 2}},
+        {"output": {"frames_every_time": 0.1, "observables_every_time": 1e-3}},
+        {"output": {"frames_per_decade": 5, "frames_from": 1e-3, "observables_at": [0.1, 0.2]}},
+        {"run": {"dynamics": "steps", "dt": 1e-4}},
+        {"species": {"name": "a", "count": 1, "radius": 0.1, "speed": 1}}
+        | {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}}
+        | {"box": {"boundary": ("periodic", "periodic")}},
+    ],
+)
+def test_a_simulation_needs_no_stop(groups, program, tmp_path, monkeypatch):
+    """Whatever the schedule; the saved input has none either, and its run goes on with one."""
+    monkeypatch.chdir(tmp_path)
+    system = {"species": {"name": "a", "count": 20, "radius": 0.01, "speed": 1}} | groups
+    box = Simulation(system).advance(time=0.25)
+    assert box.time == 0.25 and "stop" not in box.input
+    box.save("box.h5", input="box.nml")
+    told = ran(program, "box.nml", "-o", "box.h5", "--resume")
+    assert told.returncode == 2 and "no rule ends the run" in told.stderr
+    ran(program, "box.nml", "-o", "box.h5", "--resume", "--set=stop.time=0.5", check=True)
+    there = Simulation({**system, "stop": {"time": 0.5}}).advance()
+    assert np.array_equal(read_run("box.h5").position[-1], there.position)
+    assert Simulation.load("box.h5").advance(time=0.6).time == 0.6
+
+
+def test_an_input_is_saved_over_nothing_but_a_saved_one(tmp_path, monkeypatch):
+    """And that is found out before anything is written."""
+    monkeypatch.chdir(tmp_path)
+    gas = Simulation(GAS)
+    Path("mine.nml").write_text("! my comments\n")
+    Path("link.nml").symlink_to("mine.nml")
+    Path("dangling.nml").symlink_to("none.nml")
+    Path("folder").mkdir()
+    places = ["mine.nml", "link.nml", "dangling.nml", "folder", "no/where.nml"]
+    files = ["gas.h5", "gas.h5.part", "gas.h5.part_new", "gas.h5.lock", "folder/../gas.h5.part"]
+    for place in [*places, *files]:
+        with pytest.raises(ProgramError, match=place.split("/")[0]) as caught:
+            gas.save("gas.h5", input=place)
+        assert caught.value.code == 3
+    assert {path.name for path in Path().iterdir()} == {*places[:4]}
+    assert Path("mine.nml").read_text() == "! my comments\n"
+    assert gas.save("gas.h5", input="new.nml") == Path("gas.h5.part")
+    gas.advance(events=50).change({"box.gravity": (0, 1)}).save("gas.h5", True, "new.nml")
+    assert Simulation("new.nml").input == gas.input
+    Path("new.nml").write_text(Path("new.nml").read_text() + "! edited\n")
+    with pytest.raises(ProgramError, match=r"new\.nml"):
+        gas.save("gas.h5", True, "new.nml")
+
+
+def test_the_library_has_no_fault_that_checks_would_find(program):
+    """All tests of this page, with the library that the compiler has made to check itself."""
+    checked = Path(program).parent / "tests"
+    if not (checked / "libricochet_files.so").is_file():
+        pytest.skip("`make test` builds it")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:randomly", __file__]
+    own = {**os.environ, "RICOCHET_LIBRARY": str(checked)}
+    ended = ran(*command, "-k", "not checks_would_find and not header", env=own)
+    assert ended.returncode == 0, ended.stdout[-3000:]
 
 
 def test_the_library_needs_no_hdf5_and_shows_its_functions_only():
