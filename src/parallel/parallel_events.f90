@@ -21,14 +21,13 @@ module parallel_events
   real(real64), parameter :: shortest = 0.1_real64             !! window to be tried, in usual ones
   !> Events per disk that are to come before a count is at its limit, for several domains to go on, or to begin.
   real(real64), parameter :: least_left = 0.25_real64, least_left_to_begin = 2.0_real64
-  integer(int64), parameter :: shortest_spell = 5, longest_spell = 5*2**20   !! of the plain engine [events per disk]
-  integer(int64), parameter :: shortest_rest = 50, longest_rest = 1600       !! the same while cores are busy
+  ! Shortest and longest spell of the plain engine [events per disk].
+  integer(int64), parameter :: moment(2) = 5                        !! to pass what domains cannot
+  integer(int64), parameter :: failing(2) = [5, 5*2**20]            !! while windows do not hold
+  integer(int64), parameter :: busy(2) = [50, 1600]                 !! while cores are busy
 
   !> Who has predicted the events.
   integer, parameter :: nobody = 0, plain_engine = 1, all_domains = 2
-  !> What became of a visit to the domains: the state has moved on; or it has not, and is tried again by shorter windows,
-  !> or left to the plain engine.
-  integer, parameter :: kept = 1, repeated = 2, left_alone = 3
 
   type, extends(evolution_t) :: parallel_events_t
     type(event_driven_t) :: plain                  !! an engine for all that is not worth more; it is copied to run
@@ -40,9 +39,7 @@ module parallel_events
     ! To save memory this engine is there only while there are no domains.
     type(event_driven_t), allocatable, private :: engine   !! the plain one at work
     integer, private :: holder = nobody            !! of the events predicted
-    integer, private :: patience = 1               !! windows of a visit: as many as a failure may throw away
-    integer(int64), private :: spell = shortest_spell  !! of the plain engine, the next time [events per disk]
-    integer(int64), private :: rest = shortest_rest    !! likewise
+    integer(int64), private :: spell = 0           !! of the plain engine, the last time [events per disk]
     integer(int64), private :: plain_until = -1    !! number of events up to which the plain engine goes on
   contains
     procedure :: start
@@ -101,13 +98,13 @@ contains
     type(limits_t), intent(in) :: limits
     type(error_t), allocatable, intent(out) :: error
     type(event_log_t), intent(inout), optional :: log
-    integer :: outcome
+    logical :: plainly                             ! the plain engine goes on
 
     self%arrived = .false.
     if (limits%reached(sim%tally) .or. is_full(log)) return
-    outcome = left_alone
-    if (worthwhile()) call visit()
-    if (outcome == left_alone) call advance_plainly()
+    plainly = .not. worthwhile()
+    if (.not. plainly) call visit()
+    if (plainly) call advance_plainly()
     if (self%parts%wanted > self%parts%threads .and. allocated(self%parts%domain) .and. &
       (sim%now >= sim%epoch_end .or. sim%tally%events >= most_events(sim))) then
       deallocate (self%parts%domain)               ! to leave room for sorting many
@@ -125,49 +122,88 @@ contains
         .and. limits%collisions - sim%tally%collisions > least .and. limits%time > sim%now
     end function worthwhile
 
-    !> Lets the domains move on by some windows of time.
+    !> Lets the domains move on by some windows of time. If one of them does not hold the state stays as it was, and shorter
+    !> windows are tried the next time.
     subroutine visit()
       real(real64) :: t
       integer :: windows, listed
-      logical :: good
+      logical :: good, too_far
 
-      outcome = left_alone
       listed = 0
       if (self%holder /= all_domains) then
         if (allocated(self%engine)) deallocate (self%engine)
         self%holder = nobody
         call self%parts%fill(sim, present(log), good)
-        if (.not. good) then
-          self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
-          return
-        end if
+        if (.not. good) call retire(moment)
+        if (.not. good) return
         self%holder = all_domains
       end if
-      call self%parts%run_windows(sim, limits, self%patience, t, windows, good)
+      call self%parts%run_windows(sim, limits, windows_of_visit(), t, windows, good)
       self%windows_done = self%windows_done + windows
       if (present(log)) then
         listed = log%n
         if (good) call merge_logs(self%parts%domain, sim%epoch, log, good)
       end if
-      call conclude(good)
-      if (good .and. (limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink)) then
-        ! the plain engine finds the very event, or a collapse
-        outcome = left_alone
-        self%plain_until = sim%tally%events + shortest_spell*sim%n_disks()
-      end if
-      if (outcome == kept) then
+      ! The plain engine finds the very event at which a count is at its limit, or a collapse.
+      too_far = good
+      if (good) too_far = limits%outgrown(self%parts%tally_now(sim)) .or. t - sim%last_advance < sim%blink
+      if (good .and. .not. too_far) then
         call self%parts%write_back_all(sim, t)
         self%arrived = t >= limits%time
-        if (self%parts%threads > 1) call heed_cores()
-        if (all(self%parts%domain%engine%idle)) then  ! the plain engine finds out whether the whole is
-          outcome = left_alone
-          self%plain_until = sim%tally%events + 1
-        end if
       else
         self%holder = nobody
         if (present(log)) log%n = listed
       end if
+      if (.not. good) call shorten_windows()
+      if (good) call lengthen_windows(windows)
+      if (too_far) call retire(moment)
+      if (self%holder == nobody) return
+      if (self%parts%threads > 1 .and. self%parts%cores <= self%least_cores) then
+        call retire(busy)
+        self%parts%cores = self%parts%threads
+      end if
+      ! The plain engine finds out whether nothing happens in the whole.
+      if (all(self%parts%domain%engine%idle)) call retire(moment)
     end subroutine visit
+
+    !> How many windows a failure may throw away: fewer the more there have been of late.
+    pure function windows_of_visit() result(n)
+      integer :: n
+
+      n = max(1, int(most_windows*self%parts%shortening**4))
+    end function windows_of_visit
+
+    !> Makes windows longer after a visit in which all held. Within a visit they stay as they are: windows that the next
+    !> failure throws away could otherwise make up for each halving, for ever.
+    subroutine lengthen_windows(windows)
+      integer, intent(in) :: windows               !! of the visit
+
+      associate (shortening => self%parts%shortening)
+        shortening = min(1.0_real64, 1.1_real64**windows*shortening)
+      end associate
+    end subroutine lengthen_windows
+
+    !> Makes windows shorter after one that did not hold. If that does not help the plain engine takes over.
+    subroutine shorten_windows()
+      self%windows_failed = self%windows_failed + 1
+      associate (shortening => self%parts%shortening)
+        shortening = 0.5_real64*shortening
+        if (shortening > shortest) return
+        shortening = shortest
+      end associate
+      call retire(failing)
+    end subroutine shorten_windows
+
+    !> Leaves the run to the plain engine for a spell: twice as long as the last one, unless domains have gone on for longer
+    !> than that since. So a run that does not suit domains costs hardly more than with the plain engine alone.
+    subroutine retire(spells)
+      integer(int64), intent(in) :: spells(2)      !! the shortest and the longest [events per disk]
+
+      if (sim%tally%events - self%plain_until > self%spell*sim%n_disks()) self%spell = 0
+      self%spell = min(max(2*self%spell, spells(1)), spells(2))
+      self%plain_until = sim%tally%events + self%spell*sim%n_disks()
+      plainly = .true.
+    end subroutine retire
 
     !> Lets the plain engine go on for a while: where domains are to be tried again, to the end of its spell.
     subroutine advance_plainly()
@@ -192,43 +228,6 @@ contains
       if (sim%tally%events - events >= sim%n_disks()) &
         call self%parts%learn(sim%tally%events - events, goal%turns - self%turns_left, sim%time() - time)
     end subroutine advance_plainly
-
-    !> What follows from windows that were good or not. A failure makes windows shorter and visits brief, so that it throws
-    !> away at most as much as was gained before. If shorter windows do not help the plain engine takes over, twice as long
-    !> each time: a simulation that does not suit domains costs hardly more than with the plain engine alone.
-    subroutine conclude(good)
-      logical, intent(in) :: good
-
-      associate (shortening => self%parts%shortening)
-        if (good) then
-          outcome = kept
-          ! Not before: windows that the next failure throws away could make up for each halving, for ever.
-          shortening = min(1.0_real64, 1.1_real64**self%patience*shortening)
-          if (self%patience == most_windows) self%spell = max(self%spell/2, shortest_spell)
-          self%patience = min(2*self%patience, most_windows)
-          return
-        end if
-        outcome = repeated
-        self%windows_failed = self%windows_failed + 1
-        self%patience = 1
-        shortening = 0.5_real64*shortening
-        if (shortening > shortest) return
-        outcome = left_alone
-        shortening = shortest
-        self%plain_until = sim%tally%events + self%spell*sim%n_disks()
-        self%spell = min(2*self%spell, longest_spell)
-      end associate
-    end subroutine conclude
-
-    !> Leaves the run to the plain engine, longer each time, while other programs want the cores, too, or threads wait for
-    !> each other most of the time: several that share a core are slower than one.
-    subroutine heed_cores()
-      if (sim%tally%events - self%plain_until > self%rest*sim%n_disks()) self%rest = shortest_rest
-      if (self%parts%cores > self%least_cores) return
-      self%plain_until = sim%tally%events + self%rest*sim%n_disks()
-      self%rest = min(2*self%rest, longest_rest)
-      self%parts%cores = self%parts%threads
-    end subroutine heed_cores
   end subroutine advance
 
 end module parallel_events
