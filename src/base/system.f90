@@ -11,7 +11,7 @@ module system
   public :: seconds, talks_to_terminal, end_program, host_name
   public :: move_file, remove_file, make_folders_of, synchronize
   public :: what_is, identity_of, is_folder, folder_of, opening_problem, free_bytes, last_problem, lock_t
-  public :: file_size, read_bytes, read_file, write_word
+  public :: file_size, largest_file, read_bytes, read_file, write_word
   public :: fill_standard_streams, print_text, cores_of_process
 
   !> What a path can name.
@@ -76,6 +76,12 @@ module system
       import :: c_int
       integer(c_int) :: n
     end function cores_of_process
+
+    !> The most that this process may write to a file (ulimit -f); huge without a limit. [bytes]
+    function largest_file() result(bytes) bind(C, name="system_largest_file")
+      import :: c_int64_t
+      integer(c_int64_t) :: bytes
+    end function largest_file
 
     subroutine c_describe_problem(text, size) bind(C, name="system_describe_problem")
       import :: c_char, c_size_t

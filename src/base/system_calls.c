@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -137,10 +138,24 @@ int system_print(const char *bytes)
     return 0;
 }
 
+/* A limit of the process, as `ulimit` shows and raises it; INT64_MAX if there is none. */
+static int64_t limit_of(int resource)
+{
+    struct rlimit limit;
+    if (getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return INT64_MAX;
+    return (int64_t)limit.rlim_cur;
+}
+
+int64_t system_largest_file(void) { return limit_of(RLIMIT_FSIZE); }
+
+/* The limit of open files is named, with the option of `ulimit` that raises it. */
 void system_describe_problem(char *text, size_t size)
 {
-    strncpy(text, strerror(errno), size - 1);
+    const int problem = errno;
+    strncpy(text, strerror(problem), size - 1);
     text[size - 1] = '\0';
+    if (problem == EMFILE)
+        snprintf(text, size, "%s: the limit is %lld (ulimit -n)", strerror(problem), (long long)limit_of(RLIMIT_NOFILE));
 }
 
 void system_name_host(char *text, size_t size)

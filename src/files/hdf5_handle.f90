@@ -5,7 +5,7 @@
 module hdf5_handle
   use, intrinsic :: iso_c_binding, only: c_int
   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5get_libversion_f, &
-    h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
+    h5fcreate_f, h5fopen_f, h5fflush_f, h5fclose_f, h5fget_filesize_f, h5pcreate_f, h5pclose_f, h5pset_alloc_time_f, &
     h5pset_create_inter_group_f, h5pset_file_locking_f, h5pset_fill_time_f, h5pset_obj_track_times_f, &
     h5pset_sieve_buf_size_f, h5pset_small_data_block_size_f, h5p_dataset_create_f, h5p_file_access_f, h5p_file_create_f, &
     h5p_link_create_f, h5d_alloc_time_early_f, h5d_fill_time_never_f, h5f_acc_excl_f, h5f_acc_rdonly_f, &
@@ -13,7 +13,7 @@ module hdf5_handle
     h5lcreate_hard_f
   use errors, only: error_t, exit_files, fail
   use kinds, only: int64
-  use system, only: free_bytes, last_problem, move_file, opening_problem, remove_file
+  use system, only: free_bytes, largest_file, last_problem, move_file, opening_problem, remove_file
   use texts, only: written
   implicit none
   private
@@ -25,6 +25,7 @@ module hdf5_handle
     character(len=:), allocatable :: path
     character(len=:), allocatable :: final_path   !! the path once it is complete, which messages name
     character(len=:), allocatable :: failure      !! what could not be done first, after "cannot "
+    logical, private :: has_reason = .false.      !! `failure` says why
     integer(hid_t) :: id = -1
     integer(hid_t) :: links = -1                  !! properties of links: they make the groups on their path
     integer(hid_t) :: storage = -1                !! properties of datasets: see `prepare`
@@ -54,18 +55,30 @@ module hdf5_handle
 contains
 
   !> Remembers what could not be done if `status` says so and it is the first time.
-  subroutine check(self, status, action, needed)
+  subroutine check(self, status, action, reason, needed)
     class(hdf5_handle_t), intent(inout) :: self
     integer, intent(in) :: status                 !! of an HDF5 call; negative: it failed
     character(len=*), intent(in) :: action        !! what it was to do, in words that follow "cannot "
+    character(len=*), intent(in), optional :: reason    !! if it is known
     integer(int64), intent(in), optional :: needed      !! for it, if not what is unsaved [bytes]
+    integer(hsize_t) :: bytes                     ! of the file, with all room that it has been promised
+    integer :: known
 
     if (status >= 0 .or. allocated(self%failure)) return
     self%failure = action
     if (present(needed)) self%unsaved = needed
+    if (present(reason)) then
+      self%failure = action//": "//reason
+      self%has_reason = .true.
+    else if (self%id >= 0 .and. self%unsaved > 0) then
+      call h5fget_filesize_f(self%id, bytes, known)
+      if (known < 0 .or. max(bytes, self%unsaved) <= largest_file()) return
+      self%failure = action//": files may have at most "//written(largest_file())//" bytes (ulimit -f)"
+      self%has_reason = .true.
+    end if
   end subroutine check
 
-  !> The failure, if there was one, as an error: the file, what could not be done, the space on its disk.
+  !> The failure, if there was one, as an error: the file, what could not be done, and why, or the space on its disk.
   subroutine report(self, error)
     class(hdf5_handle_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -75,6 +88,7 @@ contains
     call fail(error, exit_files, self%final_path//": cannot "//self%failure)
     free = free_bytes(self%path)
     if (self%unsaved <= 0 .or. free == huge(free)) return
+    if (self%has_reason .and. free >= self%unsaved) return
     error%message = error%message//": "//written(self%unsaved)//" bytes needed, "//written(free)//" bytes free"
   end subroutine report
 
@@ -140,7 +154,7 @@ contains
     call prepare(self, access, status)
     if (status >= 0) call h5pcreate_f(h5p_file_create_f, creation, status)
     if (status >= 0) call h5fcreate_f(path, h5f_acc_excl_f, self%id, status, creation, access)
-    call self%check(status, "be created: "//last_problem())
+    call self%check(status, "be created", last_problem())
     call h5pclose_f(creation, closed)
     call h5pclose_f(access, closed)
   end subroutine create
@@ -161,7 +175,7 @@ contains
     if (reason /= "") status = -1
     if (reason == "") reason = "it is damaged, or not an HDF5 file"
     if (status >= 0) call h5fopen_f(path, merge(h5f_acc_rdwr_f, h5f_acc_rdonly_f, writable), self%id, status, access)
-    call self%check(status, "be "//trim(merge("written", "read   ", writable))//": "//reason)
+    call self%check(status, "be "//trim(merge("written", "read   ", writable)), reason)
     call h5pclose_f(access, closed)
   end subroutine open_file
 
@@ -172,7 +186,7 @@ contains
 
     if (allocated(self%failure)) return
     call move_file(self%path, self%final_path, moved)
-    if (.not. moved) call self%check(-1, "be renamed: "//last_problem())
+    if (.not. moved) call self%check(-1, "be renamed", last_problem())
     if (moved) self%path = self%final_path
   end subroutine rename_file
 

@@ -23,7 +23,7 @@ module output
   use signals, only: record_signals
   use simulation_state, only: simulation_t
   use stop_rules, only: stop_rule_t
-  use system, only: free_bytes, identity_of, is_folder, last_problem, lock_t, make_folders_of, remove_file, seconds
+  use system, only: free_bytes, identity_of, is_folder, largest_file, last_problem, lock_t, make_folders_of, remove_file, seconds
   use texts, only: written
   implicit none
   private
@@ -103,8 +103,13 @@ contains
     self%progress = progress_t(input%settings)
     call self%plan(input, sim)
     planned = planned_bytes(input, sim)
-    if (planned > free_bytes(self%path)) call fail(error, exit_files, self%path//": the output will have "//written(planned) &
-      //" bytes, "//written(free_bytes(self%path))//" are free; choose fewer frames or make room")
+    if (planned > largest_file()) then
+      call fail(error, exit_files, self%path//": the output will have "//written(planned)//" bytes, and files may have at most " &
+        //written(largest_file())//" (ulimit -f); choose fewer frames or raise the limit")
+    else if (planned > free_bytes(self%path)) then
+      call fail(error, exit_files, self%path//": the output will have "//written(planned)//" bytes, " &
+        //written(free_bytes(self%path))//" are free; choose fewer frames or make room")
+    end if
     if (allocated(error)) return
     call remove_file(self%path//unfinished)
     call self%create_file(self%file, sim)
@@ -323,7 +328,8 @@ contains
 
     call self%flush_buffers()
     needed = sum(self%track%appended()*self%track%room())
-    if (needed > free_bytes(self%path)) call self%file%check(-1, "be copied to a file of the right size", needed)
+    if (needed > free_bytes(self%path)) call self%file%check(-1, "be copied to a file of the right size", &
+      needed=needed)
     if (allocated(self%file%failure)) return
     allocate (new)
     call self%create_file(new, sim)

@@ -396,8 +396,19 @@ def test_a_limit_on_the_size_of_files_is_a_full_disk(program, tmp_path):
     write_input(tmp_path, BUSY)
     limited = 'ulimit -f 3000; exec "$0" gas.nml -o gas.h5'
     run = ran("bash", "-c", limited, program, cwd=tmp_path)
-    assert run.returncode == FILES and "gas.h5.part" in one_line(run)
+    assert run.returncode == FILES and "(ulimit -f)" in one_line(run)
     assert [path.name for path in tmp_path.iterdir()] == ["gas.nml"]
+
+
+@pytest.mark.parametrize(("limit", "left"), [("f 2000", []), ("n 4", []), ("n 5", ["gas.h5.part"])])
+def test_a_limit_of_the_process_is_named(program, tmp_path, limit, left):
+    """Not the room on the disk: the event log is too large, or the end needs a second file."""
+    write_input(tmp_path, LOGGED)
+    command = f'ulimit -{limit}; exec "$0" gas.nml -o gas.h5'
+    run = ran("bash", "-c", command, program, cwd=tmp_path)
+    assert run.returncode == FILES and "ulimit -" + limit[0] in one_line(run)
+    assert "bytes free" not in run.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == [*left, "gas.nml"]
 
 
 def test_a_disk_for_reading_only_is_left_as_it_is(ricochet, tmp_path, small_disk):
