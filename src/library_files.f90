@@ -2,9 +2,8 @@
 module library_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_ptr
   use cadence, only: progress_t
-  use checkpoint, only: read_checkpoint
+  use checkpoint, only: read_checkpoint, recall_input
   use errors, only: error_t
-  use h5md_layout, only: changes_at_work, parameters_group
   use hdf5_objects, only: hdf5_file_t
   use initial_state, only: describe_system
   use library, only: answer, begin, session_of, session_t, text_of
@@ -68,13 +67,12 @@ contains
     output = output_of(text_of(path))
     if (output == "") output = text_of(path)
     call file%open(source_of(output), writable=.false.)
-    call file%fetch_text(parameters_group//"input", text)
-    call file%fetch_text(parameters_group//"overrides", overrides)
-    if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, list)
+    call recall_input(file, text, overrides, list, error)
     call file%close()
-    call file%report(error)
-    call lines_of(overrides, lines)
-    if (.not. allocated(error)) call input_from_text(text, source_of(output), lines, session%input, error, stepped=.true.)
+    if (.not. allocated(error)) then
+      call lines_of(overrides, lines)
+      call input_from_text(text, source_of(output), lines, session%input, error, stepped=.true.)
+    end if
     if (.not. allocated(error)) then
       call describe_system(session%input%settings, session%sim)
       call read_checkpoint(output, session%input, session%sim, progress, finished, error)

@@ -12,7 +12,7 @@ module checkpoint
   use disks, only: mass_column, n_columns
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
-  use h5md_layout, only: checkpoint_group, parameters_group
+  use h5md_layout, only: changes_at_work, checkpoint_group, parameters_group
   use hdf5_objects, only: hdf5_file_t, scalar
   use hdf5_series, only: long_integer, series_t
   use input_groups, only: group_t, most_written
@@ -28,12 +28,13 @@ module checkpoint
   implicit none
   private
   public :: checkpoint_bytes, copy_checkpoints, has_both_checkpoints, has_broken_off, make_checkpoints, mark_as_broken
-  public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides
+  public :: put_checkpoint, put_last_checkpoint, read_checkpoint, recall_overrides, recall_input
 
-  integer, parameter :: layout = 9                !! of the checkpoints; another one is not understood
+  integer, parameter :: layout = 10               !! of the checkpoints; another one is not understood
   character(len=*), parameter :: slots(2) = checkpoint_group//["1", "2"]
   character(len=*), parameter :: current = checkpoint_group//"current"     !! the number of that which counts, or:
   integer, parameter :: none = 0
+  character(len=*), parameter :: described = checkpoint_group//"input_checksum"
 
   !> A second name of the first. HDF5 writes over the name that was made last when it is taken away, one call before it
   !> strikes it off the list: a kill between would leave a file that h5dump cannot list.
@@ -102,6 +103,37 @@ contains
     overrides = [overrides, given]
   end subroutine recall_overrides
 
+  !> The texts of the input that a file describes: checked, and of this program.
+  subroutine recall_input(file, text, overrides, changes, error)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=:), allocatable, intent(out) :: text, overrides
+    character(len=:), allocatable, intent(out) :: changes         !! made while it ran; not allocated: none
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: there
+
+    call check_program(file, error)
+    if (allocated(error)) return
+    call file%fetch_text(parameters_group//"input", text)
+    call file%fetch_text(parameters_group//"overrides", overrides)
+    if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, changes)
+    call file%fetch_text(described, there)
+    if (there /= description_checksum(file)) call file%check(-1, "be read", "its input is damaged")
+    call file%report(error)
+  end subroutine recall_input
+
+  !> Checksum of the texts of an input that a file has.
+  function description_checksum(file) result(text)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=8) :: text
+    character(len=:), allocatable :: input, overrides, changes
+
+    changes = ""
+    call file%fetch_text(parameters_group//"input", input)
+    call file%fetch_text(parameters_group//"overrides", overrides)
+    if (file%length(changes_at_work) >= 0) call file%fetch_text(changes_at_work, changes)
+    text = checksum(transfer(input//eol//overrides//eol//changes, [0_int8]))
+  end function description_checksum
+
   !> The variable of an override.
   pure function variable_of(override) result(name)
     character(len=*), intent(in) :: override
@@ -119,6 +151,7 @@ contains
 
     call file%put(checkpoint_group//"program", program())
     call file%put(checkpoint_group//"input", fixed_input(groups))
+    call file%put(described, description_checksum(file))
     call file%put(current, scalar, [2_int64])
     call put_slot(file, slots(1), sim, progress)
     call put_slot(file, slots(2), sim, progress)
@@ -137,6 +170,7 @@ contains
     call file%put(checkpoint_group//"program", text)
     call source%fetch_text(checkpoint_group//"input", text)
     call file%put(checkpoint_group//"input", text)
+    call file%put(described, description_checksum(file))
     call file%put(current, scalar, [int(checkpoint_number(source), int64)])
     do k = 1, 2
       words = series_t(slots(k), long_integer)
@@ -159,7 +193,7 @@ contains
     call put_slot(file, slots(slot), sim, progress)
     call file%flush()
     call synchronize(file%path, done)
-    if (.not. done) call file%check(-1, "be written: "//last_problem())
+    if (.not. done) call file%check(-1, "be written", last_problem())
     call file%put(current, scalar, [int(slot, int64)])
     call file%flush()
   end subroutine put_checkpoint
@@ -312,6 +346,18 @@ contains
     call file%report(error)
   end subroutine read_slot
 
+  !> Refuses the checkpoint of another program.
+  subroutine check_program(file, error)
+    type(hdf5_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: there
+
+    call file%fetch_text(checkpoint_group//"program", there)
+    if (there /= program() .and. .not. allocated(file%failure)) &
+      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", this is "//program())
+    if (.not. allocated(error)) call file%report(error)
+  end subroutine check_program
+
   !> Refuses the checkpoint of another program or another input.
   subroutine check_origin(file, groups, error)
     type(hdf5_file_t), intent(inout) :: file
@@ -320,9 +366,7 @@ contains
     character(len=:), allocatable :: there, here
     integer :: k
 
-    call file%fetch_text(checkpoint_group//"program", there)
-    if (there /= program() .and. .not. allocated(file%failure)) &
-      call fail(error, exit_usage, file%path//": was written by "//legible(there)//", this is "//program())
+    call check_program(file, error)
     if (.not. allocated(error)) call file%fetch_text(checkpoint_group//"input", there)
     if (.not. allocated(error)) call file%report(error)
     if (allocated(error)) return

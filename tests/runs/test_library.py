@@ -286,6 +286,20 @@ def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
     assert sizes[-1] - sizes[0] < 1e6
 
 
+def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
+    """Whatever the bits that are wrong say, in one line."""
+    path = Simulation(GAS).save(tmp_path / "gas.h5")
+    whole = path.read_bytes()
+    place = whole.find(GAS.encode())
+    for k in range(0, len(GAS), 7):
+        damaged = bytearray(whole)
+        damaged[place + k] ^= 1 << k % 8
+        path.write_bytes(damaged)
+        with pytest.raises(ProgramError, match="input is damaged") as caught:
+            Simulation.load(path)
+        assert caught.value.code == 3 and "\n" not in caught.value.message
+
+
 @pytest.mark.parametrize(
     "groups",
     [
