@@ -7,7 +7,7 @@ module encounters
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
-  use partners, only: axis_of, is_side, is_wall, sense_of
+  use partners, only: axis_of, is_side, is_wall, met_id, most_repeats, repeated, repeats, sense_of
   use shapes, only: magnitude
   use simulation_state, only: simulation_t
   use tally, only: dissipated, heat_virial, stress, virial, work
@@ -16,6 +16,12 @@ module encounters
   implicit none
   private
   public :: collide, collide_pair, encounter_text, pass_side, passes
+
+  !> Collisions that disks may have at one moment in any series, and then in a collapse, where approaches are no more than
+  !> rounding errors: by their ratio to the velocities, per loss of speed in a collision, or, where walls slow all disks down, by
+  !> their size, far below the velocities that an input may have [length/time].
+  integer(int32), parameter :: most_visible = most_repeats - 3
+  real(real64), parameter :: rounded = 1.0e-12_real64, slowest = 1.0e-120_real64
 
 contains
 
@@ -30,8 +36,9 @@ contains
     logical, value :: counts                     !! in the tally and the log
     type(event_log_t), intent(inout), optional :: log
     real(real64) :: v(2), w(2), change(2), restitution
-    integer(int32) :: first, second, ids(2)
+    integer(int32) :: first, second, ids(2), n_repeats
 
+    n_repeats = 0
     first = i
     second = min(code, 0)
     if (code > 0) then
@@ -41,7 +48,7 @@ contains
       end if
       first = merge(i, code, sim%tag(i)%id < sim%tag(code)%id)
       second = i + code - first
-      if (counts .and. .not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) call note_stuck(sim, i, code, t)
+      if (.not. min(sim%disk(i)%clock, sim%disk(code)%clock) < t) call note_stuck(sim, i, code, t, counts, n_repeats)
       call sim%turn(second, t)
     end if
     call sim%turn(first, t)
@@ -52,6 +59,7 @@ contains
       restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
       if (sim%law%by_speed%speed > 0) restitution = sim%law%by_speed%restitution_at(restitution, approach(sim, i, code, t))
       call collide_pair(sim, i, code, t, counts, restitution)
+      if (n_repeats > 0) sim%tag([i, code])%met = repeated(sim%tag([code, i])%id, n_repeats)
       if (sim%law%grip%is_rough()) &
         call rub(sim, first, second, sim%mass_of(first)*magnitude(sim%disk(first)%v - v), counts)
     else
@@ -137,17 +145,30 @@ contains
     g = abs(dot_product(dx, dv))/magnitude(dx)
   end function approach
 
-  !> Counts a collision of two disks that have both had one at this very time, if it is lossy: by the TC model it is not. In
-  !> a lattice many may have that; but if two have hit each other then, and do so again, it is a collapse.
-  pure subroutine note_stuck(sim, i, j, t)
+  !> Looks at a collision of two disks that have both had one at this very time. In contacts of more than two disks that is
+  !> common, and the series of such collisions mostly ends. A collapse is a series without end: the same disks collide again
+  !> and again, until the speed at which they approach is no more than the rounding error of their velocities. Elastic
+  !> disks cannot collapse, nor do disks with a contact time.
+  pure subroutine note_stuck(sim, i, j, t, counts, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: i, j
     real(real64), intent(in) :: t
+    logical, intent(in) :: counts                !! in the tally
+    integer(int32), intent(out) :: n             !! length of the series so far, see `partners: most_repeats`
+    real(real64) :: restitution, fastest
+    integer(int32) :: met(2)
 
-    if (sim%law%contact_time > 0 .or. .not. sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species) < 1) return
+    n = 0
+    restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(j)%species)
+    if (sim%law%contact_time > 0 .or. .not. restitution < 1) return
+    met = sim%tag([i, j])%met
+    n = minval(merge(repeats(met), most_repeats, met > 0)) + 1        ! where one has hit a wall in between, its partner counts
+    fastest = max(magnitude(sim%disk(i)%v), magnitude(sim%disk(j)%v))
+    if (approach(sim, i, j, t) > max(rounded*(1 - restitution)*fastest, slowest)) n = min(n, most_visible)
+    n = min(n, most_repeats)
+    if (.not. counts) return
     sim%tally%stuck = sim%tally%stuck + 1
-    if (sim%tag(i)%met == sim%tag(j)%id .or. sim%tag(j)%met == sim%tag(i)%id) &
-      sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
+    if (n == most_repeats) sim%tally%collapse = min(sim%tally%collapse, sim%box%epoch + t)
   end subroutine note_stuck
 
   !> The tangential part of a collision of the rough disks i and j, whose velocities along the normal have changed already.
@@ -240,7 +261,7 @@ contains
     type(images_t) :: images
     real(real64) :: then(2), dx(2)
 
-    yes = sim%tag(i)%met == sim%tag(j)%id .and. sim%tag(j)%met == sim%tag(i)%id
+    yes = met_id(sim%tag(i)%met) == sim%tag(j)%id .and. met_id(sim%tag(j)%met) == sim%tag(i)%id
     if (.not. yes) return
     images = sim%images()
     associate (p => sim%disk(i), q => sim%disk(j), g => sim%box%gravity)

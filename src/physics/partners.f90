@@ -6,11 +6,14 @@ module partners
   implicit none
   private
   public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, crossing, side_crossed, looks_again, nothing
+  public :: met_id, most_repeats, repeated, repeats
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
   integer(int32), parameter :: looks_again = first_crossing - n_sides      !! the end of what was searched, within a cell
   integer(int32), parameter :: nothing = -huge(1_int32)
+  integer(int32), parameter :: most_repeats = 11           !! of collisions at one moment that are counted
+  integer(int32), parameter :: per_repeat = 2_int32**27    !! larger than any id of a disk
   character(len=6), parameter :: side_name(n_sides) = ["left  ", "right ", "bottom", "top   "]
 
 contains
@@ -62,5 +65,32 @@ contains
 
     side = code - first_crossing
   end function side_crossed
+
+  !> The last collision partner `met` of a disk that has hit it as the n-th in a series of collisions that take no time. Such
+  !> series are rare: every other collision writes the plain id of the partner.
+  elemental function repeated(id, n) result(met)
+    integer(int32), intent(in) :: id               !! of the partner, a disk
+    integer(int32), intent(in) :: n                !! at most `most_repeats`
+    integer(int32) :: met
+
+    met = id + n*per_repeat
+  end function repeated
+
+  !> The id of the last collision partner, if it was a disk; else the code of an obstacle, or 0.
+  elemental function met_id(met) result(id)
+    integer(int32), intent(in) :: met
+    integer(int32) :: id
+
+    id = met
+    if (met > 0) id = modulo(met, per_repeat)
+  end function met_id
+
+  !> The length of the series of collisions at one moment to which the last one belonged.
+  elemental function repeats(met) result(n)
+    integer(int32), intent(in) :: met
+    integer(int32) :: n
+
+    n = max(met, 0_int32)/per_repeat
+  end function repeats
 
 end module partners

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from ricochet import read_run
 
 from whole_runs import BROKEN, FILES, FINISHED, MIXTURE, STOPPED, USAGE
 from whole_runs import contents, differences, one_line, write_input
@@ -175,6 +176,40 @@ def test_a_run_that_passed_a_collapse_says_so(ricochet, tmp_path):
     assert (int(said[1]), float(said[2])) == (len(stuck), pytest.approx(stuck[0], rel=1e-5))
     run = ricochet(*crater, f"--set=contact.contact_time={said[3]}")
     assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
+
+
+#: Disks that touch, in a row, in a triangle and in two lattices, and one that strikes them.
+DIAGONAL = 0.125 * 3**0.5 / 2
+TOUCHING = {
+    "cradle": [(0.75 + 0.125 * k, 1) for k in range(5)],
+    "decimal": [(0.7 + 0.1 * k, 1) for k in range(4)],
+    "rack": [
+        (0.75 + DIAGONAL * k, 1 + 0.0625 * (2 * m - k)) for k in range(5) for m in range(k + 1)
+    ],
+    "square": [(0.75 + 0.125 * k, 0.5 + 0.125 * m) for k in range(8) for m in range(9)],
+    "hexagonal": [
+        (0.75 + DIAGONAL * k, 0.5 + 0.125 * m + 0.0625 * (k % 2))
+        for k in range(9)
+        for m in range(9)
+    ],
+}
+
+
+@pytest.mark.parametrize("restitution", [0.75, 0.9, 0.95, 0.999])
+@pytest.mark.parametrize("name", TOUCHING)
+def test_disks_that_touch_and_are_struck_are_no_collapse(ricochet, tmp_path, name, restitution):
+    """Not above the threshold of their number: nothing is said, and scripts take the run."""
+    places = [(0.125, 1), *TOUCHING[name]]
+    write_input(
+        tmp_path,
+        f"&box upper = 3, 2 / &contact restitution = {restitution} wall_restitution = 1 /"
+        f"&species radius = {0.05 if name == 'decimal' else 0.0625}"
+        f" position = {', '.join(f'{x!r}, {y!r}' for x, y in places)}"
+        f" velocity = 1, 0 {', 0, 0' * (len(places) - 1)} / &stop time = 0.7 /",
+    )
+    run = ricochet("gas.nml", "-o", "gas.h5")
+    assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
+    assert "collapsed" not in read_run(tmp_path / "gas.h5").nature
 
 
 # --- a finished run goes on ---
