@@ -122,6 +122,7 @@ contains
       rule%limits%time = min(time, never)
       rule%limits%collisions = collisions
       rule%limits%events = events
+      rule%limits%at_rest = session%rule%limits%at_rest
     end if
     call make_team(session%input%settings%run%threads)
     began = seconds()

@@ -133,7 +133,7 @@ contains
       if (.not. allocated(error)) call read_checkpoint(command%output, run%input, sim, progress, finished, error)
       if (allocated(error)) return
       rule = stop_rule_t(run%input%settings%stop, sim)
-      if (finished .and. rule%met(sim)) then
+      if (finished .and. (rule%met(sim) .or. rule%rests(sim))) then
         call fail(error, exit_files, command%output//": is a finished run, of "//written(sim%time())//" time units and " &
           //written(sim%tally%collisions)//" collisions; to continue it, repeat the command with --resume and a later stop rule")
       else if (finished .and. rule%too_cold(sim)) then
@@ -266,7 +266,7 @@ contains
     character(len=:), allocatable :: text
 
     text = passed_collapse(run%sim)
-    if (run%stop_rule%met(run%sim)) return
+    if (run%stop_rule%met(run%sim) .or. run%stop_rule%rests(run%sim)) return
     if (text /= "") text = text//"; "
     if (run%stop_rule%too_cold(run%sim)) then
       text = text//coldness//", below which rounding errors dominate"

@@ -445,7 +445,7 @@ class Run:
             self.parameters,
             self.mass,
             self.radius,
-            lost=lost / most if most else 0.0,
+            lost=lost / most if most > 1e-300 else 0.0,  # a disk at rest may have that much
             turning="all/rotational_energy" in self.observables,
             collapsed="collapse" in str(self.provenance.get("note", "")),
         )

@@ -11,7 +11,7 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: are_crushed, begin_first_epoch, last_time, most_events, move_epoch, stands_still
+  public :: are_crushed, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
   !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 24
@@ -151,5 +151,23 @@ contains
     yes = sim%now - sim%last_advance < sim%blink &
       .and. sim%tally%events - sim%events_then >= max(collapse_length, collapse_length_per_disk*sim%n_disks())
   end function stands_still
+
+  !> Whether all disks have come to rest. Bounces of a disk that falls back on what is still take ever shorter times, whose sum
+  !> is finite: where time stands still, a disk is at rest if its next bounces end within a blink, and it had its last one
+  !> within a blink. Without gravity it is at rest if it does not move.
+  pure function is_at_rest(sim) result(yes)
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+    real(real64) :: slow                           ! [length/time]
+    integer(int32) :: i
+
+    slow = magnitude(sim%box%gravity)*sim%blink
+    yes = .true.
+    do i = 1, sim%n_disks()
+      yes = magnitude(sim%velocity(i)) <= slow .and. abs(sim%spin(i))*sim%disk(i)%radius <= slow
+      if (sim%box%falling()) yes = yes .and. sim%now - sim%disk(i)%clock <= sim%blink
+      if (.not. yes) return
+    end do
+  end function is_at_rest
 
 end module epochs

@@ -15,6 +15,7 @@ module evolution
     integer(int64) :: collisions = huge(0_int64)
     integer(int64) :: events = huge(0_int64)
     real(real64) :: dissipated = huge(0.0_real64)        !! energy
+    logical :: at_rest = .false.                         !! where all disks have come to rest
     integer(int64) :: turns = huge(0_int64)              !! of the loop, so that the caller can check other things
     real(real64) :: sampled = 0.0_real64                 !! the time of the latest sample: the end is not before it
   contains

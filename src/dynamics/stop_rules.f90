@@ -5,6 +5,7 @@
 !> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
 module stop_rules
   use kinds, only: int32, int64, never, real64
+  use epochs, only: is_at_rest, stands_still
   use evolution, only: evolution_t, limits_t
   use simulation_state, only: simulation_t
   use tally, only: dissipated
@@ -22,6 +23,7 @@ module stop_rules
     real(real64) :: collisions_per_disk = never
     integer(int64) :: events = huge(0_int64)
     real(real64) :: energy_fraction = 0.0_real64
+    logical :: at_rest = .false.                      !! all disks have come to rest
     real(real64) :: wall_clock = never                !! [s]
   end type stop_settings_t
 
@@ -31,6 +33,7 @@ module stop_rules
     logical :: cools = .false.               !! for ever, if the disks lose energy
   contains
     procedure :: met
+    procedure :: rests
     procedure :: too_cold
     procedure :: is_over
     procedure :: share
@@ -52,6 +55,7 @@ contains
     rule%limits%collisions = min(settings%collisions, &
       whole_collisions(0.5_real64*settings%collisions_per_disk*sim%n_disks()))
     rule%limits%events = settings%events
+    rule%limits%at_rest = settings%at_rest
     rule%wall_clock = settings%wall_clock
     if (settings%energy_fraction > 0) rule%limits%dissipated = (1 - settings%energy_fraction)*sim%start_energy
     rule%cools = all(sim%box%periodic) .and. .not. sim%box%has_obstacles() .and. sim%law%loses_energy() &
@@ -74,7 +78,19 @@ contains
     logical :: yes
 
     yes = sim%has_reached(self%limits%time) .or. self%limits%reached(sim%tally)
+    if (.not. yes .and. self%limits%at_rest) yes = stands_still(sim) .and. is_at_rest(sim)
   end function met
+
+  !> Whether all disks have come to rest, and the run is to end then. Where no force keeps their bounces going this is not a
+  !> matter of counts: then it is asked where nothing will ever happen any more.
+  pure function rests(self, sim) result(yes)
+    class(stop_rule_t), intent(in) :: self
+    type(simulation_t), intent(in) :: sim
+    logical :: yes
+
+    yes = self%limits%at_rest
+    if (yes) yes = is_at_rest(sim)
+  end function rests
 
   !> Whether the motion relative to the common motion had practically died out when the epoch began.
   pure function too_cold(self, sim) result(yes)
@@ -95,8 +111,9 @@ contains
     class(evolution_t), intent(in) :: evolution
     logical :: yes
 
-    yes = self%met(sim) .or. self%too_cold(sim) .or. &
-      (evolution%idle .and. .not. min(self%limits%time, next_kick(evolution, sim)) < never)
+    yes = self%met(sim) .or. self%too_cold(sim)
+    if (.not. yes .and. evolution%idle) &
+      yes = self%rests(sim) .or. .not. min(self%limits%time, next_kick(evolution, sim)) < never
   end function is_over
 
   !> Kinetic energy relative to the common motion. Two passes, because the difference of two large sums would lose digits.

@@ -2,12 +2,15 @@
 !> does, samples or the end of the run. In between the origin of time moves.
 module timeline
   use encounters, only: encounter_text
-  use epochs, only: are_crushed, last_time, most_events, move_epoch, stands_still
+  use box_geometry, only: wall_normal
+  use epochs, only: are_crushed, is_at_rest, last_time, most_events, move_epoch, stands_still
   use errors, only: error_t, exit_broken, fail
   use event_log, only: event_log_t, is_full
   use evolution, only: evolution_t, limits_t
   use kicks, only: kick
   use kinds, only: int32, int64, never, real64
+  use partners, only: is_side
+  use shapes, only: magnitude
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
   use texts, only: about, counted, written
@@ -92,9 +95,9 @@ contains
         call fail(error, exit_broken, "a side crushes the disks, whose energy has grown a million times: let it end " &
           //"before the time "//about(sim%time())//" (side.end)")
       else if (stands_still(sim)) then
+        if (limits%at_rest .and. is_at_rest(sim)) return
         associate (i => evolution%last_event(1), code => evolution%last_event(2))
-          call fail(error, exit_broken, "inelastic collapse, time no longer advances: "//encounter_text(sim, i, code) &
-            //remedy(sim, i, code))
+          call fail(error, exit_broken, standstill(sim, i, code))
         end associate
       else
         call move_epoch(sim)
@@ -125,26 +128,63 @@ contains
     t = evolution%pause_at(sim%drive%time_of(sim%kicks + 1))
   end function next_kick
 
-  !> What helps against the collapse of disk i with its partner, as far as it has not been done.
-  pure function remedy(sim, i, code) result(text)
+  !> The reason why time no longer advances at the encounters of disk i with its partner, and what helps.
+  pure function standstill(sim, i, code) result(text)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, code            !! as in `partners`
+    character(len=:), allocatable :: text
+    character(len=*), parameter :: steps = "or take run.dynamics = 'steps'"
+    logical :: from_the_start
+
+    text = "time no longer advances: "//encounter_text(sim, i, code)
+    from_the_start = .not. sim%time() > sim%blink
+    if (slides(sim, i, code) .and. (from_the_start .or. .not. may_lose(sim, i, code))) then
+      text = text//"; the disk slides along a concave obstacle, in an unbounded number of collisions: start it with a gap to " &
+        //"the obstacle, "//steps
+      return
+    end if
+    text = "inelastic collapse, "//text
+    if (from_the_start .and. code <= 0 .and. sim%box%falling()) then
+      text = text//"; a disk that starts at rest on a wall never leaves it: start it higher, "//steps
+      return
+    end if
+    text = text//"; "//longer_contacts(sim)
+    if (may_lose(sim, i, code)) text = text//", or raise " &
+      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
+    if (is_at_rest(sim)) text = text//"; stop.at_rest = .true. ends a run where all disks have come to rest"
+  end function standstill
+
+  !> Whether an encounter of disk i can cost energy.
+  pure function may_lose(sim, i, code) result(yes)
     type(simulation_t), intent(in) :: sim
     integer(int32), intent(in) :: i, code
-    character(len=:), allocatable :: text
-    real(real64) :: restitution
+    logical :: yes
 
     if (code > 0) then
-      restitution = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species)
+      yes = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species) < 1
     else
-      restitution = sim%box%surface(1 - code)%law%restitution
+      yes = sim%box%surface(1 - code)%law%restitution < 1
     end if
-    text = "; "//longer_contacts(sim)
-    if (restitution < 1) text = text//", or raise " &
-      //trim(merge("contact.restitution     ", "contact.wall_restitution", code > 0))
-    if (code <= 0 .and. sim%box%falling()) text = text//"; a disk that starts at rest on a wall never leaves it: " &
-      //"start it higher, or take run.dynamics = 'steps'"
-  end function remedy
+  end function may_lose
 
-  !> What is to be said of a collapse that a run has passed; empty if there was none.
+  !> Whether disk i moves along an obstacle that curves around it.
+  pure function slides(sim, i, code) result(yes)
+    type(simulation_t), intent(in) :: sim
+    integer(int32), intent(in) :: i, code
+    logical :: yes
+    real(real64), parameter :: grazing = 1.0e-6_real64     ! velocity along the normal over speed
+    real(real64) :: x(2), v(2), normal(2)
+
+    yes = .false.
+    if (code > 0 .or. is_side(code)) return
+    x = sim%position(i)
+    v = sim%velocity(i)
+    normal = wall_normal(sim%box, code, x, v)
+    yes = abs(dot_product(v, normal)) < grazing*magnitude(v) &
+      .and. dot_product(sim%box%surface(1 - code)%shape%middle - x, normal) > 0
+  end function slides
+
+  !> The report of a collapse that a run has passed; empty if there was none.
   pure function passed_collapse(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
@@ -155,19 +195,22 @@ contains
       //": rounding decides what follows; "//longer_contacts(sim)
   end function passed_collapse
 
-  !> The advice to let contacts last: so much longer than the collapse, and so much shorter than flights, as is known.
+  !> The advice to let contacts last: far longer than a collapse, and far shorter than flights, as far as their mean is known.
   pure function longer_contacts(sim) result(text)
     type(simulation_t), intent(in) :: sim
     character(len=:), allocatable :: text
-    real(real64), parameter :: share = 0.01_real64
+    real(real64), parameter :: share = 0.01_real64, blinks = 1.0e5_real64
     integer(int64) :: contacts                     ! of all disks
     real(real64) :: proposal                       ! [time]
 
-    text = trim(merge("raise", "set  ", sim%law%contact_time > 0))//" contact.contact_time (TC model)"
     contacts = sim%tally%events + sim%tally%collisions - 2*sim%tally%stuck
-    proposal = share*sim%time()*sim%n_disks()/max(contacts, 1_int64)
-    if (proposal > sim%law%contact_time) text = text//", say to "//about(proposal)
-    text = text//", well below the mean time between collisions"
+    proposal = max(share*sim%time()*sim%n_disks()/max(contacts, 1_int64), blinks*sim%blink)
+    if (sim%law%contact_time >= proposal) then
+      text = "contact.contact_time is long already: take run.dynamics = 'steps'"
+      return
+    end if
+    text = trim(merge("raise", "set  ", sim%law%contact_time > 0))//" contact.contact_time (TC model), say to " &
+      //about(proposal)//", well below the mean time between collisions"
   end function longer_contacts
 
 end module timeline

@@ -168,8 +168,9 @@ contains
         rule%events = group%integer_of("events", unlimited)
         rule%energy_fraction = group%real_of("energy_fraction", 0.0_real64)
         rule%wall_clock = group%real_of("wall_clock", never)
-        if (must_end .and. .not. any(group%values%given)) call problems%add(group%line, "stop", &
-          "no rule ends the run; give at least one of "//joined(variables_of("stop"), ", "))
+        rule%at_rest = group%text_of("at_rest") == ".true."
+        if (must_end .and. count(group%values%given) == merge(1, 0, group%given("at_rest") .and. .not. rule%at_rest)) &
+          call problems%add(group%line, "stop", "no rule ends the run; give at least one of "//joined(variables_of("stop"), ", "))
       end associate
     end subroutine take_stop
 
@@ -220,7 +221,8 @@ contains
     type(group_t), intent(in) :: groups(:)
     logical, intent(in) :: must_end                       !! by a rule of the input
     type(problem_list_t), intent(inout) :: problems
-    character(len=*), parameter :: other_rule = "; give another rule", energy = "stop.energy_fraction"
+    character(len=*), parameter :: other_rule = "; give another rule", energy = "stop.energy_fraction", &
+      rest = "stop.at_rest"
     logical :: shear, timed, counted, by_energy, single, alone
 
     associate (box => settings%box, law => settings%law, rule => settings%stop, kicks => settings%drive%is_on())
@@ -247,6 +249,15 @@ contains
         //"or motion of &side, &obstacle or &wall"//other_rule)
       call refuse(by_energy .and. .not. (timed .or. counted .or. rule%events < unlimited .or. law%loses_energy() .or. kicks &
         .or. box%has_lossy_walls() .or. box%gives_energy()), energy, "elastic collisions"//other_rule//", or a restitution below 1")
+      call refuse(rule%at_rest .and. settings%run%dynamics == "steps", rest, &
+        "run.dynamics = 'steps': bounces end at no moment"//other_rule)
+      call refuse(rule%at_rest .and. law%contact_time > 0, rest, "contact.contact_time: it keeps the bounces going"//other_rule)
+      call refuse(rule%at_rest .and. shear, rest, "box.shear_rate: disks are driven for ever"//other_rule)
+      call refuse(rule%at_rest .and. kicks, rest, "drive.kind: disks are driven for ever"//other_rule)
+      call refuse(rule%at_rest .and. box%gives_energy() .and. .not. shear, rest, "walls that give energy, by temperature, speed " &
+        //"or motion of &side, &obstacle or &wall"//other_rule)
+      call refuse(rule%at_rest .and. .not. (law%loses_energy() .or. box%has_lossy_walls()), rest, &
+        "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(single .and. counted .and. .not. (timed .or. by_energy .or. rule%events < unlimited), "stop.collisions", &
         "a single disk (species.count), which meets no other; give time or events")
       call refuse(alone .and. (shear .or. kicks) .and. .not. timed, "stop", &

@@ -250,6 +250,10 @@ module variables
       "end after this many collisions of any kind: pair, side, obstacle, wall", not_negative), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
       "end when collisions have left this fraction of the kinetic energy", energy_left), &
+    variable_t("stop", "at_rest", "logical", 1, "optional", ".true.", &
+      "End of the run when all disks have come to rest: when the ever shorter bounces of each under box.gravity have ended " &
+      //"or, without gravity, when no disk moves. It needs collisions that lose energy, run.dynamics = 'events' and surfaces " &
+      //"that stand still."), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
       "stop with a checkpoint after this much computing time", positive, "s")]
 

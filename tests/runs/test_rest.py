@@ -1,0 +1,158 @@
+"""Disks that come to rest: `stop.at_rest`, and the reports where time no longer advances."""
+
+import re
+from math import pi, sqrt, tan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ricochet import Simulation, read_run
+
+from whole_runs import BROKEN, FINISHED, STOPPED, USAGE, differences, one_line, write_input
+
+INPUTS = Path(__file__).resolve().parents[2] / "input"
+BALL = """&box gravity = 0, -2 upper = 1, 3 /
+&species name = 'ball' radius = 0.1 position = 0.5, {height} velocity = 0, 0 /
+&contact wall_restitution = {restitution} {more} /
+&stop at_rest = .true. /
+&output frames_every_time = 0.25 event_log = .true. /
+"""
+COMMAND = ["gas.nml", "-o", "gas.h5"]
+
+
+@pytest.mark.parametrize("restitution", [0, 0.1, 0.5, 0.9, 0.98])
+@pytest.mark.parametrize("rule", ["", "wall_rule = 'normal'"])
+def test_a_ball_comes_to_rest_when_its_bounces_have_ended(ricochet, tmp_path, restitution, rule):
+    """After the fall and the bounces, whose times are a geometric series."""
+    write_input(tmp_path, BALL.format(height=2, restitution=restitution, more=rule))
+    run = ricochet(*COMMAND)
+    assert run.returncode == FINISHED and "note" not in run.stderr + run.stdout
+    fall = sqrt(2 * (2 - 0.1) / 2)
+    end = fall * (1 + restitution) / (1 - restitution)
+    found = read_run(tmp_path / "gas.h5")
+    assert found.time[-1] == pytest.approx(end, rel=1e-8)
+    assert found.position[-1] == pytest.approx(np.array([[0.5, 0.1]]), abs=1e-12)
+    assert found.observable("total_energy").value[-1] == pytest.approx(2 * 0.1)
+    assert "collapsed" not in found.nature
+    again = ricochet(*COMMAND, "--resume")
+    assert "is a finished run" in one_line(again)
+
+
+def test_a_run_that_comes_to_rest_ends_alike_in_all_ways(ricochet, tmp_path):
+    """In parts, by another search and queue, and in memory."""
+    write_input(tmp_path, BALL.format(height=2, restitution=0.7, more=""))
+    assert ricochet(*COMMAND).returncode == FINISHED
+    other = ["--set=run.search='pairs'", "--set=run.queue='heap'", "--set=run.threads=2"]
+    assert ricochet("gas.nml", "-o", "other.h5", *other).returncode == FINISHED
+    aside = re.compile("/parameters/(run|overrides)|/checkpoint")
+    different = differences(tmp_path / "gas.h5", tmp_path / "other.h5")
+    assert [name for name in different if not aside.match(name)] == []
+    command = ["gas.nml", "-o", "parts.h5", "--set=stop.wall_clock=1e-9"]
+    assert ricochet(*command).returncode == STOPPED
+    while ricochet(*command, "--resume").returncode == STOPPED:
+        pass
+    different = differences(tmp_path / "gas.h5", tmp_path / "parts.h5")
+    assert different == ["/parameters/overrides", "/parameters/stop@wall_clock"]
+    whole = read_run(tmp_path / "gas.h5")
+    for slices in ((), (0.5, 1, 1.5, 100)):
+        ball = Simulation(tmp_path / "gas.nml")
+        for time in slices:
+            ball.advance(time=time)
+        ball.advance()
+        assert ball.time == whole.time[-1]
+        assert np.array_equal(ball.position, whole.position[-1])
+
+
+PAIR = """&box gravity = 0, -1 upper = 2, 2 /
+&species name = 'ball' radius = 0.1 position = 0.5, 1, 1.5, {height} velocity = 0, 0, 0, 0 /
+&contact restitution = 0.5 / &stop at_rest = .true. /
+"""
+
+
+def test_a_disk_that_rests_while_another_moves_breaks_the_run_off(ricochet, tmp_path):
+    """Two that come to rest at the same moment do not."""
+    write_input(tmp_path, PAIR.format(height=1.3))
+    run = ricochet(*COMMAND)
+    assert run.returncode == BROKEN and "disk 1 (ball) and the bottom side" in one_line(run)
+    assert "stop.at_rest" not in run.stderr
+    write_input(tmp_path, PAIR.format(height=1))
+    run = ricochet(*COMMAND, "--force")
+    assert run.returncode == FINISHED and "note" not in run.stdout
+
+
+def test_without_gravity_disks_are_at_rest_when_none_moves(ricochet, tmp_path):
+    write_input(
+        tmp_path,
+        """&species radius = 0.1 position = 0.3, 0.3, 0.7, 0.7 velocity = 1, 0.1, -0.5, 0.2 /
+        &contact wall_restitution = 0 / &stop at_rest = .true. /""",
+    )
+    run = ricochet(*COMMAND)
+    assert run.returncode == FINISHED and "note" not in run.stdout
+    assert "\ntime = 1\n" in run.stdout and "\nkinetic_energy = 0\n" in run.stdout
+
+
+def test_at_rest_is_no_rule_where_it_is_false(ricochet, tmp_path):
+    write_input(tmp_path, BALL.format(height=2, restitution=0.5, more=""))
+    run = ricochet(*COMMAND, "--set=stop.at_rest=.false.")
+    assert run.returncode == USAGE and "no rule ends the run" in one_line(run)
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_a_ball_ends_in_a_bin_of_the_galton_board(ricochet, tmp_path, seed):
+    path = tmp_path / "galton.h5"
+    run = ricochet(INPUTS / "galton.nml", "-o", path, f"--set=run.seed={seed}")
+    assert run.returncode == FINISHED and "note" not in run.stdout
+    x, y = read_run(path).position[-1, 0]
+    assert y == pytest.approx(0.2, abs=1e-9) and 0.2 - 1e-9 <= x % 1 <= 0.8 + 1e-9
+
+
+RING = """&box lower = -1, -1 upper = 1, 1 /
+&obstacle name = 'ring' centre = 0, 0 radius = 1 side = 'inside' /
+&species name = 'p' radius = 0.1 position = 0.9, 0 velocity = {} / &stop time = 10 /
+&contact restitution = {} {} /
+"""
+
+
+@pytest.mark.parametrize("velocity", ["0, 1", "1e-9, 1", "0, -1e-5"])
+@pytest.mark.parametrize("contact_time", ["", "contact_time = 1e-6", "contact_time = 1e-2"])
+def test_sliding_along_a_ring_is_named(ricochet, tmp_path, velocity, contact_time):
+    """It is no collapse, and no contact time helps."""
+    write_input(tmp_path, RING.format(velocity, 1, contact_time))
+    run = ricochet(*COMMAND, "--quiet")
+    assert run.returncode == BROKEN and "slides along a concave obstacle" in one_line(run)
+    assert "disk 1 (p) and obstacle ring" in run.stderr
+    assert "collapse" not in run.stderr and "contact_time" not in run.stderr
+
+
+#: Collapses: a bouncing ball, two on top of each other, a row that is struck, one that presses
+#: itself against a container.
+COLLAPSES = {
+    "ball": PAIR.replace("1.5, {height}", "1.5, 0.7").replace("at_rest = .true.", "time = 9"),
+    "tower": """&box gravity = 0, -1 / &contact restitution = 0.6 / &stop time = 9 /
+        &species radius = 0.1 position = 0.5, 0.2, 0.5, 0.6 velocity = 0, 0, 0, 0 /""",
+    "row": f"""&box upper = 2, 1 / &contact restitution = {0.95 * tan(pi / 8) ** 2} /
+        &stop time = 9 / &species radius = 0.0625
+        position = 0.25, 0.5, 0.75, 0.5, 0.875, 0.5, 1, 0.5
+        velocity = 1, 0, 0, 0, 0, 0, 0, 0 /""",
+    "at once": f"""&box upper = 2, 1 / &contact restitution = {0.5 * tan(pi / 8) ** 2} /
+        &stop time = 9 / &species radius = 0.0625
+        position = 0.625, 0.5, 0.75, 0.5, 0.875, 0.5, 1, 0.5
+        velocity = 1, 0, 0, 0, 0, 0, 0, 0 /""",
+    "ring": RING.format("0.5, 1", "0.3 wall_rule = 'normal'", ""),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "contact_time"),
+    [*((name, 0) for name in COLLAPSES), ("ball", 1e-30), ("tower", 1e-30), ("ring", 1e-30)],
+)
+def test_the_contact_time_that_is_proposed_prevents_the_collapse(
+    ricochet, tmp_path, name, contact_time
+):
+    write_input(tmp_path, COLLAPSES[name])
+    run = ricochet(*COMMAND, f"--set=contact.contact_time={contact_time}")
+    assert "collapse" in run.stderr
+    word = "raise" if contact_time else "set"
+    said = re.search(rf"; {word} contact.contact_time \(TC model\), say to ([^,]+),", run.stderr)
+    run = ricochet(*COMMAND, "--force", f"--set=contact.contact_time={said[1]}")
+    assert run.returncode == FINISHED and "collapse" not in run.stderr + run.stdout
