@@ -2,7 +2,7 @@
 !> and what they do to the energy is work.
 module changes
   use box_sides, only: bounds
-  use disks, only: land, mass_column
+  use disks, only: land
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
@@ -28,8 +28,6 @@ contains
     other%given_t = sim%given_t
     other%system_t = system
     other%with%own_sizes = sim%with%own_sizes
-    call other%make_room(0_int32)
-    other%row(mass_column) = sim%row(mass_column)
     other%box%epoch = sim%epoch
     do k = 1, n_sides                                        ! the mass and force of a piston may change
       associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
@@ -42,7 +40,8 @@ contains
     end do
     call bounds(sim%box, sim%now, here(:, 1), here(:, 2))
     call bounds(other%box, sim%now, there(:, 1), there(:, 2))
-    if (any((other%row > 0) .neqv. (sim%row > 0))) then
+    if ((other%with%rotation .neqv. sim%with%rotation) .or. (other%with%orientation .neqv. sim%with%orientation) .or. &
+      (other%law%contact_time > 0 .neqv. sim%law%contact_time > 0)) then
       problem = "disks would need other columns: rotation, orientation and contact_time > 0 are there from the start, or never"
     else if (any(abs(there - here) > 1.0e-12_real64*minval(sim%box%edges()))) then
       problem = "a side would jump; at this moment the new motion must be where the old one is"

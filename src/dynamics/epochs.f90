@@ -2,7 +2,6 @@
 !> to go on from it agree.
 module epochs
   use box_sides, only: keep_off_sides
-  use disks, only: columns
   use kinds, only: int32, int64, never, pi, real64
   use partners, only: n_sides
   use renumbering, only: renumber
@@ -98,15 +97,13 @@ contains
 
     !> Moves the origin from which moments of this epoch count, and lets all events be stale.
     subroutine move_origin()
-      integer, allocatable :: moments(:)            ! rows of `extra`
       integer(int32) :: i
 
-      moments = pack(sim%row, sim%row > 0 .and. columns%is_moment)
       do i = 1, sim%n_disks()
         sim%disk(i)%clock = sim%disk(i)%clock - shift
         sim%disk(i)%stamp = 0
-        sim%extra(moments, i) = sim%extra(moments, i) - shift
       end do
+      if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
       sim%now = sim%now - shift
       sim%epoch = sim%epoch + shift
       sim%last_advance = sim%last_advance - shift

@@ -2,7 +2,7 @@
 !> alone, so that it matters neither in which order disks are kicked nor how the run has come there.
 module kicks
   use kinds, only: int32, pi, real64
-  use disks, only: angle_column, land, spin_column
+  use disks, only: land
   use drive, only: active, andersen, noise
   use exact_sums, only: exact_sum_t
   use random_stream, only: draws_of_kicks => kicks, orientations, random_stream_t
@@ -103,7 +103,7 @@ contains
       type(random_stream_t) :: stream
       real(real64) :: z(2)
 
-      associate (drive => sim%drive, angle => sim%extra(sim%row(angle_column), i))
+      associate (drive => sim%drive, angle => sim%extra(i)%angle)
         call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
         call stream%draw_normals(z)
         angle = angle + sqrt(2*drive%rotational_diffusion*drive%interval)*z(1)
@@ -123,7 +123,7 @@ contains
       if (.not. sim%drive%reaches(sim%tag(i)%species)) cycle
       call stream%seed_draw(sim%seed, orientations, sim%tag(i)%id, sim%kicks)
       call stream%draw_uniform(u)
-      sim%extra(sim%row(angle_column), i) = 2*pi*u
+      sim%extra(i)%angle = 2*pi*u
     end do
   end subroutine orient
 
@@ -146,7 +146,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: omega            !! [1/time]
 
-    associate (before => sim%extra(sim%row(spin_column), i))
+    associate (before => sim%extra(i)%spin)
       call sim%tally%sum(drive_energy)%add(0.5_real64*sim%inertia_of(i)*(omega - before)*(omega + before))
       before = omega
     end associate

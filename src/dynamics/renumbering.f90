@@ -1,7 +1,7 @@
 !> Disks that are neighbours in space become neighbours in memory.
 module renumbering
   use kinds, only: int32, real64
-  use disks, only: disk_t, tag_t
+  use disks, only: whole_disk_t
   use simulation_state, only: simulation_t
   use sorting, only: sort_by_count
   implicit none
@@ -38,29 +38,21 @@ contains
   subroutine move_in_order(sim, order)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(inout) :: order(:)     !! the disk that comes to each place; afterwards each is there
-    type(disk_t) :: disk
-    type(tag_t) :: tag
-    real(real64) :: extra(size(sim%extra, 1))
+    type(whole_disk_t) :: held
     integer(int32) :: start, to, from
 
     do start = 1, sim%n_disks()
       if (order(start) == start) cycle
-      disk = sim%disk(start)
-      tag = sim%tag(start)
-      extra = sim%extra(:, start)
+      held = sim%whole_disk(start)
       to = start
       do
         from = order(to)
         order(to) = to
         if (from == start) exit
-        sim%disk(to) = sim%disk(from)
-        sim%tag(to) = sim%tag(from)
-        sim%extra(:, to) = sim%extra(:, from)
+        call sim%place_disk(to, sim%whole_disk(from))
         to = from
       end do
-      sim%disk(to) = disk
-      sim%tag(to) = tag
-      sim%extra(:, to) = extra
+      call sim%place_disk(to, held)
     end do
   end subroutine move_in_order
 

@@ -25,7 +25,8 @@ module record
     procedure :: make
     procedure :: begin
     procedure :: seal
-    procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs, pass
+    procedure :: pass
+    procedure, private :: exchange_real, exchange_reals, exchange_long, exchange_longs
   end type record_t
 
   interface
@@ -117,7 +118,7 @@ contains
     if (there /= crc) call file%check(-1, "be read: the checksum of "//self%name//" is wrong")
   end subroutine seal
 
-  !> Writes or reads the next n numbers from or to the memory at an address.
+  !> Writes or reads the next n words from or to the memory at an address: numbers, or records of them.
   subroutine pass(self, file, address, n)
     class(record_t), intent(inout) :: self
     type(hdf5_file_t), intent(inout) :: file

@@ -5,11 +5,11 @@
 !> a number says that it counts from now on. So there is a whole one at every moment, from the first on; each has a checksum.
 !> A finished file keeps one. In that of a run that broke off there is none.
 module checkpoint
+  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int8
-  use kinds, only: int32, int64, real64
+  use kinds, only: int128, int32, int64, real64
   use build_info, only: build_flags
   use cadence, only: progress_t
-  use disks, only: mass_column, n_columns
   use errors, only: error_t, exit_files, exit_usage, fail
   use exact_sums, only: exact_sum_t
   use h5md_layout, only: changes_at_work, checkpoint_group, parameters_group
@@ -305,6 +305,7 @@ contains
     call file%close()
     if (allocated(error)) return
     if (.not. sim%with%own_sizes) sim%disk%radius = input%settings%species(sim%tag%species)%radius
+    call sim%settle_masses()
     call sim%choose_units()
     call progress%cadence%look_ahead(sim)
   end subroutine read_checkpoint
@@ -383,7 +384,7 @@ contains
   subroutine exchange_all(file, record, sim, progress)
     type(hdf5_file_t), intent(inout) :: file      !! not used while the record is counted
     type(record_t), intent(inout) :: record
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     type(progress_t), intent(inout) :: progress
     integer(int64) :: settled
     integer :: k
@@ -441,16 +442,11 @@ contains
     !> Whole numbers of units, which may grow to twice as many bits as an integer has.
     subroutine exchange_sums(sums)
       type(exact_sum_t), intent(inout) :: sums(:)
-      integer(int64) :: halves(2*size(sums))
-      integer :: i
+      integer(int128), target :: units(size(sums))
 
-      do i = 1, size(sums)
-        halves(2*i - 1:2*i) = transfer(sums(i)%units, halves)
-      end do
-      call record%exchange(file, halves)
-      do i = 1, size(sums)
-        sums(i)%units = transfer(halves(2*i - 1:2*i), sums(i)%units)
-      end do
+      units = sums%units
+      call record%pass(file, c_loc(units), 2*size(units))
+      sums%units = units
     end subroutine exchange_sums
 
     !> The disks.
@@ -469,15 +465,11 @@ contains
         call exchange_short(tag%met)
         if (sim%with%own_sizes) call record%exchange(file, disk%radius)      ! else sizes follow from the input
       end associate
-      do k = 1, n_columns
-        if (sim%row(k) > 0 .and. k /= mass_column) call record%exchange(file, sim%extra(sim%row(k), :))
-      end do
+      if (allocated(sim%extra)) call record%pass(file, c_loc(sim%extra(1)), size(sim%extra)*storage_size(sim%extra)/64)
       if (.not. sim%with%own_sizes) return
-      mass = sim%masses()                       ! there is no column of them if they turn out to be equal
+      mass = sim%masses()                       ! they may turn out to be those of the species
       call record%exchange(file, mass)
-      if (record%way /= reading) return
-      sim%extra(sim%row(mass_column), :) = mass
-      call sim%settle_masses()
+      if (record%way == reading) sim%own_mass = mass
     end subroutine exchange_disks
 
     !> Integers of half a word.

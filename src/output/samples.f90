@@ -66,7 +66,7 @@ contains
 
     too_far = .false.
     do i = 1, merge(sim%n_disks(), 0, any(sim%box%periodic))
-      too_far = too_far .or. any(abs(sim%image(i)) >= int(most_exact, int64))         ! a frame may have to count one period more
+      too_far = too_far .or. any(abs(sim%extra(i)%image) >= most_exact)         ! a frame may have to count one period more
     end do
     if (sim%tally%events > int(most_exact, int64) .or. too_far) &
       call fail(error, exit_broken, "more than 2**53 collisions or periods: the output cannot count further")

@@ -2,7 +2,7 @@
 !> they stand for; if no own disk can have met a wrong copy, the copies are put right. The rule, and why it is right, is
 !> in docs/theory.md.
 module domain_borders
-  use kinds, only: int16, int32
+  use kinds, only: int16, int32, int64
   use domains, only: copy_of, domain_t, forever, list_copies, news_t
   use partners, only: nothing
   use tracks, only: track_t
@@ -96,7 +96,8 @@ contains
           .or. mine%v(1) /= theirs%v(1) .or. mine%v(2) /= theirs%v(2)) &
           .and. self%sim%tag(s)%collisions == other%sim%tag(t)%collisions .and. self%sim%tag(s)%met == other%sim%tag(t)%met
       end associate
-      if (yes .and. size(self%sim%extra) > 0) yes = .not. any(self%sim%extra(:, s) /= other%sim%extra(:, t))
+      if (.not. yes .or. .not. allocated(self%sim%extra)) return
+      yes = all(transfer(self%sim%extra(s), [0_int64]) == transfer(other%sim%extra(t), [0_int64]))    ! whatever components
     end function same_state
 
     !> Notes what is to be taken over from the neighbour's slot t.
@@ -111,12 +112,10 @@ contains
       end if
       self%n_news = self%n_news + 1
       associate (news => self%news(self%n_news))
-        news%disk = other%sim%disk(t)
-        news%tag = other%sim%tag(t)
+        news%whole_disk_t = other%sim%whole_disk(t)
         news%home = other%home(t)
         news%cell = cell
         news%slot = s
-        news%extra(:size(other%sim%extra, 1)) = other%sim%extra(:, t)
       end associate
     end subroutine note_news
   end subroutine compare
@@ -150,7 +149,7 @@ contains
     !> Takes over one piece of news.
     subroutine take_over(news)
       type(news_t), intent(in) :: news
-      integer(int32) :: s, window
+      integer(int32) :: s, stamp, window
 
       s = news%slot
       if (any(news%cell > self%patch%n)) then
@@ -166,15 +165,12 @@ contains
         call self%engine%search%take_out(self%sim%tag(s), s)
       end if
       window = self%sim%tag(s)%window
-      self%sim%tag(s) = news%tag
+      stamp = self%sim%disk(s)%stamp + 1
+      call self%sim%place_disk(s, news%whole_disk_t)
       self%sim%tag(s)%window = window
-      associate (disk => self%sim%disk(s), stamp => self%sim%disk(s)%stamp + 1)
-        disk = news%disk
-        disk%stamp = stamp
-        disk%event_time = forever
-      end associate
+      self%sim%disk(s)%stamp = stamp
+      self%sim%disk(s)%event_time = forever
       self%home(s) = news%home
-      self%sim%extra(:, s) = news%extra(:size(self%sim%extra, 1))
       call self%engine%search%insert(self%sim%tag(s), s, int(news%cell, int16))
       call self%engine%tracks%begin_track(self%sim%tag(s)%cell, s)
       n_waiting = n_waiting + 1

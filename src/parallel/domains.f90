@@ -4,7 +4,7 @@
 module domains
   use kinds, only: int32, int64, real64
   use cell_faces, only: patch_t
-  use disks, only: disk_t, n_columns, tag_t
+  use disks, only: disk_t, tag_t, whole_disk_t
   use errors, only: error_t
   use event_driven, only: event_driven_t
   use event_log, only: event_log_t
@@ -23,10 +23,7 @@ module domains
   integer(int32), parameter :: spare = 32, spare_at_least = 200    !! slots for disks to come: one of so many, and more
 
   !> The true state of a disk of which this domain has a wrong copy, or none yet; or which has left.
-  type :: news_t
-    type(disk_t) :: disk
-    type(tag_t) :: tag
-    real(real64) :: extra(n_columns) = 0           !! the optional columns, as many as there are
+  type, extends(whole_disk_t) :: news_t
     integer(int32) :: home = 0                     !! number of the disk in the whole simulation
     integer(int32) :: cell(2) = 0                  !! in this domain's patch, or beyond its ends
     integer(int32) :: slot = 0                     !! of the copy; 0: none
@@ -63,9 +60,7 @@ contains
     n = size(disks, kind=int32)
     call make_room()
     do i = 1, n
-      self%sim%disk(i) = sim%disk(disks(i))
-      self%sim%tag(i) = sim%tag(disks(i))
-      self%sim%extra(:, i) = sim%extra(:, disks(i))
+      call self%sim%place_disk(i, sim%whole_disk(disks(i)))
     end do
     self%home(:n) = disks
     slots = self%sim%n_disks()
@@ -98,7 +93,9 @@ contains
       slots = n + n/spare + spare_at_least
       if (allocated(self%home)) then
         if (size(self%home) > n + spare_at_least/2 .and. size(self%home) < 2*slots) return
-        deallocate (self%sim%disk, self%sim%tag, self%sim%extra, self%home)
+        deallocate (self%sim%disk, self%sim%tag, self%home)
+        if (allocated(self%sim%own_mass)) deallocate (self%sim%own_mass)
+        if (allocated(self%sim%extra)) deallocate (self%sim%extra)
       end if
       allocate (self%home(slots))
       call self%sim%make_room(slots, like=sim)
@@ -233,9 +230,7 @@ contains
 
     do k = 1, self%sim%n_disks()
       if (self%sim%tag(k)%id == 0 .or. .not. self%engine%tracks%is_own(k)) cycle
-      sim%disk(self%home(k)) = self%sim%disk(k)
-      sim%tag(self%home(k)) = self%sim%tag(k)
-      sim%extra(:, self%home(k)) = self%sim%extra(:, k)
+      call sim%place_disk(self%home(k), self%sim%whole_disk(k))
     end do
   end subroutine write_back
 

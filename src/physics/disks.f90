@@ -1,12 +1,12 @@
 !> What moves. The numbers of a disk are kept by access: a record of one cache line, which every prediction reads; a tag of
-!> half a line, which is needed only when a disk has an event of its own; and columns that are there only where something
-!> needs them. What is derived is in no checkpoint: it is rebuilt at every start.
+!> half a line, which is needed only when a disk has an event of its own; and arrays that only some simulations
+!> have. What is derived is in no checkpoint: it is rebuilt at every start.
 module disks
   use free_flight, only: flight, flight_velocity
   use kinds, only: int16, int32, int64, real64
   implicit none
   private
-  public :: columns, disk_t, species_t, tag_t
+  public :: disk_t, extra_t, species_t, tag_t, whole_disk_t
   public :: disks_before, land, longest_name, names_of, species_by_id
 
   !> Position, velocity and clock change only at the disk's own collisions (and when it passes a periodic side); other
@@ -43,23 +43,21 @@ module disks
     real(real64) :: mass = 1.0_real64           !! of each disk, or the largest [mass]
   end type species_t
 
-  !> A number that disks have only in some simulations.
-  type :: column_t
-    character(len=16) :: name
-    logical :: is_moment = .false.              !! a time since the epoch
-    logical :: is_element = .false.             !! of frames, by this name
-    integer :: rate = 0                         !! number of the column by which it grows in time; 0: none
-  end type column_t
+  !> Numbers that a disk has only in some simulations: `simulation_state: has_extra`.
+  type :: extra_t
+    real(real64) :: image(2) = 0.0_real64       !! periods travelled, whole numbers: the true position is x + image*edges
+    real(real64) :: last_contact = 0.0_real64   !! time of the last collision since the epoch, for the TC model [time]
+    real(real64) :: spin = 0.0_real64           !! angular velocity [1/time]
+    real(real64) :: angle = 0.0_real64          !! orientation at `clock`, not wrapped [radian]
+  end type extra_t
 
-  !> The table of these. Which of them there are says `simulation_state: choose_columns`.
-  integer, parameter, public :: mass_column = 1, image_column = 2, contact_column = 4, spin_column = 5, angle_column = 6
-  type(column_t), parameter :: columns(*) = [ &
-    column_t("mass"), &                                           ! other than that of the species [mass]
-    column_t("image1"), column_t("image2"), &                     ! periods travelled, whole numbers
-    column_t("last_contact", is_moment=.true.), &                 ! time of the last collision, for the TC model [time]
-    column_t("angular_velocity", is_element=.true.), &            ! [1/time]
-    column_t("orientation", is_element=.true., rate=spin_column)] ! at `clock`, not wrapped [radian]
-  integer, parameter, public :: n_columns = size(columns)
+  !> All numbers of one disk, to be moved as a whole.
+  type :: whole_disk_t
+    type(disk_t) :: disk
+    type(tag_t) :: tag
+    real(real64) :: own_mass = 0.0_real64       !! if masses are not those of the species [mass]
+    type(extra_t) :: extra
+  end type whole_disk_t
 
 contains
 

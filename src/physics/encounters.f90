@@ -3,7 +3,7 @@
 module encounters
   use kinds, only: int32, int64, real64
   use collisions, only: pair_impulse, tangential_impulse
-  use disks, only: disk_t, image_column, land, mass_column
+  use disks, only: disk_t, land
   use event_log, only: event_log_t
   use free_flight, only: flight, flight_velocity
   use images, only: image_t, images_t
@@ -107,9 +107,9 @@ contains
     distance2 = dx(1)*dx(1) + dx(2)*dx(2)
     mass_i = sim%species(si)%mass
     mass_j = sim%species(sj)%mass
-    if (sim%row(mass_column) > 0) then               ! as in `mass_of`, with one test for both
-      mass_i = sim%extra(sim%row(mass_column), i)
-      mass_j = sim%extra(sim%row(mass_column), j)
+    if (allocated(sim%own_mass)) then                ! as in `mass_of`, with one test for both
+      mass_i = sim%own_mass(i)
+      mass_j = sim%own_mass(j)
     end if
     q = pair_impulse(b, distance2, mass_i, mass_j, restitution)
     sim%disk(i)%v = sim%disk(i)%v + (q/mass_i)*dx          ! a reciprocal would round the same way each time
@@ -325,9 +325,7 @@ contains
     associate (d => sim%disk(i), edges => sim%box%edges())
       d%x(axis) = d%x(axis) - period*edges(axis)
       d%stamp = d%stamp + 1
-      associate (image => sim%extra(sim%row(image_column) + axis - 1, i))
-        image = image + period
-      end associate
+      sim%extra(i)%image(axis) = sim%extra(i)%image(axis) + period
     end associate
   end subroutine pass_side
 
@@ -342,14 +340,12 @@ contains
     real(real64) :: v, columns
 
     images = sim%images()
-    associate (d => sim%disk(i), row => sim%row(image_column), length => sim%box%upper(1) - sim%box%lower(1))
+    associate (d => sim%disk(i), periods => sim%extra(i)%image, length => sim%box%upper(1) - sim%box%lower(1))
       v = d%v(1)
-      associate (periods => sim%extra(row:row + 1, i))
-        call images%climb(real(rows, real64), d%clock, d%x, d%v, periods)
-        columns = floor((flight(d%x(1), d%v(1), 0.0_real64, t - d%clock) - sim%box%lower(1))/length, int64)
-        d%x(1) = d%x(1) - columns*length
-        periods(1) = periods(1) + columns
-      end associate
+      call images%climb(real(rows, real64), d%clock, d%x, d%v, periods)
+      columns = floor((flight(d%x(1), d%v(1), 0.0_real64, t - d%clock) - sim%box%lower(1))/length, int64)
+      d%x(1) = d%x(1) - columns*length
+      periods(1) = periods(1) + columns
       d%stamp = d%stamp + 1
       call sim%tally%sum(work)%add(0.5_real64*sim%mass_of(i)*(d%v(1) - v)*(d%v(1) + v))
     end associate

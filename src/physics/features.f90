@@ -1,4 +1,4 @@
-!> What a run does beside flights and collisions that change two velocities. Whoever must know asks here: which columns the
+!> What a run does beside flights and collisions that change two velocities. Whoever must know asks here: which arrays the
 !> disks have, what is observed, how much a collision takes, and what the input is refused.
 module features
   implicit none

@@ -1,7 +1,6 @@
 !> A frame and a sample of the observables of this moment: their values one after the other.
 module moments
   use kinds, only: int32, int64, real64
-  use disks, only: columns, image_column, n_columns
   use observables, only: observable_list_t, observed
   use simulation_state, only: simulation_t
   use team, only: many
@@ -16,9 +15,10 @@ module moments
     logical :: is_count = .false.
   end type frame_column_t
 
-  !> What every disk has, and may have, without a column of its own in `disks: columns`.
-  type(frame_column_t), parameter :: common(4) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
-    frame_column_t("collisions", is_count=.true.), frame_column_t("image", 2, is_count=.true.)]
+  !> What every disk has, and may have.
+  type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
+    frame_column_t("collisions", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
+    frame_column_t("angular_velocity"), frame_column_t("orientation")]
 
 contains
 
@@ -29,10 +29,7 @@ contains
     type(frame_column_t), allocatable :: list(:)
     integer :: k
 
-    list = common(:merge(4, 3, sim%row(image_column) > 0))
-    do k = 1, n_columns
-      if (columns(k)%is_element .and. sim%row(k) > 0) list = [list, frame_column_t(columns(k)%name)]
-    end do
+    list = pack(columns, [.true., .true., .true., any(sim%box%periodic), sim%with%rotation, sim%with%orientation])
     if (present(wanted)) list = pack(list, [.true., (any(wanted == list(k)%name), k=2, size(list))])
   end function frame_columns
 
@@ -45,8 +42,8 @@ contains
     logical :: shared
     real(real64) :: x(2), v(2), image(2)
     integer(int32) :: i, k, n
-    integer :: c, column, first
-    integer :: at(4)                              ! where those of `common` begin; 0: they are not wanted
+    integer :: c, first
+    integer :: at(size(columns))                  ! where they begin; 0: they are not wanted
 
     n = sim%n_disks()
     allocate (sample(2 + n*sum(list%width), 1))
@@ -54,12 +51,7 @@ contains
     first = 3
     at = 0
     do c = 1, size(list)
-      column = findloc(common%name, list(c)%name, dim=1)
-      if (column > 0) then
-        at(column) = first
-      else
-        sample(first - 1 + sim%tag%id, 1) = sim%values_now(findloc(columns%name, list(c)%name, dim=1))
-      end if
+      at(findloc(columns%name, list(c)%name, dim=1)) = first
       first = first + n*list(c)%width
     end do
     shared = n >= many
@@ -69,14 +61,16 @@ contains
       x = sim%position(i)
       v = sim%velocity(i)
       image = 0
-      if (sim%row(image_column) > 0) then
-        image = sim%image(i)
+      if (any(sim%box%periodic)) then
+        image = sim%extra(i)%image
         call wrap(sim, x, v, image)
       end if
       if (at(1) > 0) sample(at(1) + 2*k:at(1) + 2*k + 1, 1) = x
       if (at(2) > 0) sample(at(2) + 2*k:at(2) + 2*k + 1, 1) = v
       if (at(3) > 0) sample(at(3) + k, 1) = sim%tag(i)%collisions
       if (at(4) > 0) sample(at(4) + 2*k:at(4) + 2*k + 1, 1) = image
+      if (at(5) > 0) sample(at(5) + k, 1) = sim%spin(i)
+      if (at(6) > 0) sample(at(6) + k, 1) = sim%extra(i)%angle + sim%spin(i)*(sim%now - sim%disk(i)%clock)
     end do
     !$omp end parallel do
   end function frame_sample

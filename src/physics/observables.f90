@@ -173,7 +173,8 @@ contains
     type(observable_list_t) :: list
     integer :: k
 
-    allocate (empty%species(0), empty%disk(0), empty%tag(0))
+    allocate (empty%species(0))
+    call empty%make_room(0)
     empty%drive%kind = noise
     call empty%tally%make_room(n_sides)
     empty%box = box_t()

@@ -4,8 +4,7 @@ module simulation_state
   use kinds, only: int32, int64, real64
   use box_geometry, only: box_t
   use collisions, only: contact_law_t
-  use disks, only: angle_column, columns, contact_column, disk_t, image_column, mass_column, n_columns, species_by_id, &
-    species_t, spin_column, tag_t
+  use disks, only: disk_t, extra_t, species_by_id, species_t, tag_t, whole_disk_t
   use drive, only: drive_t
   use features, only: features_t
   use free_flight, only: flight, flight_velocity
@@ -37,8 +36,8 @@ module simulation_state
   type, extends(given_t) :: simulation_t
     type(disk_t), allocatable :: disk(:)          !! (n) in the order of cells; `tag%id` is their number in the input
     type(tag_t), allocatable :: tag(:)            !! (n)
-    real(real64), allocatable :: extra(:, :)      !! (rows,n) those of `disks: columns` that are needed
-    integer :: row(n_columns) = 0                 !! in which row of these a column is; 0: not there
+    real(real64), allocatable :: own_mass(:)      !! (n) where those of a species differ [mass]
+    type(extra_t), allocatable :: extra(:)        !! (n) where `has_extra`
     real(real64) :: epoch = 0.0_real64            !! the moment from which `now` and the clocks count [time]
     real(real64) :: now = 0.0_real64              !! since the epoch [time]
     logical :: settled = .false.                  !! all that happens up to `now` is behind
@@ -59,13 +58,14 @@ module simulation_state
     procedure :: has_reached
     procedure :: n_disks
     procedure :: list_disks
+    procedure :: has_extra
     procedure :: make_room
+    procedure :: whole_disk
+    procedure :: place_disk
     procedure :: mass_of
     procedure :: masses
     procedure :: settle_masses
-    procedure :: image
     procedure :: images => images_now
-    procedure :: values_now
     procedure :: position
     procedure :: velocity
     procedure :: spin
@@ -79,7 +79,6 @@ module simulation_state
     procedure :: start_sums
     procedure :: choose_units
     procedure :: fastest_drive
-    procedure, private :: choose_columns
   end type simulation_t
 
 contains
@@ -117,36 +116,57 @@ contains
     call self%make_room(sum(self%species%count))
     self%tag%id = [(i, i=1, self%n_disks())]
     self%tag%species = species_by_id(self%species)
-    do i = 1, merge(self%n_disks(), 0, self%with%own_sizes)
-      self%extra(self%row(mass_column), i) = self%species(self%tag(i)%species)%mass
+    if (.not. allocated(self%own_mass)) return
+    do i = 1, self%n_disks()
+      self%own_mass(i) = self%species(self%tag(i)%species)%mass
     end do
   end subroutine list_disks
+
+  !> Whether disks have the numbers of `extra_t`.
+  pure function has_extra(self) result(yes)
+    class(simulation_t), intent(in) :: self
+    logical :: yes
+
+    yes = any(self%box%periodic) .or. self%law%contact_time > 0 .or. self%with%rotation .or. self%with%orientation
+  end function has_extra
 
   !> Makes room for n disks.
   pure subroutine make_room(self, n, like)
     class(simulation_t), intent(inout) :: self    !! with all that the input gives
     integer(int32), intent(in) :: n
-    class(simulation_t), intent(in), optional :: like   !! whose columns they are to have
+    class(simulation_t), intent(in), optional :: like   !! of which these are a part
+    logical :: own_masses
 
-    call self%choose_columns()
-    if (present(like)) self%row = like%row
+    own_masses = self%with%own_sizes
+    if (present(like)) own_masses = allocated(like%own_mass)
     allocate (self%disk(n), self%tag(n))
-    allocate (self%extra(maxval(self%row), n), source=0.0_real64)
+    if (self%has_extra()) allocate (self%extra(n))
+    if (own_masses) allocate (self%own_mass(n), source=0.0_real64)
   end subroutine make_room
 
-  !> Which of the optional columns the disks have.
-  pure subroutine choose_columns(self)
-    class(simulation_t), intent(inout) :: self
-    logical :: needed(n_columns)
-    integer :: k
+  !> All numbers of disk i.
+  pure function whole_disk(self, i) result(whole)
+    class(simulation_t), intent(in) :: self
+    integer(int32), intent(in) :: i
+    type(whole_disk_t) :: whole
 
-    needed(mass_column) = self%with%own_sizes
-    needed(image_column:image_column + 1) = any(self%box%periodic)
-    needed(contact_column) = self%law%contact_time > 0
-    needed(spin_column) = self%with%rotation
-    needed(angle_column) = self%with%orientation
-    self%row = merge([(count(needed(:k)), k=1, n_columns)], 0, needed)
-  end subroutine choose_columns
+    whole%disk = self%disk(i)
+    whole%tag = self%tag(i)
+    if (allocated(self%own_mass)) whole%own_mass = self%own_mass(i)
+    if (allocated(self%extra)) whole%extra = self%extra(i)
+  end function whole_disk
+
+  !> Makes a disk, of this simulation or of another part of it, disk i.
+  pure subroutine place_disk(self, i, whole)
+    class(simulation_t), intent(inout) :: self
+    integer(int32), intent(in) :: i
+    type(whole_disk_t), intent(in) :: whole
+
+    self%disk(i) = whole%disk
+    self%tag(i) = whole%tag
+    if (allocated(self%own_mass)) self%own_mass(i) = whole%own_mass
+    if (allocated(self%extra)) self%extra(i) = whole%extra
+  end subroutine place_disk
 
   !> Mass of disk i.
   pure function mass_of(self, i) result(mass)
@@ -154,8 +174,8 @@ contains
     integer(int32), intent(in) :: i
     real(real64) :: mass                          !! [mass]
 
-    if (self%row(mass_column) > 0) then
-      mass = self%extra(self%row(mass_column), i)
+    if (allocated(self%own_mass)) then
+      mass = self%own_mass(i)
     else
       mass = self%species(self%tag(i)%species)%mass
     end if
@@ -170,39 +190,22 @@ contains
     mass = [(self%mass_of(i), i=1, self%n_disks())]
   end function masses
 
-  !> Gives the species the masses of their disks, which need no column if those of each species are equal.
+  !> Gives each species the largest mass of its disks, and gives up the array of masses if those of each species are equal.
   pure subroutine settle_masses(self)
     class(simulation_t), intent(inout) :: self
-    real(real64) :: mass(size(self%disk))         ! [mass]
     logical :: equal
-    integer :: s, row
+    integer :: s
 
-    mass = self%masses()
+    if (.not. allocated(self%own_mass)) return
     equal = .true.
     do s = 1, size(self%species)
       associate (own => self%tag%species == s)
-        self%species(s)%mass = maxval(mass, mask=own)
-        equal = equal .and. .not. minval(mass, mask=own) < self%species(s)%mass
+        self%species(s)%mass = maxval(self%own_mass, mask=own)
+        equal = equal .and. .not. minval(self%own_mass, mask=own) < self%species(s)%mass
       end associate
     end do
-    row = self%row(mass_column)
-    if (.not. equal .or. row == 0) return
-    self%extra = self%extra(pack([(s, s=1, size(self%extra, 1))], [(s /= row, s=1, size(self%extra, 1))]), :)
-    self%row = merge(self%row - 1, self%row, self%row > row)
-    self%row(mass_column) = 0
+    if (equal) deallocate (self%own_mass)
   end subroutine settle_masses
-
-  !> Periods that disk i has travelled: its true position is x + image*edges.
-  pure function image(self, i) result(periods)
-    class(simulation_t), intent(in) :: self
-    integer(int32), intent(in) :: i
-    integer(int64) :: periods(2)
-
-    periods = 0
-    associate (row => self%row(image_column))
-      if (row > 0) periods = int(self%extra(row:row + 1, i), int64)
-    end associate
-  end function image
 
   !> The images of the box, for the clocks of this epoch.
   pure function images_now(self) result(images)
@@ -211,19 +214,6 @@ contains
 
     images = self%box%images(self%epoch)
   end function images_now
-
-  !> Values of column k of `disks: columns` now: what grows in time has grown since the clock of its disk.
-  pure function values_now(self, k) result(values)
-    class(simulation_t), intent(in) :: self
-    integer, intent(in) :: k                      !! of one that is there
-    real(real64) :: values(size(self%disk))
-    integer :: rate
-
-    values = self%extra(self%row(k), :)
-    rate = columns(k)%rate
-    if (rate > 0) rate = self%row(rate)
-    if (rate > 0) values = values + self%extra(rate, :)*(self%now - self%disk%clock)
-  end function values_now
 
   !> Where disk i is now. Its own state, at its clock, stays as it is.
   pure function position(self, i) result(x)
@@ -254,7 +244,7 @@ contains
     real(real64) :: omega                         !! [1/time]
 
     omega = 0
-    if (self%row(spin_column) > 0) omega = self%extra(self%row(spin_column), i)
+    if (self%with%rotation) omega = self%extra(i)%spin
   end function spin
 
   !> Changes the angular momentum of disk i.
@@ -263,9 +253,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: change            !! [mass length**2/time]
 
-    associate (omega => self%extra(self%row(spin_column), i))
-      omega = omega + change/self%inertia_of(i)
-    end associate
+    self%extra(i)%spin = self%extra(i)%spin + change/self%inertia_of(i)
   end subroutine spin_up
 
   !> Turns disk i as far as it is turned at the time t, before `disks: land` takes it there.
@@ -274,10 +262,7 @@ contains
     integer(int32), intent(in) :: i
     real(real64), intent(in) :: t
 
-    if (.not. self%with%rotation) return
-    associate (angle => self%extra(self%row(angle_column), i))
-      angle = angle + self%spin(i)*(t - self%disk(i)%clock)
-    end associate
+    if (self%with%rotation) self%extra(i)%angle = self%extra(i)%angle + self%extra(i)%spin*(t - self%disk(i)%clock)
   end subroutine turn
 
   !> Disk i makes contact at the time t, which is elastic if its last contact is not over yet (TC model).
@@ -287,7 +272,7 @@ contains
     real(real64), intent(in) :: t
     logical, intent(inout) :: elastic             !! already, or for this reason
 
-    associate (last => self%extra(self%row(contact_column), i))
+    associate (last => self%extra(i)%last_contact)
       elastic = elastic .or. (self%tag(i)%collisions > 0 .and. t - last < self%law%contact_time)
       last = t
     end associate

@@ -4,7 +4,7 @@ module wall_hits
   use box_geometry, only: next_obstacle, strike_velocity, surface_velocity, wall_normal
   use box_sides, only: side_time
   use collisions, only: grip_t, tangential_impulse, wall_law_t, wall_rebound
-  use disks, only: land, spin_column
+  use disks, only: land
   use partners, only: axis_of, is_side, sense_of
   use side_motion, only: piston
   use random_stream, only: random_stream_t, thermal_walls
@@ -108,7 +108,7 @@ contains
     call stream%draw_normals(normals)
     thermal = sqrt(temperature/sim%mass_of(i))
     sim%disk(i)%v = u + thermal*(sqrt(-2*log(1 - uniform))*normal + normals(1)*[-normal(2), normal(1)])
-    if (sim%with%rotation) sim%extra(sim%row(spin_column), i) = sqrt(temperature/sim%inertia_of(i))*normals(2)
+    if (sim%with%rotation) sim%extra(i)%spin = sqrt(temperature/sim%inertia_of(i))*normals(2)
   end subroutine leave_thermally
 
   !> Parts disk i from a surface on which it rests: with restitution 0 nothing is left that the TC model could keep, and the

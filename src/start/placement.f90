@@ -11,7 +11,7 @@ module placement
   use collisions, only: wall_law_t
   use circles, only: new_circle
   use dense_growth, only: grow_disks, smallest_scale
-  use disks, only: angle_column, disks_before, mass_column, spin_column
+  use disks, only: disks_before
   use errors, only: error_t
   use input_fit, only: complain_of_file, rounding
   use input_groups, only: group_t
@@ -86,10 +86,10 @@ contains
     do s = 1, size(species)
       if (.not. species(s)%mass_by_area) cycle
       associate (me => species(s), first => disks_before(species, s) + 1, last => disks_before(species, s + 1))
-        sim%extra(sim%row(mass_column), first:last) = me%mass*(sim%disk(first:last)%radius/me%mean_radius)**2
+        sim%own_mass(first:last) = me%mass*(sim%disk(first:last)%radius/me%mean_radius)**2
       end associate
     end do
-    if (sim%with%own_sizes) call sim%settle_masses()
+    call sim%settle_masses()
 
   contains
 
@@ -122,9 +122,9 @@ contains
               sim%disk(k)%v = file%table(3:4, k - first + 1)
             end do
           end if
-          if (sim%with%own_sizes) sim%extra(sim%row(mass_column), first:last) = file%table(mass_row, :)
-          if (species(s)%spin_in_file) sim%extra(sim%row(spin_column), first:last) = file%table(spin_row, :)
-          if (species(s)%angle_in_file) sim%extra(sim%row(angle_column), first:last) = file%table(angle_row, :)
+          if (sim%with%own_sizes) sim%own_mass(first:last) = file%table(mass_row, :)
+          if (species(s)%spin_in_file) sim%extra(first:last)%spin = file%table(spin_row, :)
+          if (species(s)%angle_in_file) sim%extra(first:last)%angle = file%table(angle_row, :)
           deallocate (file%table)
         end select
       end associate

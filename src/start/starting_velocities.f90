@@ -2,7 +2,7 @@
 !> one does not change what the others draw.
 module starting_velocities
   use kinds, only: int32, real64
-  use disks, only: disks_before, spin_column
+  use disks, only: disks_before
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use random_stream, only: random_stream_t
@@ -139,7 +139,7 @@ contains
 
       call stream%seed(settings%run%seed, [s, purpose_of_spins])
       do i = first, last
-        associate (species => settings%species(s), omega => sim%extra(sim%row(spin_column), i))
+        associate (species => settings%species(s), omega => sim%extra(i)%spin)
           if (species%rotational_temperature >= 0) then
             call stream%draw_normals(normals)
             omega = sqrt(species%rotational_temperature/sim%inertia_of(int(i, int32)))*normals(1)

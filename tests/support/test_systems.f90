@@ -91,15 +91,12 @@ contains
     end do
   end function few_disks
 
-  !> Makes room for n disks, with columns for what a test may switch on later.
+  !> Makes room for n disks, with the numbers of what a test may switch on later.
   pure subroutine make_room(sim, n)
     type(simulation_t), intent(inout) :: sim
     integer(int32), intent(in) :: n
-    type(simulation_t) :: rich
-    rich%box%periodic = .true.
-    rich%law%contact_time = 1
-    call rich%make_room(0)
-    call sim%make_room(n, like=rich)
+    call sim%make_room(n)
+    if (.not. allocated(sim%extra)) allocate (sim%extra(n))
   end subroutine make_room
 
   !> A gas of about a hundred disks with the features that the words name, in a box of 3 x 2 away from the
@@ -225,14 +222,19 @@ contains
       [b%epoch, b%now, b%epoch_begin, b%epoch_end, b%blink, b%last_advance, b%tally%sum%value()]))) text = "a time or a sum"
     if (any(a%tally%hits /= b%tally%hits)) text = "collisions with walls"
     if (any(differ(a%tally%at_surface%value(), b%tally%at_surface%value()))) text = "a sum of a wall"
-    if (any(a%row /= b%row)) text = "columns of the disks"
+    if (allocated(a%extra) .neqv. allocated(b%extra)) text = "numbers of the disks"
     do i = 1, a%n_disks()
       if (text /= "") return
       associate (p => a%disk(i), q => b%disk(i), s => a%tag(i), t => b%tag(i))
         if (s%id /= t%id) text = "order of the disks"
         if (s%collisions /= t%collisions) text = "counts of a disk"
-        if (any(differ([p%x, p%v, p%clock, p%radius, a%extra(:, i)], [q%x, q%v, q%clock, q%radius, b%extra(:, i)]))) &
+        if (any(differ([p%x, p%v, p%clock, p%radius, a%mass_of(i)], [q%x, q%v, q%clock, q%radius, b%mass_of(i)]))) &
           text = "state of a disk"
+      end associate
+      if (.not. allocated(a%extra)) cycle
+      associate (p => a%extra(i), q => b%extra(i))
+        if (any(differ([p%image, p%last_contact, p%spin, p%angle], [q%image, q%last_contact, q%spin, q%angle]))) &
+          text = "an optional number of a disk"
       end associate
     end do
   end function difference
