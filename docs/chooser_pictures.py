@@ -39,7 +39,7 @@ def digest(path: Path, at: float) -> str:
 def picture(path: Path, at: float) -> bytes:
     """The disks at a time, as PNG."""
     from ricochet import Simulation
-    from ricochet.reader import SIDES, obstacles_of, walls_of
+    from ricochet.reading.reader import SIDES, obstacles_of, walls_of
 
     figure = Figure(figsize=(1.6, 1.6), dpi=2 * PIXELS / 1.6, layout="none")
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))

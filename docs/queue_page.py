@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle, Rectangle
-from ricochet.drawing import COLOURS, STYLE, WALL
+from ricochet.figures.drawing import COLOURS, STYLE, WALL
 
 SIDES = ("left", "right", "bottom", "top")
 BOX, RADIUS = 4.0, 0.3

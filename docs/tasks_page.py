@@ -13,7 +13,7 @@ import re
 import textwrap
 from pathlib import Path
 
-from ricochet.statistics import fit_power_law, to_error
+from ricochet.analysis.statistics import fit_power_law, to_error
 
 DOCS = Path(__file__).resolve().parent
 TABLES = DOCS.parent / "runs" / "figures"

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import (
+from ricochet.figures.drawing import (
     LABELS,
     aspect_of,
     caption,
@@ -27,7 +27,7 @@ from ricochet.drawing import (
     values_of,
     warn,
 )
-from ricochet.files import destination
+from ricochet.reading.files import destination
 from ricochet.script import chosen_frames, command_line, launch, positive, report
 
 from matplotlib import animation

@@ -11,11 +11,11 @@ curves, against collisions per disk in the same units, against time in those of 
 from itertools import chain, cycle
 
 from ricochet import Run
-from ricochet.cooling import SMOOTH, Curves, energies
-from ricochet.drawing import band, caption, colours, dilute_limit, plt
+from ricochet.analysis.cooling import SMOOTH, Curves, energies
+from ricochet.analysis.statistics import Estimate
+from ricochet.figures.drawing import band, caption, colours, dilute_limit, plt
+from ricochet.predictions.theory import EQUIPARTITION
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
-from ricochet.statistics import Estimate
-from ricochet.theory import EQUIPARTITION
 
 DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 3)), (0, (8, 3)))  # of the species
 

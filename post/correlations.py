@@ -35,17 +35,29 @@ from itertools import combinations_with_replacement, cycle
 from typing import NamedTuple
 
 from ricochet import Run, RunError, hard_disks, transport
-from ricochet.correlations import correlators
-from ricochet.correlations import curves as curves_of
-from ricochet.drawing import band, caption, colours, dilute_limit, noise_band, plt
-from ricochet.nature import Refused, allow
+from ricochet.analysis.correlations import correlators, curves as curves_of
+from ricochet.analysis.speeds import relaxation
+from ricochet.analysis.statistics import (
+    Curve,
+    Estimate,
+    SeriesMean,
+    combined,
+    estimate,
+    series_mean,
+)
+from ricochet.analysis.structure import (
+    averaged,
+    bond_correlation,
+    bond_order,
+    evenly,
+    pair_correlation,
+    structure_factor,
+)
+from ricochet.analysis.thermodynamics import FLUID, all_settle, later, mean_free_time
+from ricochet.figures.drawing import band, caption, colours, dilute_limit, noise_band, plt
+from ricochet.predictions.theory import RELAXATION
+from ricochet.reading.nature import Refused, allow
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
-from ricochet.speeds import relaxation
-from ricochet.statistics import Curve, Estimate, SeriesMean, combined, estimate, series_mean
-from ricochet.structure import averaged, bond_correlation, bond_order, evenly
-from ricochet.structure import pair_correlation, structure_factor
-from ricochet.theory import RELAXATION
-from ricochet.thermodynamics import FLUID, all_settle, later, mean_free_time
 
 import numpy as np
 

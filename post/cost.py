@@ -9,10 +9,10 @@ caches.
 """
 
 from ricochet import Run
-from ricochet.drawing import COLOURS, plt
+from ricochet.analysis.statistics import PowerLaw, fit_power_law
+from ricochet.analysis.thermodynamics import packing
+from ricochet.figures.drawing import COLOURS, plt
 from ricochet.script import command_line, launch, recorded, report
-from ricochet.statistics import PowerLaw, fit_power_law
-from ricochet.thermodynamics import packing
 
 import numpy as np
 

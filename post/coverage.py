@@ -9,10 +9,10 @@ For comparison: the error that takes every sample of the observables for indepen
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
-from ricochet.nature import allow
+from ricochet.analysis.thermodynamics import FLUID, virial_over_kt, z_virial
+from ricochet.figures.drawing import COLOURS, caption, plt
+from ricochet.reading.nature import allow
 from ricochet.script import by_packing, command_line, launch, report
-from ricochet.thermodynamics import FLUID, virial_over_kt, z_virial
 
 import numpy as np
 import scipy

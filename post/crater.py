@@ -14,8 +14,8 @@ more energy left than `stop.energy_fraction`.
 """
 
 from ricochet import Run, crater, drawing
-from ricochet.crater import Crater, bed, displaced, projectile
-from ricochet.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
+from ricochet.analysis.crater import Crater, bed, displaced, projectile
+from ricochet.figures.drawing import COLOURS, LABELS, WALL, caption, disk_collection, draw_box, plt
 from ricochet.script import command_line, launch, report
 
 import numpy as np

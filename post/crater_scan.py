@@ -17,11 +17,15 @@ from itertools import chain
 from typing import NamedTuple
 
 from ricochet import Run, RunError
-from ricochet.crater import bed, box_takes_part, crater, ended_by_time, energy_fraction, projectile
-from ricochet.drawing import COLOURS, colours, panel_grid, plt
-from ricochet.reader import span
-from ricochet.script import command_line, grouped, launch, measured, report
-from ricochet.statistics import (
+from ricochet.analysis.crater import (
+    bed,
+    box_takes_part,
+    crater,
+    ended_by_time,
+    energy_fraction,
+    projectile,
+)
+from ricochet.analysis.statistics import (
     FEWEST_RUNS,
     Estimate,
     PowerLaw,
@@ -29,6 +33,9 @@ from ricochet.statistics import (
     fit_power_law,
     to_error,
 )
+from ricochet.figures.drawing import COLOURS, colours, panel_grid, plt
+from ricochet.reading.reader import span
+from ricochet.script import command_line, grouped, launch, measured, report
 
 import numpy as np
 

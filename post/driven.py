@@ -34,13 +34,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ricochet import Run, RunError, drawing, hard_disks, theory
-from ricochet.drawing import plt
-from ricochet.nature import Refused
-from ricochet.reader import SIDES
+from ricochet.analysis.statistics import Estimate, combined, grows, series_mean, windows
+from ricochet.analysis.structure import largest_cluster
+from ricochet.analysis.thermodynamics import packing
+from ricochet.figures.drawing import plt
+from ricochet.reading.nature import Refused
+from ricochet.reading.reader import SIDES
 from ricochet.script import command_line, launch, measured, over_runs, report
-from ricochet.statistics import Estimate, combined, grows, series_mean, windows
-from ricochet.structure import largest_cluster
-from ricochet.thermodynamics import packing
 
 import numpy as np
 

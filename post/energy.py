@@ -14,8 +14,8 @@ and the largest change.
 from collections.abc import Callable
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, colours, lone, plt
-from ricochet.nature import Refused
+from ricochet.figures.drawing import COLOURS, caption, colours, lone, plt
+from ricochet.reading.nature import Refused
 from ricochet.script import command_line, launch, report
 
 import numpy as np

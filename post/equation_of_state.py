@@ -13,10 +13,10 @@ Santos, Yuste and Lopez de Haro 1999, of the fluid, for their <r>^2 / <r^2>: one
 """
 
 from ricochet import Run, RunError, hard_disks
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.analysis.statistics import combined
+from ricochet.analysis.thermodynamics import z_ways
+from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.script import by_packing, columns, command_line, launch, measured, over_runs, report
-from ricochet.statistics import combined
-from ricochet.thermodynamics import z_ways
 
 import numpy as np
 from matplotlib.ticker import LogLocator

@@ -14,11 +14,11 @@ from functools import reduce
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.drawing import caption, colours, plt
-from ricochet.nature import SETTLED, allow
+from ricochet.analysis.statistics import Estimate, estimate, to_error, when, windows
+from ricochet.analysis.thermodynamics import lightest_and_heaviest, start_of_equilibrium
+from ricochet.figures.drawing import caption, colours, plt
+from ricochet.reading.nature import SETTLED, allow
 from ricochet.script import command_line, grouped, launch, measured, report
-from ricochet.statistics import Estimate, estimate, to_error, when, windows
-from ricochet.thermodynamics import lightest_and_heaviest, start_of_equilibrium
 
 import numpy as np
 

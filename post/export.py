@@ -11,7 +11,7 @@ and the time.  Numbers keep all their digits.
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.files import destination
+from ricochet.reading.files import destination
 from ricochet.script import chosen_frames, command_line, launch, report
 
 from tqdm import tqdm

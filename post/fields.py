@@ -22,11 +22,11 @@ are the walls; how far the gas there is from them, by the law, is in the table.
 import argparse
 
 from ricochet import Run
-from ricochet.drawing import band, draw_box, plt, titled
-from ricochet.fields import ACROSS, fields, has_theory, places, prediction
-from ricochet.reader import SIDES
+from ricochet.analysis.fields import ACROSS, fields, has_theory, places, prediction
+from ricochet.analysis.statistics import Estimate
+from ricochet.figures.drawing import band, draw_box, plt, titled
+from ricochet.reading.reader import SIDES
 from ricochet.script import command_line, launch, measured, report, spread
-from ricochet.statistics import Estimate
 
 import numpy as np
 from matplotlib.patches import Circle

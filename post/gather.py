@@ -12,8 +12,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from ricochet.ensembles import gathered
-from ricochet.files import destination
+from ricochet.reading.files import destination
+from ricochet.running.ensembles import gathered
 from ricochet.script import launch
 
 

@@ -18,11 +18,18 @@ their errors come from ten blocks of time.
 from typing import NamedTuple
 
 from ricochet import Run, RunError, statistics, thermodynamics
-from ricochet.drawing import bars, caption, colours, plt
-from ricochet.nature import allow
-from ricochet.reader import Species
+from ricochet.analysis.statistics import (
+    Estimate,
+    SeriesMean,
+    binned,
+    estimate,
+    series_mean,
+    to_error,
+)
+from ricochet.figures.drawing import bars, caption, colours, plt
+from ricochet.reading.nature import allow
+from ricochet.reading.reader import Species
 from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, SeriesMean, binned, estimate, series_mean, to_error
 
 import numpy as np
 import scipy

@@ -21,13 +21,13 @@ from the law.
 """
 
 from ricochet import Run
-from ricochet.cooling import SLOW, energy_left, exponent, haff, soft_law
-from ricochet.drawing import band, caption, colours, plt
-from ricochet.hard_disks import haff_rate
-from ricochet.reader import Restitution
+from ricochet.analysis.cooling import SLOW, energy_left, exponent, haff, soft_law
+from ricochet.analysis.statistics import Estimate, to_error
+from ricochet.analysis.thermodynamics import packing
+from ricochet.figures.drawing import band, caption, colours, plt
+from ricochet.predictions.hard_disks import haff_rate
+from ricochet.reading.reader import Restitution
 from ricochet.script import by_restitution, command_line, launch, measured, report, spread
-from ricochet.statistics import Estimate, to_error
-from ricochet.thermodynamics import packing
 
 import numpy as np
 

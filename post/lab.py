@@ -18,8 +18,8 @@ from pathlib import Path
 
 from player import INPUTS, chooser, lab_page, view
 from ricochet import RunError
-from ricochet.lab import Lab, form
-from ricochet.live import application, page_of, serving
+from ricochet.pages.lab import Lab, form
+from ricochet.pages.live import application, page_of, serving
 from ricochet.script import Parser, launch
 
 from aiohttp import web
@@ -27,7 +27,7 @@ from aiohttp import web
 #: A worker, which finds the player's module where this one is.
 WORKER = """import sys; sys.path[:0] = [{!r}]
 from player import scene
-from ricochet.worker import work
+from ricochet.pages.worker import work
 work(scene)"""
 
 

@@ -14,10 +14,10 @@ A gas that cools has no such rate.
 from typing import NamedTuple
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, plt
-from ricochet.nature import TRAITS, allow
+from ricochet.analysis.statistics import Estimate, estimate
+from ricochet.figures.drawing import COLOURS, plt
+from ricochet.reading.nature import TRAITS, allow
 from ricochet.script import command_line, launch, measured, report
-from ricochet.statistics import Estimate, estimate
 
 import numpy as np
 

@@ -11,12 +11,12 @@ warnings.
 """
 
 from ricochet import Run
-from ricochet.drawing import caption, colours, plt
-from ricochet.hard_disks import MELTING
-from ricochet.nature import allow
+from ricochet.analysis.statistics import combined
+from ricochet.analysis.thermodynamics import z_virial
+from ricochet.figures.drawing import caption, colours, plt
+from ricochet.predictions.hard_disks import MELTING
+from ricochet.reading.nature import allow
 from ricochet.script import by_packing, command_line, grouped, launch, over_runs, report
-from ricochet.statistics import combined
-from ricochet.thermodynamics import z_virial
 
 import numpy as np
 

@@ -24,10 +24,10 @@ from itertools import combinations_with_replacement
 from math import comb
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, caption, plt
+from ricochet.analysis.statistics import Estimate, estimate
+from ricochet.analysis.thermodynamics import kinds_of_disks, start_of_equilibrium, temperature
+from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.script import command_line, grouped, launch, measured, report
-from ricochet.statistics import Estimate, estimate
-from ricochet.thermodynamics import kinds_of_disks, start_of_equilibrium, temperature
 
 import numpy as np
 

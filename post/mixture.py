@@ -11,13 +11,13 @@ or kicks heat, or disks turn, it is the mean over all disks in equilibrium, with
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, bars, caption, plt
-from ricochet.nature import SETTLED, allow
+from ricochet.analysis.speeds import means
+from ricochet.analysis.statistics import binned, combined, hold_against, memory, to_error
+from ricochet.analysis.thermodynamics import kinds_of_disks, mean_energy
+from ricochet.figures.drawing import COLOURS, bars, caption, plt
+from ricochet.predictions.theory import maxwell_cdf, maxwell_pdf
+from ricochet.reading.nature import SETTLED, allow
 from ricochet.script import command_line, late_frames, launch, measured, report
-from ricochet.speeds import means
-from ricochet.statistics import binned, combined, hold_against, memory, to_error
-from ricochet.theory import maxwell_cdf, maxwell_pdf
-from ricochet.thermodynamics import kinds_of_disks, mean_energy
 
 import numpy as np
 

@@ -28,11 +28,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
-from ricochet.files import destination
-from ricochet.nature import known, rows_of
-from ricochet.paths import seen, turns_between, why_unknown
-from ricochet.reader import SIDES, span
+from ricochet.analysis.paths import seen, turns_between, why_unknown
+from ricochet.figures.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
+from ricochet.reading.files import destination
+from ricochet.reading.nature import known, rows_of
+from ricochet.reading.reader import SIDES, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np
@@ -401,7 +401,7 @@ def main() -> None:
     if args.live:
         if args.output:
             raise RunError("--live writes no file: leave out -o")
-        from ricochet.live import serve  # films need no server
+        from ricochet.pages.live import serve  # films need no server
 
         def newest(now: Run) -> dict:
             return texts(*chosen_film(now, args, LIVE_ROOM)[1])

@@ -18,13 +18,12 @@ different temperature, only the free paths are found: in the frames after --skip
 nothing drifts, or 15 collisions per disk after the start of a gas that cools.
 """
 
-from ricochet import Run, RunError, statistics
-from ricochet import thermodynamics as td
-from ricochet.drawing import COLOURS, band, bars, caption, plt
-from ricochet.nature import allow
+from ricochet import Run, RunError, statistics, thermodynamics as td
+from ricochet.analysis.statistics import FINE, Curve, Estimate, SeriesMean, estimate
+from ricochet.figures.drawing import COLOURS, band, bars, caption, plt
+from ricochet.predictions.theory import path_density
+from ricochet.reading.nature import allow
 from ricochet.script import command_line, launch, points, report
-from ricochet.statistics import FINE, Curve, Estimate, SeriesMean, estimate
-from ricochet.theory import path_density
 
 import numpy as np
 

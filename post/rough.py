@@ -11,8 +11,8 @@ develops as it cools counts in T: it lowers the ratio, at packing 0.02 by 3.8 to
 """
 
 from ricochet import Run, RunError, theory
-from ricochet.cooling import Curves, rough, rough_law, steady_ratio
-from ricochet.drawing import COLOURS, band, caption, plt
+from ricochet.analysis.cooling import Curves, rough, rough_law, steady_ratio
+from ricochet.figures.drawing import COLOURS, band, caption, plt
 from ricochet.script import command_line, launch, measured, report, spread
 
 

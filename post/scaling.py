@@ -8,7 +8,7 @@ least and the largest.  runs/scaling.sh does it all.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, plt
+from ricochet.figures.drawing import COLOURS, plt
 from ricochet.script import command_line, grouped, launch, recorded, report
 
 import numpy as np

@@ -10,10 +10,10 @@ last velocity.  Exact for a finite mass ratio M = m1 / m2 and restitution xi, ka
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import COLOURS, plt
-from ricochet.nature import allow
+from ricochet.figures.drawing import COLOURS, plt
+from ricochet.predictions.theory import scattering_angle
+from ricochet.reading.nature import allow
 from ricochet.script import command_line, launch, report
-from ricochet.theory import scattering_angle
 
 import numpy as np
 

@@ -13,9 +13,9 @@ side is drawn on both.
 import argparse
 
 from ricochet import Run, drawing
-from ricochet.drawing import plt
+from ricochet.analysis.thermodynamics import packing
+from ricochet.figures.drawing import plt
 from ricochet.script import chosen_frames, command_line, frame_list, launch, report
-from ricochet.thermodynamics import packing
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize, to_rgba_array

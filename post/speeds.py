@@ -20,14 +20,31 @@ a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 from ricochet import Run, RunError
-from ricochet.drawing import bars, caption, colours, dilute_limit, noise_band, plt
-from ricochet.nature import TRAITS, Refused, allow
+from ricochet.analysis.speeds import (
+    all_move,
+    exact_law,
+    independent_frames,
+    kt_of_frames,
+    moment,
+    reduced_speeds,
+    relaxation,
+)
+from ricochet.analysis.statistics import (
+    Estimate,
+    SeriesMean,
+    binned,
+    combined,
+    drifts,
+    estimate,
+    grows,
+    hold_against,
+    series_mean,
+    to_error,
+)
+from ricochet.figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
+from ricochet.predictions.theory import RELAXATION, maxwell_cdf, maxwell_pdf
+from ricochet.reading.nature import TRAITS, Refused, allow
 from ricochet.script import command_line, grouped, late_frames, launch, measured, report
-from ricochet.speeds import all_move, exact_law, independent_frames, kt_of_frames, moment
-from ricochet.speeds import reduced_speeds, relaxation
-from ricochet.statistics import Estimate, SeriesMean, binned, combined, drifts, estimate, grows
-from ricochet.statistics import hold_against, series_mean, to_error
-from ricochet.theory import RELAXATION, maxwell_cdf, maxwell_pdf
 
 import numpy as np
 

@@ -8,7 +8,7 @@ are the exact path of flight without gravity.  Several runs are drawn side by si
 """
 
 from ricochet import Run
-from ricochet.drawing import COLOURS, caption, disk_collection, draw_box, plt
+from ricochet.figures.drawing import COLOURS, caption, disk_collection, draw_box, plt
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np

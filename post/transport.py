@@ -24,10 +24,10 @@ large boxes.  N disks that share a fixed energy have a conductivity that is lowe
 it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
 """
 
-from ricochet.drawing import COLOURS, band, caption, colours, plt
+from ricochet.analysis.statistics import combined
+from ricochet.analysis.transport import Found, coefficients
+from ricochet.figures.drawing import COLOURS, band, caption, colours, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
-from ricochet.statistics import combined
-from ricochet.transport import Found, coefficients
 
 NO_CONDUCTIVITY = (
     "no conductivity and D of a mixture: its energy goes with the species that diffuse, too; "

@@ -27,7 +27,7 @@ plan() {
     [$shared/post/requirements.txt]=requirements.txt)
   for text in LICENSE README.md CHANGELOG.md CITATION.cff docs/*.{md,png,ipynb}; do behind[$documents/$text]=$text; done
   behind[$documents/input]="-> ../../ricochet/input" # pages lead there
-  for text in input/*.* input/pictures/* post/*.* post/ricochet/*.* post/page/*.*; do behind[$shared/$text]=$text; done
+  for text in input/*.* input/pictures/* post/*.* post/ricochet/{,*/}*.* post/page/*.*; do behind[$shared/$text]=$text; done
   for text in libricochet.so libricochet_files.so; do
     [[ -e $build/$text ]] || continue # made by make library
     behind[$package/lib/$text]=$build/$text

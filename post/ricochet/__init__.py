@@ -1,27 +1,28 @@
-"""Start Ricochet, read and analyse its output files.
+"""Start Ricochet, read its output files, and analyse them.
 
     import ricochet
     run = ricochet.run("input/gas.nml")
     run = ricochet.read_run("runs/gas.h5")
+    curve = ricochet.structure.pair_correlation(run)
 
-`program` starts simulations, `simulation` has them in memory, `ensembles` makes many; `starting`
-writes what they start from; `reader` opens files,
-`bridges` hands them to other programs; `nature` says what kind of run one is, and so which laws
-are for it; `statistics` finds means and errors, `theory` and `hard_disks` have the laws;
-`thermodynamics`, `correlations`, `transport`, `structure`, `fields`, `speeds`, `cooling` and
-`crater` measure;
-`drawing` draws disks and walls, `film` moves them; `paths` knows where disks are between frames;
-`live` shows a run that goes on, `lab` starts the runs of its pages; `script` is what the
-command-line scripts share, `files` what opens files.
+The modules are sorted into sub-packages; `README.md` beside this file has the picture.  A module is
+an attribute of the package, whatever its sub-package is: `from ricochet import structure` imports
+`ricochet.analysis.structure`.  It is loaded when it is first used, because `import ricochet` should
+load neither Matplotlib nor a web server.
 """
 
-from . import packages as packages  # first
-from .bridges import mdanalysis_universe
-from .ensembles import ensemble, sweep
-from .program import ProgramError, run
-from .reader import Events, Obstacle, Run, RunError, Series, read_run
-from .simulation import Simulation
-from .starting import write_start
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from . import packages as packages  # first: it reports packages that are missing
+from .aliases import Aliases
+from .reading.bridges import mdanalysis_universe
+from .reading.reader import Events, Obstacle, Run, RunError, Series, read_run
+from .running.ensembles import ensemble, sweep
+from .running.program import ProgramError, run
+from .running.simulation import Simulation
+from .running.starting import write_start
 
 __all__ = [
     "Events",
@@ -38,3 +39,42 @@ __all__ = [
     "sweep",
     "write_start",
 ]
+
+if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
+    from .analysis import cooling as cooling
+    from .analysis import correlations as correlations
+    from .analysis import crater as crater
+    from .analysis import fields as fields
+    from .analysis import paths as paths
+    from .analysis import speeds as speeds
+    from .analysis import statistics as statistics
+    from .analysis import structure as structure
+    from .analysis import thermodynamics as thermodynamics
+    from .analysis import transport as transport
+    from .figures import drawing as drawing
+    from .figures import film as film
+    from .pages import lab as lab
+    from .pages import live as live
+    from .pages import worker as worker
+    from .predictions import hard_disks as hard_disks
+    from .predictions import theory as theory
+    from .reading import bridges as bridges
+    from .reading import files as files
+    from .reading import nature as nature
+    from .reading import reader as reader
+    from .running import ensembles as ensembles
+    from .running import program as program
+    from .running import simulation as simulation
+    from .running import starting as starting
+else:
+    ALIASES = Aliases()
+    sys.meta_path.append(ALIASES)
+
+    def __getattr__(name: str) -> object:
+        """The module of this short name."""
+        if name in ALIASES.modules:
+            return import_module(f"{__name__}.{name}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *ALIASES.modules})

@@ -17,13 +17,13 @@ from typing import NoReturn
 import matplotlib
 import numpy as np
 
-from .drawing import LABELS, STYLE, plt, save, warn
-from .ensembles import in_order, read_manifest
-from .files import did_you_mean, destination
-from .nature import Refused
-from .reader import Restitution, Run, RunError, read_run
-from .statistics import Curve, Estimate, SeriesMean, combined, doubts
-from .thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
+from .analysis.statistics import Curve, Estimate, SeriesMean, combined, doubts
+from .analysis.thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
+from .figures.drawing import LABELS, STYLE, plt, save, warn
+from .reading.files import destination, did_you_mean
+from .reading.nature import Refused
+from .reading.reader import Restitution, Run, RunError, read_run
+from .running.ensembles import in_order, read_manifest
 
 matplotlib.use("Agg")
 plt.style.use(STYLE)

@@ -21,14 +21,22 @@ import melting
 import rates
 import trajectory
 from driven import demon_law, fuller, noise_law, temperature_law
-from ricochet import Events, RunError, fields, read_run, statistics, theory, write_start
-from ricochet import cooling as cool
-from ricochet import hard_disks as hd
-from ricochet import thermodynamics as td
-from ricochet import transport as tp
-from ricochet.drawing import plt
-from ricochet.nature import Refused, nature_of
-from ricochet.reader import Restitution
+from ricochet import (
+    Events,
+    RunError,
+    cooling as cool,
+    fields,
+    hard_disks as hd,
+    read_run,
+    statistics,
+    theory,
+    thermodynamics as td,
+    transport as tp,
+    write_start,
+)
+from ricochet.figures.drawing import plt
+from ricochet.reading.nature import Refused, nature_of
+from ricochet.reading.reader import Restitution
 from synthetic_run import ROOT, drawn, run_script, write_run, written
 from validation.estimators import force, hit_rate
 

@@ -18,9 +18,8 @@ import aiohttp
 import numpy as np
 import pytest
 
-from ricochet import Simulation
-from ricochet import lab as module
-from ricochet.worker import AHEAD, pressure_between, sampled
+from ricochet import Simulation, lab as module
+from ricochet.pages.worker import AHEAD, pressure_between, sampled
 from synthetic_run import ROOT, run_script
 from whole_runs import PATIENCE, wait_for
 

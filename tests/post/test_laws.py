@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from ricochet import hard_disks as hd
-from ricochet import theory
-from ricochet.theory import path_density
+from ricochet import hard_disks as hd, theory
+from ricochet.predictions.theory import path_density
 from validation.laws import cooling_ratio, mixture_rates
 
 

@@ -10,7 +10,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from ricochet.live import LOOK
+from ricochet.pages.live import LOOK
 from synthetic_run import ROOT, run_script, write_run
 from whole_runs import PATIENCE, frames_in, wait_for, write_input
 

@@ -13,9 +13,9 @@ from PIL import Image
 
 import player
 from ricochet import Simulation
-from ricochet.lab import form
-from ricochet.program import ProgramError
-from ricochet.worker import DISKS, told
+from ricochet.pages.lab import form
+from ricochet.pages.worker import DISKS, told
+from ricochet.running.program import ProgramError
 from synthetic_run import ROOT
 from whole_runs import PATIENCE, wait_for
 

@@ -5,8 +5,8 @@ import pytest
 
 import player
 from ricochet import read_run
-from ricochet.drawing import draw_box, plt
-from ricochet.reader import SIDES
+from ricochet.figures.drawing import draw_box, plt
+from ricochet.reading.reader import SIDES
 from synthetic_run import maxwell_velocities, run_script, write_run, written
 from whole_runs import wait_for
 

@@ -178,6 +178,6 @@ def test_a_missing_program_is_named(monkeypatch, tmp_path):
         package.run(GROUPS)
     monkeypatch.delenv("RICOCHET")
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(program, "__file__", str(tmp_path / "lib/ricochet/program.py"))
+    monkeypatch.setattr(program, "HERE", tmp_path / "lib/ricochet")
     with pytest.raises(ProgramError, match=r"^no program ricochet on PATH: run make install in a "):
         package.run(GROUPS)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ricochet import RunError, read_run
-from ricochet.drawing import draw_box, plt, radius_marks
+from ricochet.figures.drawing import draw_box, plt, radius_marks
 from synthetic_run import ROOT, SCRIPTS, run_script, write_run
 from whole_runs import FINISHED, MIXTURE, STOPPED
 from whole_runs import executable, frames_in, ran, wait_for, write_input

@@ -18,9 +18,18 @@ import player
 import scaling
 import scattering
 import trajectory
-from ricochet import RunError
-from ricochet import cooling, crater, read_run, script, speeds, statistics, theory, thermodynamics
-from ricochet.drawing import caption, plt, with_images
+from ricochet import (
+    RunError,
+    cooling,
+    crater,
+    read_run,
+    script,
+    speeds,
+    statistics,
+    theory,
+    thermodynamics,
+)
+from ricochet.figures.drawing import caption, plt, with_images
 from ricochet.script import chosen_frames, distinct, frame_list, grouped
 from synthetic_run import drawn, maxwell_velocities, run_script, write_run, written
 

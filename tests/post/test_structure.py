@@ -8,12 +8,18 @@ import scipy
 
 import correlations
 import snapshot
-from ricochet import RunError, Simulation, statistics, structure, transport
-from ricochet import correlations as pairs
-from ricochet import hard_disks as hd
-from ricochet.drawing import values_of
-from ricochet.nature import Refused
-from ricochet.structure import largest_cluster
+from ricochet import (
+    RunError,
+    Simulation,
+    correlations as pairs,
+    hard_disks as hd,
+    statistics,
+    structure,
+    transport,
+)
+from ricochet.analysis.structure import largest_cluster
+from ricochet.figures.drawing import values_of
+from ricochet.reading.nature import Refused
 from synthetic_run import run_script, written
 
 PERIODIC = (True, True)

@@ -22,7 +22,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "tests"), str(ROOT / "post")]
-from ricochet.program import namelist  # noqa: E402
+from ricochet.running.program import namelist  # noqa: E402
 from whole_runs import PATIENCE, within  # noqa: E402
 
 MOST_SECONDS = int(os.environ.get("MOST_SECONDS", "5"))  # of processor time

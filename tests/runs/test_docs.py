@@ -420,7 +420,7 @@ def look_at_bars(run, folder):
     ran(*run, "--set", "contact.wall_rule=normal", "--force", cwd=folder, check=True)
     code = """if True:
         from ricochet import read_run
-        from ricochet.paths import seen, turns_between
+        from ricochet.analysis.paths import seen, turns_between
         run = read_run("all.h5")
         assert run.walls.tolist() == [[[1, 0.1], [1, 0.9]]]
         frames = list(range(0, run.frames, 50))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fuzz_input
 import pytest
-from ricochet.program import namelist
+from ricochet.running.program import namelist
 from whole_runs import FILES, USAGE
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from ricochet import ProgramError, RunError, Simulation, read_run
-from ricochet.simulation import COLUMNS, NEVER, library
+from ricochet.running.simulation import COLUMNS, NEVER, library
 from whole_runs import ran
 
 GAS = """&box boundary = 'periodic', 'wall' gravity = 0, -1 /

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from ricochet import ProgramError, RunError, ensemble, sweep
-from ricochet.ensembles import typed
+from ricochet.running.ensembles import typed
 from whole_runs import executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]

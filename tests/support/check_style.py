@@ -1,12 +1,13 @@
-"""Holds src/ against the rules of the design that no other tool knows. One line per problem.
+"""Holds the sources against the rules of the design that no other tool knows. One line per problem.
 
     python tests/support/check_style.py [FOLDER]
 
-Arrows between folders (the picture in src/README.md), lengths of files, procedures and argument
-lists, comments before procedures, privacy, names, no preprocessor; and no path of somebody's
-machine in any file of the project.
+Arrows between folders (the pictures in src/README.md and post/ricochet/README.md), lengths of
+files, procedures and argument lists, comments before procedures, privacy, names, no preprocessor;
+and no path of somebody's machine in any file of the project.
 """
 
+import ast
 import re
 import subprocess
 import sys
@@ -69,6 +70,43 @@ def arrow_problems(
         if own != "src" and other not in arrows.get(own, set()) | {own}:
             what = f"{own}/ uses {use[1]} of {other}/"
             yield Problem(path, number, f"{what}: no such arrow in src/README.md")
+
+
+def import_problems(root: Path, package: Path) -> Iterator[Problem]:
+    """Imports between the folders of a Python package that have no arrow in its picture.
+
+    A module that stands in the package itself counts as a folder; `__init__.py` may use all.
+    """
+    page = package / "README.md"
+    arrows = arrows_of(page.read_text())
+    files = [path for path in package.rglob("*.py") if path != package / "__init__.py"]
+    nodes = {path: path.relative_to(package).parts[0].removesuffix(".py") for path in files}
+    for name in sorted((arrows.keys() | set().union(*arrows.values())) - set(nodes.values())):
+        yield Problem(page.relative_to(root), 1, f"there is no {name} in the package")
+    for folder in sorted({path.parent for path in files}):
+        if len([path for path in folder.glob("*.py") if path in nodes]) > MOST_FILES_OF_FOLDER:
+            yield Problem(folder.relative_to(root), 1, f"more than {MOST_FILES_OF_FOLDER} modules")
+    for path, own in sorted(nodes.items()):
+        for line, other in imports_of(path, package):
+            if other not in arrows.get(own, set()) | {own}:
+                what = f"{own} imports {other}"
+                yield Problem(path.relative_to(root), line, f"{what}: no such arrow in {page.name}")
+
+
+def imports_of(path: Path, package: Path) -> Iterator[tuple[int, str]]:
+    """Line and first name below the package of each import, wherever it stands in the file."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level > 0:
+            start = path.parents[node.level - 1].relative_to(package).parts
+            start += tuple(node.module.split(".")) if node.module else ()
+            for name in node.names:
+                yield node.lineno, (*start, name.name)[0]
+        elif isinstance(node, ast.ImportFrom | ast.Import):
+            whole = isinstance(node, ast.Import)
+            for name in node.names:
+                called = name.name if whole else f"{node.module}.{name.name}"
+                if called.split(".")[0] == package.name:
+                    yield node.lineno, called.split(".")[1] if "." in called else called
 
 
 def unit_problems(path: Path, lines: list[str]) -> Iterator[Problem]:
@@ -202,6 +240,8 @@ def problems_of(root: Path) -> Iterator[Problem]:
         yield from procedure_problems(own, lines)
         yield from heading_problems(own, text)
     yield from name_problems(root, paths)
+    if (package := root / "post" / "ricochet").is_dir():
+        yield from import_problems(root, package)
     yield from path_problems(root)
 
 

@@ -18,7 +18,7 @@ from whole_runs import environment, executable, ran
 
 ROOT = Path(__file__).resolve().parents[2]
 #: What pages lead to and no install brings: see there in a clone.
-SOURCES = {"src", "runs", "tests", "CONTRIBUTING.md"}
+SOURCES = {"src", "post", "runs", "tests", "CONTRIBUTING.md"}
 PFUNIT_DIR = os.environ.get("PFUNIT_DIR", "")
 SUITE = """module test_it
   use funit

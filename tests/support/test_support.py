@@ -296,3 +296,37 @@ def test_folders_and_what_they_use_are_those_of_the_picture(tmp_path):
     place = "src/high/upper.f90:3: high/ uses lower of low/"
     lost, used = sorted(style_problems(tmp_path, MODULE, drawn))
     assert lost == "src/README.md:1: there is no folder src/lost" and used.startswith(place)
+
+
+@pytest.mark.parametrize(
+    ("line", "used"),
+    [
+        ("from ..reading import reader", "reading"),
+        ("from ..reading.reader import Run", "reading"),
+        ("from ricochet.reading import reader", "reading"),
+        ("def run():\n    import ricochet.commands", "commands"),
+        ("from .. import commands", "commands"),
+    ],
+)
+def test_imports_of_the_package_are_those_of_its_picture(tmp_path, line, used):
+    """Absolute or relative, at the top of a module or in a function; its own folder is free."""
+    package = tmp_path / "post" / "ricochet"
+    ran("git", "init", "-q", tmp_path, check=True)
+    for name in ("__init__", "commands", "reading/reader", "pages/live", "pages/lab"):
+        path = package / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "README.md").write_text("no picture")
+    (package / "pages" / "lab.py").write_text(f"from . import live\n{line}\n")
+
+    def problems(picture: str) -> list[str]:
+        (package / "README.md").write_text(picture)
+        return [str(problem) for problem in problems_of(tmp_path)]
+
+    assert problems("  pages --> reading & commands") == []
+    (problem,) = problems("  commands --> reading\n  pages --> reading".replace(used, "pages"))
+    where = line.count("\n") + 2
+    assert problem.startswith(f"post/ricochet/pages/lab.py:{where}: pages imports {used}")
+    (problem,) = problems("  pages --> reading & commands & lost")
+    assert problem == "post/ricochet/README.md:1: there is no lost in the package"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ricochet.statistics import Estimate, SeriesMean
+from ricochet.analysis.statistics import Estimate, SeriesMean
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from ricochet import Run
-from ricochet.statistics import Estimate, estimate
+from ricochet.analysis.statistics import Estimate, estimate
 
 from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative
 from .inputs import PERIODIC, ensemble, namelist

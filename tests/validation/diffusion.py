@@ -5,10 +5,9 @@ Frames in single precision: seven digits of a velocity are more than enough here
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.correlations import Correlator, curves
-from ricochet.thermodynamics import later
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.correlations import Correlator, curves
+from ricochet.analysis.thermodynamics import later
 
 from .case import Case, Member, within
 from .estimators import over

@@ -5,9 +5,8 @@ from math import log, sqrt
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.cooling import energy_left, exponent, soft_law
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.cooling import energy_left, exponent, soft_law
 
 from .case import AT_LEAST, AT_MOST, EXACT, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, each, over

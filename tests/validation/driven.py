@@ -4,12 +4,11 @@ from math import pi, sqrt
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.statistics import Estimate, combined, hold_against
-from ricochet.theory import ROUGH_RATIOS, maxwell_cdf
-from ricochet.thermodynamics import start_of_equilibrium
-from ricochet.transport import MOMENTS, of_moments
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.statistics import Estimate, combined, hold_against
+from ricochet.analysis.thermodynamics import start_of_equilibrium
+from ricochet.analysis.transport import MOMENTS, of_moments
+from ricochet.predictions.theory import ROUGH_RATIOS, maxwell_cdf
 
 from .case import AT_LEAST, Case, Member, sigmas, within
 from .estimators import over

@@ -4,10 +4,9 @@ from math import gamma, pi, sqrt
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.statistics import SeriesMean
-from ricochet.thermodynamics import collision_rate, packing, z_rate, z_virial, z_wall
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.statistics import SeriesMean
+from ricochet.analysis.thermodynamics import collision_rate, packing, z_rate, z_virial, z_wall
 
 from .case import Case, Member, relative, sigmas, within
 from .estimators import each, force, hit_rate, over, pooled, several

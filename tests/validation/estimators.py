@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ricochet import Run
-from ricochet.statistics import Estimate, SeriesMean, combined, estimate, series_mean
-from ricochet.thermodynamics import steps
+from ricochet.analysis.statistics import Estimate, SeriesMean, combined, estimate, series_mean
+from ricochet.analysis.thermodynamics import steps
 
 
 def each(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ricochet import Run
-from ricochet.statistics import hold_against
-from ricochet.theory import maxwell_cdf
+from ricochet.analysis.statistics import hold_against
+from ricochet.predictions.theory import maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import each, middle, over

@@ -5,10 +5,9 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.correlations import Correlator, curves
-from ricochet.statistics import excess_kurtosis
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.correlations import Correlator, curves
+from ricochet.analysis.statistics import excess_kurtosis
 
 from .case import Case, Member, sigmas, within
 from .estimators import over

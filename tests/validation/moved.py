@@ -6,9 +6,9 @@ import numpy as np
 
 from driven import fuller, share
 from ricochet import Run
-from ricochet.statistics import Estimate, combined, series_mean
-from ricochet.hard_disks import adiabat
-from ricochet.theory import demon_share, pushed_width
+from ricochet.analysis.statistics import Estimate, combined, series_mean
+from ricochet.predictions.hard_disks import adiabat
+from ricochet.predictions.theory import demon_share, pushed_width
 
 from .case import AT_LEAST, AT_MOST, Case, Member, Tolerance, relative, sigmas, within
 from .estimators import each, over, several

@@ -5,9 +5,8 @@ from math import pi, sqrt
 
 import numpy as np
 
-from ricochet import Run
-from ricochet import hard_disks as hd
-from ricochet.fields import fields, places, prediction
+from ricochet import Run, hard_disks as hd
+from ricochet.analysis.fields import fields, places, prediction
 
 from .case import Case, Member, relative, sigmas
 from .estimators import over

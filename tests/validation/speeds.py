@@ -7,9 +7,9 @@ import numpy as np
 from scipy import stats
 
 from ricochet import Run
-from ricochet.statistics import Estimate, estimate, excess_kurtosis, hold_against
-from ricochet.theory import finite_n_cdf, maxwell_cdf
-from ricochet.thermodynamics import kt_at_start
+from ricochet.analysis.statistics import Estimate, estimate, excess_kurtosis, hold_against
+from ricochet.analysis.thermodynamics import kt_at_start
+from ricochet.predictions.theory import finite_n_cdf, maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
 from .estimators import at_collisions, middle, over

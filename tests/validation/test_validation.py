@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ricochet.statistics import Estimate
+from ricochet.analysis.statistics import Estimate
 from validation import CASES, report
 from validation.case import AT_LEAST, AT_MOST, EXACT, Case, Member, judge, relative, sigmas, within
 from validation.running import validate

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import hard_disks, theory
-from .nature import SOURCES, TRAITS, Refused, allow
-from .reader import Run
+from ..predictions import hard_disks, theory
+from ..reading.nature import SOURCES, TRAITS, Refused, allow
+from ..reading.reader import Run
 from .statistics import Estimate, estimate, when
 from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .files import destination
+from ..reading.files import destination
 
 SPECIES = re.compile(r"[1-9]\d*|[A-Za-z][A-Za-z0-9_-]{0,39}")  # as the program reads them
 

@@ -33,12 +33,12 @@ from pathlib import Path
 
 import numpy as np
 
-from . import hard_disks
-from .nature import Nature
-from .program import ProgramError
-from .reader import Run, Series, obstacles_of, walls_of
-from .simulation import NEVER, Simulation
-from .statistics import SeriesMean, equilibration, series_mean
+from ..analysis.statistics import SeriesMean, equilibration, series_mean
+from ..predictions import hard_disks
+from ..reading.nature import Nature
+from ..reading.reader import Run, Series, obstacles_of, walls_of
+from ..running.program import ProgramError
+from ..running.simulation import NEVER, Simulation
 
 DISKS = 20000  # of a run
 MEMORY = 2 << 30  # bytes of a process

@@ -4,8 +4,8 @@ import html
 import sys
 from pathlib import Path
 
-from .commands import SCRIPTS
-from .reader import Run
+from ..commands import SCRIPTS
+from ..reading.reader import Run
 
 
 class Film:

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-from .files import RunError
-from .reader import Run, read_run
+from ..reading.files import RunError
+from ..reading.reader import Run, read_run
 
 ADDRESS = "127.0.0.1"
 LOOK = 0.5  # seconds between looks whether the run has ended

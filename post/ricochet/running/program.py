@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from .files import RunError
-from .reader import Run, read_run
+from ..commands import HERE
+from ..reading.files import RunError
+from ..reading.reader import Run, read_run
 
 STOPPED = 75
 PROGRESS = "\033[?7l"  # begins each update of the program's line on a terminal
@@ -94,11 +95,11 @@ def whole_threads(threads: int | None) -> int:
 
 def find_program() -> str:
     """What RICOCHET names, else build/ricochet of this clone, else the installed program."""
-    root = Path(__file__).resolve().parents[2]
+    root = HERE.parents[1]
     if wish := os.environ.get("RICOCHET"):
         places = [Path(wish)]
     else:
-        built = [Path(__file__).with_name("bin") / "ricochet", root / "build/ricochet"]
+        built = [HERE / "bin/ricochet", root / "build/ricochet"]
         places = [*built, Path(shutil.which("ricochet") or "")]
     for place in places:
         if place.is_file() and os.access(place, os.X_OK):

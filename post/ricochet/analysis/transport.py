@@ -23,11 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import hard_disks
+from ..predictions import hard_disks
+from ..reading.nature import allow
+from ..reading.reader import Run, RunError
 from . import thermodynamics as td
 from .correlations import Correlator
-from .nature import allow
-from .reader import Run, RunError
 from .statistics import Curve, SeriesMean, estimate, series_mean
 
 PER_FREE_TIME = 4  # samples of the moments that are enough

@@ -23,8 +23,9 @@ from typing import Self
 
 import numpy as np
 
-from .files import RunError, did_you_mean
-from .nature import Nature, nature_of
+from ..commands import HERE
+from ..reading.files import RunError, did_you_mean
+from ..reading.nature import Nature, nature_of
 from .program import ProgramError, named, settings_of, unseen, whole_threads
 
 ROOM = 100_000  # bytes for a message
@@ -469,8 +470,8 @@ def called(function, *arguments: object) -> bool:
 def library(files: bool = False) -> ctypes.CDLL:
     """The engine; with the functions for files it needs the HDF5 of the system."""
     name = "libricochet_files.so" if files else "libricochet.so"
-    wish, own = os.environ.get("RICOCHET_LIBRARY"), Path(__file__).resolve()  # a folder
-    places = [Path(wish)] if wish else [own.with_name("lib"), own.parents[2] / "build"]
+    wish = os.environ.get("RICOCHET_LIBRARY")  # a folder
+    places = [Path(wish)] if wish else [HERE / "lib", HERE.parents[1] / "build"]
     path = next((place / name for place in places if (place / name).is_file()), None)
     if path is None:
         raise ProgramError(f"no {name} in {places[-1]}: run make library in a clone", 3)

@@ -10,8 +10,8 @@ import contourpy
 import numpy as np
 import scipy
 
-from .nature import allow
-from .reader import Run, RunError
+from ..reading.nature import allow
+from ..reading.reader import Run, RunError
 
 
 class Crater(NamedTuple):

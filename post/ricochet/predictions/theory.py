@@ -3,10 +3,13 @@
 Two dimensions throughout; u = v / sqrt(2 kT / m) is the reduced speed, x = K / kT = u^2.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 
-from .statistics import Law
+#: A distribution function, or its density.
+Law = Callable[[np.ndarray], np.ndarray]
 
 # Dilute gas of hard disks, by Monte Carlo solution of the Boltzmann equation (10^6 disks).
 # (collisions per disk, excess kurtosis a2), from equal speeds.

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-from .files import RunError
-from .program import find_program, value_text
+from ..reading.files import RunError
+from ..running.program import find_program, value_text
 
 RUNS = 24  # at a time, of all pages
 GRACE = 3.0  # seconds, after which a worker that has been asked to end is forced to

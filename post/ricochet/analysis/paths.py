@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .nature import KICKED
-from .reader import Events, Run
+from ..reading.nature import KICKED
+from ..reading.reader import Events, Run
 
 
 class Turns(NamedTuple):

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from . import hard_disks
-from .drawing import periods
-from .reader import SIDES, Run, RunError
+from ..predictions import hard_disks
+from ..reading.reader import SIDES, Run, RunError
 from .statistics import Estimate, memory, student
+from .structure import periods
 from .thermodynamics import after_start, free_disks, refuse_others
 
 MOST_BLOCKS = 16  # of a run

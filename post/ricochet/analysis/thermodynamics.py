@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import hard_disks
-from .nature import KICKED, ROUNDING, SETTLED, Refused, allow
-from .reader import SIDES, Run, RunError, Species
+from ..predictions import hard_disks
+from ..reading.nature import KICKED, ROUNDING, SETTLED, Refused, allow
+from ..reading.reader import SIDES, Run, RunError, Species
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions

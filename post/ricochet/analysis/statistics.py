@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from ..predictions.theory import Law
+
 MOST_WINDOWS = 10**6
 FEWEST_RUNS = 4  # for an error of their error, and so to weigh by
-Law = Callable[[np.ndarray], np.ndarray]
 
 
 class Estimate(NamedTuple):

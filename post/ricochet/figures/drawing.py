@@ -14,11 +14,11 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
-from .files import destination, did_you_mean
-from .nature import known, rows_of
-from .reader import SIDES, Run, RunError
-from .statistics import Estimate, kurtosis_noise
-from .structure import bond_order
+from ..analysis.statistics import Estimate, kurtosis_noise
+from ..analysis.structure import bond_order, periods
+from ..reading.files import destination, did_you_mean
+from ..reading.nature import known, rows_of
+from ..reading.reader import SIDES, Run, RunError
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
@@ -207,12 +207,6 @@ def name_walls(axes: plt.Axes, run: Run) -> None:
             size=9,
             color="firebrick",
         )
-
-
-def periods(run: Run) -> np.ndarray:
-    """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
-    along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
-    return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -26,9 +26,9 @@ from typing import TextIO
 
 import numpy as np
 
-from .files import RunError, open_file, plain
+from ..reading.files import RunError, open_file, plain
+from ..reading.reader import committed, series_in
 from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
-from .reader import committed, series_in
 from .simulation import Simulation, read_input
 
 BROKE_OFF = ": its run broke off "

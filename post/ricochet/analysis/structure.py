@@ -8,12 +8,18 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from .nature import TRAITS, allow
-from .reader import Run
+from ..reading.nature import TRAITS, allow
+from ..reading.reader import Run
 from .statistics import Curve, estimate, series_mean
 
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
+
+
+def periods(run: Run) -> np.ndarray:
+    """(M, 2) shifts of a thing to itself and to its periodic images next to the box."""
+    along = [(-1, 0, 1) if periodic else (0,) for periodic in run.periodic]
+    return run.edges * np.array([(i, j) for i in along[0] for j in along[1]])
 
 
 def refuse(run: Run, *traits: str) -> None:

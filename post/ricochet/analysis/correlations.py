@@ -31,9 +31,9 @@ from typing import Self
 import numpy as np
 import scipy
 
-from .nature import KICKED, TRAITS, allow
-from .reader import Run, RunError
-from .simulation import Simulation
+from ..reading.nature import KICKED, TRAITS, allow
+from ..reading.reader import Run, RunError
+from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
 from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from .nature import Refused
-from .reader import Run
-from .statistics import Estimate, Law, estimate, excess_kurtosis, series_mean
-from .theory import finite_n_cdf
+from ..predictions.theory import Law, finite_n_cdf
+from ..reading.nature import Refused
+from ..reading.reader import Run
+from .statistics import Estimate, estimate, excess_kurtosis, series_mean
 from .thermodynamics import conserved, drift, free_disks
 
 MEMORY = 5.0  # collisions per disk after which a speed is independent

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import scipy
 
-from .reader import Restitution
+from ..reading.reader import Restitution
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
 # Simulation: to 0.5 from the equation of state of Kolafa and Rottner, Mol. Phys. 104, 3435 (2006);

@@ -1,0 +1,1 @@
+"""Estimates from runs: means with errors, correlations, structure, fields and transport."""

@@ -1,0 +1,59 @@
+"""The package itself: its modules under short names, and what importing it costs."""
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ricochet
+from ricochet.aliases import modules
+
+INIT = Path(ricochet.__file__)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_a_short_name_is_the_module_itself(name):
+    """As an attribute, in `import`, and in `from ... import`."""
+    whole = importlib.import_module(modules()[name])
+    assert getattr(ricochet, name) is whole
+    assert importlib.import_module(f"ricochet.{name}") is whole
+    assert sys.modules[f"ricochet.{name}"] is whole and name in dir(ricochet)
+    scope: dict = {}
+    exec(f"from ricochet import {name}", scope)
+    assert scope[name] is whole and whole.__spec__.name == whole.__name__ == modules()[name]
+
+
+def test_no_module_has_the_name_of_another_or_of_a_function():
+    """Else a short name would be ambiguous."""
+    paths = [path for path in INIT.parent.glob("*/*.py") if path.stem != "__init__"]
+    assert sorted(path.stem for path in paths) == sorted(modules())
+    assert not modules().keys() & {*ricochet.__all__}
+
+
+def test_type_checkers_see_the_modules_that_are_there():
+    """They do not execute `__getattr__`: the list of imports in `__init__.py` is for them."""
+    found = {
+        name.asname: f"ricochet.{node.module}.{name.name}"
+        for node in ast.walk(ast.parse(INIT.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.level == 1
+        for name in node.names
+        if name.asname and node.module
+    }
+    assert found == modules()
+
+
+def test_a_name_that_is_not_there_is_an_error():
+    with pytest.raises(AttributeError, match="module 'ricochet' has no attribute 'structur'"):
+        _ = ricochet.structur
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("ricochet.structur")
+
+
+def test_the_package_loads_no_more_than_its_names_need():
+    heavy = ("matplotlib", "aiohttp", "scipy", "pandas", "ricochet.analysis", "ricochet.figures")
+    code = f"import ricochet, sys; print([name for name in {heavy} if name in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
