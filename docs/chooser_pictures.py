@@ -46,7 +46,7 @@ def picture(path: Path, at: float) -> bytes:
     with Simulation(path) as run:
         box, groups = run.parameters["box"], run.parameters
         way = [run.position.copy()]
-        for time in np.linspace(0, at, 401 if run.count <= FEW else 2)[1:]:
+        for time in np.linspace(0, at, 401 if run.n_disks <= FEW else 2)[1:]:
             way.append(run.advance(time=time).position)
         lower, upper = (np.asarray(box[end], float) for end in ("lower", "upper"))
         room = np.array([lower, upper])
@@ -60,16 +60,16 @@ def picture(path: Path, at: float) -> bytes:
             axes.add_patch(Circle(one.centre, one.radius, facecolor=colour, edgecolor="0.3"))
         walls = walls_of({k: np.asarray(v) for k, v in groups.get("wall", {}).items()})
         axes.add_collection(LineCollection(walls, color="0.3", lw=0.8))
-        least = min(0.006, 0.2 / np.sqrt(run.count)) * np.max(upper - lower)
+        least = min(0.006, 0.2 / np.sqrt(run.n_disks)) * np.max(upper - lower)
         size = 2 * np.maximum(run.radius, least)
         colours = [SPECIES[(k - 1) % len(SPECIES)] for k in run.species]
-        if run.count <= FEW:
+        if run.n_disks <= FEW:
             way = np.array(way)
             jumps = (
                 np.abs(np.diff(way, axis=0)).max(axis=2, keepdims=True) > (upper - lower).min() / 2
             )
             way[1:][np.broadcast_to(jumps, way[1:].shape)] = np.nan
-            for k in range(run.count):
+            for k in range(run.n_disks):
                 axes.plot(*way[:, k].T, color=colours[k], lw=0.6)
         circles = EllipseCollection(
             size, size, 0 * size, units="xy", offsets=run.position, offset_transform=axes.transData

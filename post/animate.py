@@ -109,7 +109,7 @@ def main() -> None:
     )
     with tqdm(total=len(frames), unit="frame", desc=path.name, disable=None) as bar:
         film.save(destination(path), writer, dpi=100, progress_callback=lambda *_: bar.update())
-    report(args, None, [{"film": path, "frames": len(frames), "of": run.frames}])
+    report(args, None, [{"film": path, "frames": len(frames), "of": run.n_frames}])
 
 
 if __name__ == "__main__":

@@ -3,17 +3,17 @@
     python post/correlations.py runs/state/memory_*.h5 -o correlations.png --csv correlations.csv
 
 Disks in an empty box, without gravity.  Runs are combined by packing fraction; lines are means over
-the runs, bands are errors. Frames may be equally far apart in time or in decades (--skip 0 if the
-run begins in equilibrium).  Times are in units of the mean free time 1/w, lengths of the mean
-diameter.  Frames before equilibrium, which is found or begins after --skip, count for a2 alone.  Of
-gases that cool, and those that flow, only a2 and the structure are found, the latter in the frames
-after --skip, or else where nothing drifts, or 15 collisions per disk after the start of a gas that
-cools.  Of a mixture, broken lines are of its species.
+the runs, bands are errors. Frames may be equally far apart in time or in decades (--equilibration 0
+if the run begins in equilibrium).  Times are in units of the mean free time 1/w, lengths of the
+mean diameter.  Frames before equilibrium, which is found or begins after --equilibration, count for
+a2 alone.  Of gases that cool, and those that flow, only a2 and the structure are found, the latter
+in the frames after --equilibration, or else where nothing drifts, or 15 collisions per disk after
+the start of a gas that cools.  Of a mixture, broken lines are of its species.
 
 Ways of disks, by lag, are from the package's `correlations`, which says how pairs of frames are
 chosen: VACF, <v(0) v(t)>, in theory at first exp(-w t), late 1/t (mode coupling); the mean square
-displacement; F_s(k, t) = <exp(i k r)> at --wave; alpha2 = <r^4> / (2 <r^2>^2) - 1, 0 for ways that
-are normal; in the table, the share of disks within 0.3 diameters (overlap).
+displacement; F_s(k, t) = <exp(i k r)> at --wavenumber; alpha2 = <r^4> / (2 <r^2>^2) - 1, the
+non-Gaussian parameter; in the table, the share of disks within 0.3 diameters (overlap).
 
 Diffusion: D(t) is a quarter of the slope of the mean square displacement, here between neighbouring
 lags; and half the integral of <v(0) v(s)> from 0 to t, which is half of <v(0) (x(t) - x(0))> and so
@@ -78,11 +78,11 @@ class Found(NamedTuple):
 def check(run: Run, first: Run) -> None:
     """Refuse what is not alike everywhere."""
     allow(run, "correlations are those of disks in an empty box", *FLUID, *RESTLESS)
-    if run.count < 3:
+    if run.n_disks < 3:
         raise RunError(f"{run.path}: needs three disks and more")
     if ("mixture" in run.nature) != ("mixture" in first.nature):
         raise RunError(f"{run.path}: not equal disks, or not a mixture, as {first.path} is")
-    if run.frames < 10:
+    if run.n_frames < 10:
         raise RunError(f"{run.path}: needs 10 frames and more")
 
 
@@ -142,7 +142,7 @@ def motion(runs: list[Run], frames: list[slice], skip: float | None, wave: float
     time = found["all"]["msd"].x
     wt, some = time[1:] / unit, np.isin(members[0].lags, time)
     if first.nature <= PLAIN:
-        density, theory = first.count / np.prod(first.edges), transport.enskog_of(first)
+        density, theory = first.n_disks / np.prod(first.edges), transport.enskog_of(first)
         kinematic = theory["viscosity"] / (density * first.mass[0])
         tail = hard_disks.long_time_tail(time[1:], density, theory["D"], kinematic)
         curves["vacf_tail"] = Curve(wt, tail, np.full_like(tail, np.nan))
@@ -167,7 +167,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
         curves = motion(runs, frames, skip, wave)
     except Refused:
         curves = {}
-    until = max(own.start for own in frames) + 1 if settled else min(run.frames for run in runs)
+    until = max(own.start for own in frames) + 1 if settled else min(run.n_frames for run in runs)
     curves["a2"] = kurtosis(runs, until)
     members, lag = {}, None
     if (
@@ -285,7 +285,7 @@ def draw(
         spare.remove()
     shades = colours(len(rows))
     for (_, runs), found, row, colour in zip(groups, results, rows, shades, strict=True):
-        count = sum(run.count for run in runs)
+        count = sum(run.n_disks for run in runs)
         draw_group(panels, found, row, colour, count, keyed=row is rows[0])
     for name, style in shown.items():
         panels[name].set(**{"xlabel": "$w\\,t$", **style})
@@ -329,16 +329,16 @@ def draw(
 
 
 def main() -> None:
-    options = {"skip": None, "wave": 2 * np.pi}
+    options = {"equilibration": None, "wavenumber": 2 * np.pi}
     args = command_line(__doc__, "correlations.png", **options).parse_args()
     for run in args.runs:
         check(run, args.runs[0])
     groups = by_packing(args.runs)
-    results = [analysed(members, args.skip, args.wave) for _, members in groups]
+    results = [analysed(members, args.equilibration, args.wavenumber) for _, members in groups]
     rows, notes = table(groups, results)
     if not all("vacf" in found.curves for found in results):
         notes.append("no steady state without flow: no memory and no diffusion coefficient")
-    figure = draw(groups, results, rows, args.wave)
+    figure = draw(groups, results, rows, args.wavenumber)
     report(args, figure, rows, data=curves(groups, results), notes=notes)
 
 

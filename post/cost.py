@@ -29,7 +29,7 @@ def costs(runs: list[Run]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     for run in runs:
         points = least.setdefault(str(run.parameter("run", "search", "cells")), {})
         time = 1e6 / recorded(run, "collisions_per_second")
-        points[run.count] = min(time, points.get(run.count, np.inf))
+        points[run.n_disks] = min(time, points.get(run.n_disks, np.inf))
     return {search: tuple(np.array(sorted(points.items())).T) for search, points in least.items()}
 
 

@@ -27,7 +27,7 @@ def naive_error(run: Run, skip: float | None) -> float:
 
 
 def main() -> None:
-    args = command_line(__doc__, "coverage.png", skip=None).parse_args()
+    args = command_line(__doc__, "coverage.png", equilibration=None).parse_args()
     for run in args.runs:
         allow(run, "it has no equation of state", *FLUID)
     groups, rows = by_packing(args.runs), []
@@ -37,8 +37,8 @@ def main() -> None:
     for (eta, runs), axes in zip(groups, panels[0], strict=True):
         if len(runs) < 10:
             raise RunError(f"{runs[0].path}: needs at least 10 seeds per packing fraction")
-        z, error = np.array([z_virial(run, args.skip)[:2] for run in runs]).T
-        naive = np.array([naive_error(run, args.skip) for run in runs])
+        z, error = np.array([z_virial(run, args.equilibration)[:2] for run in runs]).T
+        naive = np.array([naive_error(run, args.equilibration) for run in runs])
         row = {"packing": eta, "runs": len(runs), "Z": float(z.mean())}
         row |= {"scatter": float(z.std(ddof=1)), "error": float(error.mean())}
         row |= {"within_%": float(100 * np.mean(np.abs(z - z.mean()) < error))}

@@ -72,7 +72,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     """Before, after, collisions per disk, energy."""
     figure, ((before, after), (hits, energy)) = plt.subplots(2, 2, figsize=(9.4, 10.6))
     moved = run.displacement(-1)
-    limits = (0, drawing.scale_top(run, [run.frames - 1], "displacement"))
+    limits = (0, drawing.scale_top(run, [run.n_frames - 1], "displacement"))
     draw_state(before, run, 0, moved, limits)
     draw_outline(before, hull(run), "hull of the displaced disks")
     draw_state(after, run, -1, moved, limits)
@@ -82,7 +82,7 @@ def draw(run: Run, size: Crater) -> plt.Figure:
     label = f"{LABELS['displacement']} at the end"
     style = {"shrink": 0.6, "aspect": 40, "extend": "max", "label": label, **below}
     figure.colorbar(scale, ax=[before, after], **style)
-    count = np.log10(1.0 + run.collisions[-1])
+    count = np.log10(1.0 + run.event_count[-1])
     top = float(np.ceil(count[bed(run)].max())) or 1.0
     draw_state(hits, run, 0, count, (0, top))
     hits.set_title("collisions of each disk, drawn at its first position")

@@ -210,7 +210,7 @@ def draw(runs: list[Run], scans: Scans) -> plt.Figure:
             axes.legend(loc="upper left", fontsize=8, ncols=1 + (len(scan) > 2))
     points = [p for scan in scans.values() for p in chain(*scan)]
     number = "-".join(map(str, sorted({f([p.runs for p in points]) for f in (min, max)})))
-    count = span(np.array([run.count for run in runs]))
+    count = span(np.array([run.n_disks for run in runs]))
     figure.suptitle(
         f"N = {count},  {number} run{'s' * (number != '1')} per point,"
         f"  ended at {100 * fraction:g} % of the energy"

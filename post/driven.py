@@ -54,10 +54,10 @@ Curves = dict[str, tuple[np.ndarray, np.ndarray]]  # time and value by species, 
 
 def temperature(run: Run) -> Curves:
     """At the observables, which are about the mean motion: of one disk nothing is left."""
-    if run.count < 2:
+    if run.n_disks < 2:
         raise Refused(f"{run.path}: holds one disk; a temperature is about the motion of all")
     time, value = run.observable("all/temperature")
-    return {"": (time, value * run.count / (run.count - 1))}
+    return {"": (time, value * run.n_disks / (run.n_disks - 1))}
 
 
 def noise_law(run: Run) -> float | None:
@@ -76,7 +76,7 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
     if side is None:
         return noise_law(run)
     kt = run.observable("all/temperature").value
-    return kt[0] * run.count / (run.count - 1) * adiabat(run, side, widths(run, side))
+    return kt[0] * run.n_disks / (run.n_disks - 1) * adiabat(run, side, widths(run, side))
 
 
 def only_moving(run: Run, motion: str) -> int | None:
@@ -95,7 +95,7 @@ def widths(run: Run, side: int) -> np.ndarray:
 def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
     """T over that at the first of the widths (W,)."""
     height, walled = float(run.edges[1 - side // 2]), not run.periodic[1 - side // 2]
-    return hard_disks.adiabat(widths, height, run.count, float(run.radius[0]), walled)
+    return hard_disks.adiabat(widths, height, run.n_disks, float(run.radius[0]), walled)
 
 
 def width(run: Run) -> Curves:
@@ -119,12 +119,12 @@ def width_law(run: Run) -> Room | None:
         return None
     along = bool(run.periodic[1 - side // 2])  # keeps its momentum
     flow = along * run.observable("momentum").value[0, 1 - side // 2] ** 2 / 2 / run.mass.sum()
-    energy = run.observable("all/kinetic_energy").value[0] * run.count - flow
+    energy = run.observable("all/kinetic_energy").value[0] * run.n_disks - flow
     start, force = widths(run, side)[:1], float(run.sides[side]["force"])
     grid = np.linspace(0, start + energy / force, 20002)[1:-1, 0]
-    places = -run.count * np.log(adiabat(run, side, np.append(start, grid))[1:])
+    places = -run.n_disks * np.log(adiabat(run, side, np.append(start, grid))[1:])
     left = energy + force * (start - grid)
-    mean, variance = theory.pushed_width(grid, places, 2 * run.count + 1 - along, left)
+    mean, variance = theory.pushed_width(grid, places, 2 * run.n_disks + 1 - along, left)
     least = grid[np.isnan(places).sum()]
     return Room(mean, variance**0.5) if mean - 4 * variance**0.5 > least else None
 
@@ -175,7 +175,7 @@ def demon_law(run: Run) -> float | None:
     if run.obstacles or run.restitution == 1 or run.parameter("contact", "wall_restitution") != 1:
         return None
     hole, diameter = float(heights[0] - run.lower[1]), 2 * run.radius[0]
-    layers = run.count * diameter / (run.edges[0] / 2 - diameter)
+    layers = run.n_disks * diameter / (run.edges[0] / 2 - diameter)
     climb = max(0.0, -down) * hole / float(floor["velocity"]) ** 2
     return theory.demon_share(climb, layers, run.restitution)
 
@@ -192,7 +192,7 @@ def height(run: Run) -> Curves:
 def cluster(run: Run) -> Curves:
     """Share of the disks in the largest cluster, at the frames."""
     gap = GAP * 2 * float(run.radius.mean())
-    shares = [largest_cluster(run, frame, gap) / run.count for frame in range(run.frames)]
+    shares = [largest_cluster(run, frame, gap) / run.n_disks for frame in range(run.n_frames)]
     return {"": (run.time, np.array(shares))}
 
 
@@ -232,7 +232,7 @@ def levels(law: np.ndarray | float | Room | None, compared: Callable) -> list:
 
 def by_input(runs: list[Run]) -> dict[str, list[Run]]:
     """Runs that differ by their seed alone together, under what sets them apart from the others."""
-    own = [{"N": run.count, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
+    own = [{"N": run.n_disks, "ξ": run.restitution, **drawing.numbers_of(run)} for run in runs]
     names = [name for name in own[0] if len({numbers.get(name) for numbers in own}) > 1]
     groups: dict[str, list[Run]] = {}
     for run, numbers in zip(runs, own, strict=True):
@@ -298,7 +298,7 @@ def main() -> None:
     parser.add_argument("--show", choices=QUANTITIES, default="temperature", help="[temperature]")
     args = parser.parse_args()
     for run in args.runs:
-        if run.frames < 2 or not run.time[-1] > run.time[0]:
+        if run.n_frames < 2 or not run.time[-1] > run.time[0]:
             raise RunError(f"{run.path}: has one frame; it takes two")
     label, curves_of, law_of, compared = QUANTITIES[args.show]
     groups, tracks, rows, notes = by_input(args.runs), {}, [], []

@@ -3,7 +3,8 @@
     python post/equation_of_state.py runs/state/eta_*.h5 -o state.png --csv state.csv
 
 By the virial of the pair collisions; by the collision rate (equal disks); by the force on the sides
-(walls).  Means are taken in equilibrium: from where nothing drifts any more, or after --skip.
+(walls).  Means are taken in equilibrium: from where nothing drifts any more, or after
+--equilibration.
 Errors take the memory of the pressure into account; `samples` is how many independent ones the
 virial is worth.  Runs at equal packing fraction are combined.  Elastic gases without gravity; walls
 and kicks may heat them, all at one temperature.  kT is then its mean, and its error counts.  Disks
@@ -49,7 +50,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
             cells = over_runs(f"Z_{name}", members, notes, about) if members else {}
             row |= cells if len(members) == len(same) else measured(f"Z_{name}", None)
         row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
-        z = hard_disks.published(eta, same[0].count, bool(same[0].periodic.all()))
+        z = hard_disks.published(eta, same[0].n_disks, bool(same[0].periodic.all()))
         z = hard_disks.of_sizes(z, eta, alike)
         known = np.isfinite(z) and (alike == 1 or eta <= hard_disks.FLUID[-1, 0])
         rows.append(row | {"Z_reference": z if known else None})
@@ -95,8 +96,8 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "equation_of_state.png", skip=None).parse_args()
-    rows, notes = table(args.runs, args.skip)
+    args = command_line(__doc__, "equation_of_state.png", equilibration=None).parse_args()
+    rows, notes = table(args.runs, args.equilibration)
     report(args, draw(rows, args.runs), rows, notes=notes)
 
 

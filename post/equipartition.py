@@ -7,7 +7,7 @@ windows of --window.  T_therm is when their difference enters --within, to stay 
 between where it does so less its error, and where with it.  A single run has no error and no
 T_therm: with 30 + 30 disks the ratio of the energies fluctuates by 26 % in equilibrium, so take
 many.  K_light and K_heavy in the table are means in equilibrium, which is found or begins after
---skip.
+--equilibration.
 """
 
 from functools import reduce
@@ -96,7 +96,7 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
 
 
 def main() -> None:
-    parser = command_line(__doc__, "equipartition.png", skip=None)
+    parser = command_line(__doc__, "equipartition.png", equilibration=None)
     parser.add_argument("--window", type=float, default=0.5, help="time averaged over [0.5]")
     parser.add_argument("--within", type=float, default=0.1, help="relative difference [0.1]")
     parser.add_argument("--until", type=float, default=20, help="end of the time axis [20]")
@@ -107,11 +107,11 @@ def main() -> None:
     results = [approach(runs, args.window, args.within) for _, runs in groups]
     for (v0, runs), found in zip(groups, results, strict=True):
         row = {"v0": v0, "runs": len(runs), **measured("T_therm", found.thermalisation)}
-        total = late(runs, "total_energy", args.skip)
-        row |= measured("energy", Estimate(*(part / runs[0].count for part in total)))
+        total = late(runs, "total_energy", args.equilibration)
+        row |= measured("energy", Estimate(*(part / runs[0].n_disks for part in total)))
         for which, kind in zip(("light", "heavy"), lightest_and_heaviest(runs[0]), strict=True):
             name = f"{runs[0].names[kind]}/kinetic_energy"
-            row |= measured(f"K_{which}", late(runs, name, args.skip))
+            row |= measured(f"K_{which}", late(runs, name, args.equilibration))
         rows.append(row)
         if np.isnan(found.thermalisation.mean):
             known, share = 2 * np.median(found.gap.error) <= args.within, f"{100 * args.within:g} %"

@@ -41,7 +41,7 @@ def xyz_frame(run: Run, frame: int) -> str:
         " ".join((species.replace(" ", "_"), *numbers, str(k)))
         for k, (species, *numbers) in enumerate(rows(run, frame), start=1)
     ]
-    return "\n".join([str(run.count), head, *lines, ""])
+    return "\n".join([str(run.n_disks), head, *lines, ""])
 
 
 def csv_frame(run: Run, frame: int) -> str:
@@ -66,7 +66,7 @@ def main() -> None:
             file.write(",".join([HEAD, *run.elements]) + "\n")
         for frame in tqdm(frames, unit="frame", desc="export", disable=None):
             file.write(one(run, frame))
-    report(args, None, [{"export": path, "frames": len(frames), "of": run.frames}])
+    report(args, None, [{"export": path, "frames": len(frames), "of": run.n_frames}])
 
 
 if __name__ == "__main__":

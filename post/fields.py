@@ -7,10 +7,10 @@ Per cell, of the disks with their centres in it: number density n over the area 
 reach, flow u (mean of v by mass), kT (mean of m c^2 / 2, c = v - u), kT_rot (mean of I omega^2) of
 disks that can turn, the stress that disks carry (sum of m c_a c_b over the area) and the heat that
 they carry (sum of m c^2 c / 2); what collisions hand on over the distance of two centres comes on
-top of both.  u changes within a cell as it does from cell to cell.  Frames count after --skip, or
-in the second half of a run.  Errors are over blocks of time of all runs of one input
-(docs/theory.md); cells in which fewer than two of them saw a disk have a density alone, and three
-disks must be left without any block for kT, stress and heat.
+top of both.  u changes within a cell as it does from cell to cell.  Frames count after
+--equilibration, or in the second half of a run.  Errors are over blocks of time of all runs of one
+input (docs/theory.md); cells in which fewer than two of them saw a disk have a density alone, and
+three disks must be left without any block for kT, stress and heat.
 
 Across equal disks between two walls, dashed: what the fluxes of momentum and energy at the walls
 say by Enskog's viscosity and conductivity (Gass 1971) and the equation of state, from temperature
@@ -146,7 +146,7 @@ def cells_of(text: str) -> tuple[int, ...]:
 
 
 def main() -> None:
-    parser = command_line(__doc__, "fields.png", skip=None)
+    parser = command_line(__doc__, "fields.png", equilibration=None)
     parser.add_argument("--across", choices=("x", "y"), default="x", help="axis of a profile [x]")
     shape = parser.add_mutually_exclusive_group()
     whole = {"type": cells_of, "metavar": "N", "default": (20,), "help": "of the profile [20]"}
@@ -159,7 +159,7 @@ def main() -> None:
         parser.error("--cells takes one number, --grid two")
     cooling = [run.path.name for run in runs if run.nature.cooling]
     notes = [f"{name} loses energy and gets none: means of what is not steady" for name in cooling]
-    own = fields(runs, args.skip, cells)
+    own = fields(runs, args.equilibration, cells)
     found = own.found
     middles = places(runs[0], cells)
     data = {"x": middles[:, 0], "y": middles[:, 1]} | spread({"": found})

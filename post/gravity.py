@@ -2,13 +2,13 @@
 
     python post/gravity.py runs/gravity/long.h5 -o gravity.png --csv gravity.csv
 
-kT is the mean of the kinetic energy in equilibrium, which is found or begins after --skip.  Laws,
-drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height h of
-the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks share a
-fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), unless walls or kicks give
-it; and a disk of species i is kept out of the area pi s_ij^2 about each other disk, which
-multiplies its density by exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near the
-floor.  Where that sum is above 0.5 for disks without size, no law of the heights is drawn.
+kT is the mean of the kinetic energy in equilibrium, which is found or begins after --equilibration.
+Laws, drawn solid: P(v^2) = m / (2 kT) exp(-m v^2 / 2 kT) and P(h) ~ exp(-m g h / kT) for the height
+h of the centre above its lowest place.  They hold for many disks without size.  Dashed: N disks
+share a fixed energy, so that exp(-e / kT) becomes (1 - e / (2 N kT))^(2 N - 2), unless walls or
+kicks give it; and a disk of species i is kept out of the area pi s_ij^2 about each other disk,
+which multiplies its density by exp(-sum_j pi s_ij^2 n_j(h)) to first order: a few per cent, near
+the floor.  Where that sum is above 0.5 for disks without size, no law of the heights is drawn.
 
 Slopes are those of weighted lines through the logarithm of the histograms, from 0 to 5 kT in the
 kinetic energy and from 1 to 5 kT in m g h, above the layer that the size of the disks flattens;
@@ -69,7 +69,7 @@ def log_slope(values: np.ndarray, limits: tuple[float, float], bins: int = 30) -
 
 def sharers(run: Run) -> float:
     """How many disks share a fixed energy: infinitely many where a bath gives and takes it."""
-    return run.count if run.nature.keeps_energy else np.inf
+    return run.n_disks if run.nature.keeps_energy else np.inf
 
 
 def sharing(energy: np.ndarray, temperature: float, count: float) -> np.ndarray:
@@ -221,16 +221,16 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
 
 
 def main() -> None:
-    args = command_line(__doc__, "gravity.png", one=True, skip=None).parse_args()
+    args = command_line(__doc__, "gravity.png", one=True, equilibration=None).parse_args()
     (run,) = args.runs
     known = "walled", "falling", "mixture", "thermal", "bathed", "stepped"
     allow(run, "it follows no exponential laws", *known)
-    start = thermodynamics.start_of_equilibrium(run, args.skip)
+    start = thermodynamics.start_of_equilibrium(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
     if not run.gravity[1] or not frames:
         raise RunError(f"{run.path}: needs gravity along y and frames in equilibrium")
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
-    result, notes = table(run, species, thermodynamics.temperature(run, args.skip)), []
+    result, notes = table(run, species, thermodynamics.temperature(run, args.equilibration)), []
     for kind, s in zip(run.by_species, species, strict=True):
         mean = series_mean(s.height.mean(axis=1))
         notes += statistics.doubts(f"height of {kind.label}", [mean])

@@ -35,8 +35,8 @@ class Divergence(NamedTuple):
 
 def distance(one: Run, other: Run) -> np.ndarray:
     """(T,) between two runs, in the space of the positions of all disks."""
-    frames = min(one.frames, other.frames)
-    if one.count != other.count or not np.array_equal(one.time[:frames], other.time[:frames]):
+    frames = min(one.n_frames, other.n_frames)
+    if one.n_disks != other.n_disks or not np.array_equal(one.time[:frames], other.time[:frames]):
         raise RunError(f"{other.path}: not the same disks at the same times as in {one.path}")
     apart = other.unwrapped(slice(frames)) - one.unwrapped(slice(frames))
     return np.sqrt(np.sum(apart**2, axis=(1, 2)))

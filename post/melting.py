@@ -3,11 +3,11 @@
     python post/melting.py runs/melting/*/*.h5 -o melting.png --csv melting.csv
 
 P* = P d^2 / kT by the virial, d the diameter, in equilibrium: from where nothing drifts any more,
-or after --skip.  Equal disks, periodic boxes.  Between liquid (to 0.700) and hexatic (from 0.716)
-both are there, at P* = 9.185.  In a finite box the pressure has a loop instead, made by the line
-between the two, which flattens as N grows.  For comparison: Engel et al., Phys. Rev. E 87, 042134
-(2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).  Memory is long here: mind the
-warnings.
+or after --equilibration.  Equal disks, periodic boxes.  Between liquid (to 0.700) and hexatic (from
+0.716) both are there, at P* = 9.185.  In a finite box the pressure has a loop instead, made by the
+line between the two, which flattens as N grows.  For comparison: Engel et al., Phys. Rev. E 87,
+042134 (2013); N = 128^2: Li et al., J. Chem. Phys. 157, 234111 (2022).  Memory is long here: mind
+the warnings.
 """
 
 from ricochet import Run
@@ -24,7 +24,7 @@ import numpy as np
 def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
     """A row per number of disks and packing fraction; and what speaks against it."""
     rows, notes = [], []
-    for count, own in grouped(runs, lambda run: run.count):
+    for count, own in grouped(runs, lambda run: run.n_disks):
         for eta, same in by_packing(own):
             members = [z_virial(run, skip).scaled(4 * eta / np.pi) for run in same]
             row = {"N": count, "packing": eta, "runs": len(same)}
@@ -49,10 +49,10 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "melting.png", skip=None).parse_args()
+    args = command_line(__doc__, "melting.png", equilibration=None).parse_args()
     for run in args.runs:
         allow(run, "melting is that of equal disks in a periodic box", "bathed", "rough", "turning")
-    rows, notes = table(args.runs, args.skip)
+    rows, notes = table(args.runs, args.equilibration)
     report(args, draw(rows, args.runs), rows, notes=notes)
 
 

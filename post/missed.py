@@ -4,7 +4,7 @@
 
 Needs event-driven runs, and runs by time steps with the same seeds.  For each step dt: the share of
 pair collisions that is missing against the event-driven run of the same seed, after the first
---skip collisions per disk, averaged over the seeds; and the share expected from the rule.
+--equilibration collisions per disk, averaged over the seeds; and the share expected from the rule.
 
 Two disks with the relative speed g and the impact parameter b overlap on a chord of length 2 l,
 l = sqrt(s^2 - b^2), s their diameter.  They approach on its first half only, for the time l / g:
@@ -112,8 +112,8 @@ def draw(runs: list[Run], rows: list[dict]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "missed.png", skip=None).parse_args()
-    rows = compare(args.runs, args.skip)
+    args = command_line(__doc__, "missed.png", equilibration=None).parse_args()
+    rows = compare(args.runs, args.equilibration)
     seeds = {run.seed for run in args.runs if run.time_step == 0}
     alone = ", ".join(str(run.path) for run in args.runs if run.seed not in seeds)
     notes = [f"left out, as no event-driven run has their seeds: {alone}"] if alone else []

@@ -2,12 +2,12 @@
 
     python post/mixture.py runs/mixture/*.h5 -o mixture.png --csv mixture.csv
 
-Equilibrium is found, or begins after --skip; it takes the frames of --frames that are at least
---apart collisions per disk from each other.  Errors are those over the runs (of a single
-run: from the autocorrelation over its frames).
-Theory: each species has <K> = kT and <v> = sqrt(pi kT / 2 m); in a periodic box <K> is smaller by
-the share of the disk in the mass of all.  kT is exact where the kinetic energy is kept; where walls
-or kicks heat, or disks turn, it is the mean over all disks in equilibrium, with its error.
+Equilibrium is found, or begins after --equilibration; it takes the frames of --frames that are at
+least --min-separation collisions per disk from each other.  Errors are those over the runs (of a
+single run: from the autocorrelation over its frames). Theory: each species has <K> = kT and <v> =
+sqrt(pi kT / 2 m); in a periodic box <K> is smaller by the share of the disk in the mass of all.  kT
+is exact where the kinetic energy is kept; where walls or kicks heat, or disks turn, it is the mean
+over all disks in equilibrium, with its error.
 """
 
 from ricochet import Run, RunError
@@ -106,10 +106,12 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
 
 
 def main() -> None:
-    args = command_line(__doc__, "mixture.png", frames=None, skip=None, apart=5.0).parse_args()
+    args = command_line(
+        __doc__, "mixture.png", frames=None, equilibration=None, min_separation=5.0
+    ).parse_args()
     runs = args.runs
     for run in runs:
-        if run.names != runs[0].names or len(run.names) < 2 or run.count < 3:
+        if run.names != runs[0].names or len(run.names) < 2 or run.n_disks < 3:
             what = "needs a mixture of three disks or more, the same in all runs; see speeds.py"
             raise RunError(f"{run.path}: {what}")
         allow(run, "its species do not come to one temperature", *SETTLED)
@@ -119,7 +121,7 @@ def main() -> None:
                 f"{run.path}: its species have not met: each has the energy of its start"
             )
     frames = [late_frames(run, args) for run in runs]
-    result = table(runs, frames, args.skip)
+    result = table(runs, frames, args.equilibration)
     report(args, draw(runs, frames, result), result)
 
 

@@ -61,17 +61,17 @@ def frames_that_fit(run: Run, room: float) -> int:
     Each disk needs two 16-bit positions and velocities, 8 bits of collisions, 32 bits of an angle.
     Up to half of the room is for collisions between frames.
     """
-    more = (run.collisions is not None) + (run.image is not None)
+    more = (run.event_count is not None) + (run.image is not None)
     more += 4 * ("orientation" in run.elements)
-    one = run.count * (8 + more) * 4 / 3
-    fixed = run.count * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
-    turns = 0 if run.collisions is None else TURN * float(run.collisions[-1].sum())
+    one = run.n_disks * (8 + more) * 4 / 3
+    fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
+    turns = 0 if run.event_count is None else TURN * float(run.event_count[-1].sum())
     return int(np.clip((room - fixed - min(turns, room / 2)) / (one + 50), 2, MOST_FRAMES))
 
 
 def quantities(run: Run) -> list[str]:
     """What disks can be coloured by, apart from their species."""
-    return ["speed", "displacement"] + ["collisions"] * (run.collisions is not None)
+    return ["speed", "displacement"] + ["collisions"] * (run.event_count is not None)
 
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
@@ -112,19 +112,19 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
     scale up to `top`; periods crossed along x and y since the frame before, four bits each; angles.
     """
     found: dict[str, bytearray] = defaultdict(bytearray)
-    at_once = max(1, MOST_AT_ONCE // run.count)
+    at_once = max(1, MOST_AT_ONCE // run.n_disks)
     for first in range(0, len(frames), at_once):
         some, before = frames[first : first + at_once], frames[max(0, first - 1)]
         inside, velocity = in_room(run, run.position[some]), run.velocity[some]
         fastest = np.ones(len(some))
-        if run.count > FEW_DISKS:
+        if run.n_disks > FEW_DISKS:
             inside = np.round(65535 * np.clip(inside, 0, 1)).astype("<u2")
             fastest = np.abs(velocity).max(axis=(1, 2))
             unit = np.where(fastest > 0, fastest, 1)[:, None, None]
             velocity = np.round(32767 * velocity / unit).astype("<i2")
         parts = {"positions": inside, "velocities": velocity, "fastest": fastest}
-        if run.collisions is not None:
-            share = np.log1p(run.collisions[some]) / np.log1p(top)
+        if run.event_count is not None:
+            share = np.log1p(run.event_count[some]) / np.log1p(top)
             parts["hits"] = np.round(255 * np.clip(share, 0, 1)).astype("u1")
         if run.image is not None:
             crossed = np.clip(np.diff(run.image[[before, *some]], axis=0), -7, 7) + 8
@@ -142,14 +142,14 @@ def told_by_log(run: Run, frames: list[int], most: float) -> tuple[dict, dict[st
     Events as their times and partners.  Of each gap between two frames the number of turns; of each
     turn its disk, and three numbers: when, as share of the gap, and the velocity afterwards.
     """
-    exact, facts = run.count <= FEW_DISKS, {"known": False, "events": False}
+    exact, facts = run.n_disks <= FEW_DISKS, {"known": False, "events": False}
     try:
-        log = run.events
+        log = run.event_log()
     except RunError:  # that it is not there, or damaged, does not stop a film
         facts["collisions"] = run.collisions_per_disk_at(run.time)[frames].tolist()
         return facts | {"note": "output.event_log tells the paths between"}, {}
     ends, pairs = seen(run, log, frames), np.append(0, np.cumsum(log.j > 0))
-    facts["collisions"] = (2 / run.count * pairs[ends]).tolist()
+    facts["collisions"] = (2 / run.n_disks * pairs[ends]).tolist()
     some = slice(ends[0], ends[-1])
     if ends[-1] - ends[0] + pairs[ends[-1]] - pairs[ends[0]] > most:
         return facts | {"note": "too many collisions between"}, {}
@@ -232,7 +232,7 @@ def scene(run: Run) -> tuple[dict, dict]:
     """
     radii, own = radii_of(run)
     facts = {
-        "exact": run.count <= FEW_DISKS,
+        "exact": run.n_disks <= FEW_DISKS,
         "settles": run.nature.in_equilibrium,
         "gravity": run.gravity.tolist(),
         "lower": run.room[0].tolist(),
@@ -279,7 +279,7 @@ def film(
         "curves": curves(run),
         "scales": {name: [LABELS[name], float(f"{top:.7g}")] for name, top in tops.items()},
         "colour": colour,
-        "traced": traced or ([0] if run.count == 1 else []),
+        "traced": traced or ([0] if run.n_disks == 1 else []),
         **told,
     }
     return facts, blocks | own
@@ -415,7 +415,7 @@ def main() -> None:
     text = page(run, texts(*parts))
     destination(path).write_text(text, encoding="utf-8")
     size = len(text) / 1e6
-    rows = [{"player": path, "frames": len(frames), "of": run.frames, "MB": size}]
+    rows = [{"player": path, "frames": len(frames), "of": run.n_frames, "MB": size}]
     report(args, None, rows)
     if args.open:
         webbrowser.open(path.resolve().as_uri())

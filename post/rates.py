@@ -3,10 +3,10 @@
     python post/rates.py runs/bulk.h5 -o rates.png --csv rates.csv
 
 Runs are combined; all must be of one system, without gravity.  Means are taken in equilibrium: from
-where nothing drifts any more, or after --skip.  Errors take the memory of each quantity into
-account, `samples` is how many independent ones it is worth, and what speaks against an error is a
-warning.  Runs that keep their kinetic energy have an exact kT, and are scaled to the mean of it;
-others, with walls or kicks of one temperature or disks that turn, have a kT with an error.
+where nothing drifts any more, or after --equilibration.  Errors take the memory of each quantity
+into account, `samples` is how many independent ones it is worth, and what speaks against an error
+is a warning.  Runs that keep their kinetic energy have an exact kT, and are scaled to the mean of
+it; others, with walls or kicks of one temperature or disks that turn, have a kT with an error.
 Pressure: by the virial of the pair collisions, and by the impulses on each side (a little larger:
 centres keep a radius away from sides).  With an event log also w_ij, the collisions of a disk of
 species i with disks of species j per time, and the free paths: in a frame each disk is on one, as
@@ -14,8 +14,8 @@ long as its speed times the time between its collisions before and after.  Frame
 more often; therefore each counts 1 over its time; errors are from the scatter of runs, or of one
 run's frames in blocks.  The line is for equal disks that meet without memory (Boltzmann, Enskog).
 Kicked disks have no free paths.  Of runs without equilibrium, that lose energy or have walls of
-different temperature, only the free paths are found: in the frames after --skip, or else where
-nothing drifts, or 15 collisions per disk after the start of a gas that cools.
+different temperature, only the free paths are found: in the frames after --equilibration, or else
+where nothing drifts, or 15 collisions per disk after the start of a gas that cools.
 """
 
 from ricochet import Run, RunError, statistics, thermodynamics as td
@@ -42,7 +42,7 @@ def check(runs: list[Run]) -> None:
         if not run.nature.in_equilibrium and not td.has_log(run):
             needs = "it has free paths only, and those need output.event_log = .true."
             allow(run, needs, *td.FLUID)
-        if run.names != first.names or run.count != first.count:
+        if run.names != first.names or run.n_disks != first.n_disks:
             raise RunError(f"{run.path}: not the same system as {first.path}")
 
 
@@ -80,7 +80,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
 
     def ideal(run: Run) -> tuple[np.ndarray, np.ndarray]:
         _, time, kt = td.kt_in_time(run)
-        carried = run.count / area * td.between(time, kt)[1]
+        carried = run.n_disks / area * td.between(time, kt)[1]
         return time, np.append(0, np.cumsum(carried))
 
     area, length = np.prod(runs[0].edges), runs[0].edges[[1, 1, 0, 0]]
@@ -95,13 +95,13 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
 def free_paths(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Lengths of the paths that the disks of all frames are on, and the weight of each."""
     allow(run, "free paths are those of disks that fly freely in an empty box", *STRAIGHT)
-    log = run.events
+    log = run.event_log()
     disk = np.concatenate([log.i, log.j[log.j > 0]])
     time = np.concatenate([log.time, log.time[log.j > 0]])
     order = np.lexsort((time, disk))
-    ends = np.cumsum(np.bincount(disk, minlength=run.count + 1))
-    duration = np.full((run.frames, run.count), np.nan)
-    for k in range(run.count):
+    ends = np.cumsum(np.bincount(disk, minlength=run.n_disks + 1))
+    duration = np.full((run.n_frames, run.n_disks), np.nan)
+    for k in range(run.n_disks):
         own = time[order[ends[k] : ends[k + 1]]]
         after = np.searchsorted(own, run.time, side="right")
         inside = (after > 0) & (after < len(own))
@@ -181,18 +181,18 @@ def table(runs: list[Run], start: float, means: dict, path: Estimate | None) -> 
 
 
 def main() -> None:
-    args = command_line(__doc__, "rates.png", skip=None).parse_args()
+    args = command_line(__doc__, "rates.png", equilibration=None).parse_args()
     runs, notes = args.runs, []
     check(runs)
     settled = td.all_settle(runs)
-    start = max(td.start_of_steady_state(run, args.skip) for run in runs)
+    start = max(td.start_of_steady_state(run, args.equilibration) for run in runs)
     kicked = any("bathed" in run.nature for run in runs)
-    paths = None if kicked else mean_and_density(runs, args.skip)
+    paths = None if kicked else mean_and_density(runs, args.equilibration)
     means, curves = {}, {}
     count = settled + bool(paths)
     figure, panels = plt.subplots(1, count, squeeze=False, figsize=(2 + 4 * count, 4.5))
     if settled:
-        means = over_all(runs, args.skip, notes)
+        means = over_all(runs, args.equilibration, notes)
         shown = pressures_in_time(runs)
         draw_pressure(panels[0, 0], shown, means["pressure_virial"], start)
         curves = {(f"pressure_{way}(t)",): curve for way, curve in shown.items()}

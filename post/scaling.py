@@ -16,7 +16,7 @@ import numpy as np
 
 def table(runs: list[Run]) -> list[dict]:
     """A row for each number of disks and threads, in ascending order."""
-    groups = grouped(runs, lambda run: (run.count, int(run.provenance.get("threads", 1))))
+    groups = grouped(runs, lambda run: (run.n_disks, int(run.provenance.get("threads", 1))))
     walls = {key: [recorded(run, "wall_time") for run in same] for key, same in groups}
     rows = []
     for (disks, threads), times in walls.items():

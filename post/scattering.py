@@ -21,7 +21,7 @@ import numpy as np
 def moving_and_resting(run: Run) -> tuple[int, int]:
     """Which disk moves at the start, and which does not."""
     moving = np.flatnonzero(run.speed(0))
-    if run.count != 2 or len(moving) != 1:
+    if run.n_disks != 2 or len(moving) != 1:
         raise RunError(f"{run.path}: needs two disks, one of them at rest")
     return moving[0], 1 - moving[0]
 

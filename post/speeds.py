@@ -3,20 +3,18 @@
     python post/speeds.py runs/gas/*.h5 -o speeds.png --csv speeds.csv
 
 Speeds are given in u = v / sqrt(2 kT / m), kT = mean kinetic energy of the species, so that
-equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start
-u is v itself.  Runs of the same N are combined.  Equilibrium, or the steady state of a driven gas,
-is found, or begins after --skip; it takes the frames of --frames that are at least --apart
-collisions per disk from each other, and their mean kT.  In a sheared box speeds are relative to
-its flow.
-A gas that only loses energy has no steady state: its histogram is of the frames after --skip, or
-else 15 collisions per disk, with the kT of each frame for itself.  So is that of a gas whose sides
-move, or whose kT drifts; `kT_first` and `kT_last` say how far.
+equilibrium is P(u) = 2 u exp(-u^2) for any mass; with m = 1 and all speeds 1 at the start u is v
+itself.  Runs of the same N are combined.  Equilibrium, or the steady state of a driven gas, is
+found, or begins after --equilibration; it takes the frames of --frames that are at least
+--min-separation collisions per disk from each other, and their mean kT.  In a sheared box speeds
+are relative to its flow. A gas that only loses energy has no steady state: its histogram is of the
+frames after --equilibration, or else 15 collisions per disk, with the kT of each frame for itself.
+So is that of a gas whose sides move, or whose kT drifts; `kT_first` and `kT_last` say how far.
 Tests: Kolmogorov-Smirnov (KS) and chi-square against the Maxwell law, KS against the exact law of N
 disks that share a fixed kinetic energy, which matters if they are few; none where that law is not
 known: with gravity, losses, one periodic axis of two, or two and unequal masses.  A disk forgets
 its speed within 5 collisions: frames that are closer count for the tests as one frame every 5
-collisions per disk.
-a2 = <v^4> / (2 <v^2>^2) - 1.
+collisions per disk. a2 = <v^4> / (2 <v^2>^2) - 1.
 """
 
 from ricochet import Run, RunError
@@ -57,7 +55,7 @@ UNSTEADY = "No steady kT yet: each frame at its own"
 
 def state_of(run: Run) -> str:
     """That of the late frames, if nothing drifts."""
-    if run.count < 3:
+    if run.n_disks < 3:
         raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
     known = set(TRAITS) - {"changed", "collapsed", "sliding"}
     allow(run, "its speeds are of no single state; see fields.py", *known)
@@ -85,11 +83,11 @@ def pooled(
     """The late frames of runs with the same number of disks: density of speeds (B,), and tests."""
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     u = np.concatenate([reduced_speeds(*one, each=each) for one in own])
-    n = runs[0].count * sum(map(independent_frames, runs, picked))
+    n = runs[0].n_disks * sum(map(independent_frames, runs, picked))
     maxwell, law = hold_against(u, maxwell_cdf, independent=n), exact_law(runs[0])
     exact = hold_against(u, law, independent=n) if law else None
     row = {
-        "N": runs[0].count,
+        "N": runs[0].n_disks,
         "runs": len(runs),
         "frames": sum(map(len, picked)),
         "speeds": len(u),
@@ -177,7 +175,7 @@ def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
     for axes, frame, when in ((first, 0, "first frame"), (last, -1, f"t = {largest.time[-1]:.4g}")):
         if all_move(largest, frame):
             height = binned(reduced_speeds(largest, [frame]), BINS)
-            draw_histogram(axes, [height], [f"{when}, N = {largest.count}"])
+            draw_histogram(axes, [height], [f"{when}, N = {largest.n_disks}"])
         else:
             axes.set_axis_off()
             axes.text(0.5, 0.5, f"{when}: disks at rest", ha="center", transform=axes.transAxes)
@@ -196,12 +194,14 @@ def draw(runs: list[Run], groups: list, pools: list, state: str) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "speeds.png", frames=None, skip=None, apart=5.0).parse_args()
+    args = command_line(
+        __doc__, "speeds.png", frames=None, equilibration=None, min_separation=5.0
+    ).parse_args()
     state, *others = map(state_of, args.runs)
     if any(other != state for other in others):
         odd = args.runs[1 + [other != state for other in others].index(True)]
         raise RunError(f"{odd.path}: is not of the kind of {args.runs[0].path}: draw them apart")
-    groups = grouped(args.runs, lambda run: run.count)
+    groups = grouped(args.runs, lambda run: run.n_disks)
     picked = [[late_frames(run, args) for run in members] for _, members in groups]
     found = [temperature(runs, own) for (_, runs), own in zip(groups, picked, strict=True)]
     if state in (EQUILIBRIUM, STEADY) and any(drift for *_, drift in found):

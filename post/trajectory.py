@@ -44,7 +44,7 @@ def wrapped(path: np.ndarray, image: np.ndarray, edges: np.ndarray) -> np.ndarra
 def draw_paths(axes: plt.Axes, run: Run, disks: list[int], frames: list[int]) -> None:
     """Paths, with the disk where it is at the end; the others grey."""
     draw_box(axes, run, run.time[frames[-1]])
-    others = np.full(run.count, "0.85")
+    others = np.full(run.n_disks, "0.85")
     others[disks] = "none"
     disk_collection(axes, run, run.position[frames[-1]], facecolors=others, zorder=0.8)
     for order, (disk, path) in enumerate(zip(disks, paths_of(run, disks, frames), strict=True)):
@@ -68,7 +68,7 @@ def main() -> None:
     figure, panels = plt.subplots(1, size, squeeze=False, figsize=(5.2 * size, 5.7))
     for axes, run in zip(panels.flat, args.runs, strict=True):
         frames = chosen_frames(run, args.frames, args.count)
-        disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.count))))
+        disks = chosen_disks(run, args.disks or list(range(1, 1 + min(12, run.n_disks))))
         draw_paths(axes, run, disks, frames)
         ends = np.hstack([run.unwrapped(frames[end])[disks] for end in (0, -1)]).tolist()
         names = ("x_first", "y_first", "x_last", "y_last")

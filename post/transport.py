@@ -90,8 +90,8 @@ def draw(results: Results, rows: list[dict]) -> plt.Figure:
 
 
 def main() -> None:
-    args = command_line(__doc__, "transport.png", skip=None).parse_args()
-    results = [(eta, coefficients(runs, args.skip)) for eta, runs in by_packing(args.runs)]
+    args = command_line(__doc__, "transport.png", equilibration=None).parse_args()
+    results = [(eta, coefficients(runs, args.equilibration)) for eta, runs in by_packing(args.runs)]
     rows, notes = table(results)
     data = [
         {"what": row["what"], "packing": row["packing"], "wt": None}

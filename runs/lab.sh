@@ -5,7 +5,7 @@
 
 runs/ensemble.sh input/lab.nml -d "$data" --seeds 1 "$@"
 # Frame 50 is the state after 5000 events; the 500 that follow give 50 000 speeds.
-"$python" post/speeds.py "$data/seed_1.h5" --frames 51: --skip 0 --apart 0 \
+"$python" post/speeds.py "$data/seed_1.h5" --frames 51: --equilibration 0 --min-separation 0 \
   -o "$figures/lab_speeds.png" --csv "$figures/lab_speeds.csv"
 runs/ensemble.sh input/lab.nml -d "$data/start" --seeds 1 --set stop.events=300 \
   --set output.frames_every_events=1 "$@"

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 from . import packages as packages  # first: it reports packages that are missing
 from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
-from .reading.reader import Events, Obstacle, Run, RunError, Series, read_run
+from .reading.reader import EventLog, Obstacle, Run, RunError, Series, read_run
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, run
 from .running.simulation import Simulation
 from .running.starting import write_start
 
 __all__ = [
-    "Events",
+    "EventLog",
     "Obstacle",
     "ProgramError",
     "Run",

@@ -79,12 +79,22 @@ def not_negative(text: str) -> float:
 OPTIONS = {
     "frames": (frame_list, "LIST", "which frames: numbers, ranges, as 0,10,-1 or 100:200 or ::5"),
     "count": (positive, "N", "at most this many of the frames, evenly spread"),
-    "skip": (not_negative, "X", "leave out the first X collisions per disk [until nothing drifts]"),
-    "apart": (float, "X", "take frames at least X collisions per disk apart"),
-    "wave": (not_negative, "K", "wave number of F_s(k, t), times the mean diameter"),
+    "equilibration": (
+        not_negative,
+        "X",
+        "leave out the first X collisions per disk [until nothing drifts]",
+    ),
+    "min_separation": (float, "X", "take frames at least X collisions per disk apart"),
+    "wavenumber": (not_negative, "K", "wave number of F_s(k, t), times the mean diameter"),
     "disks": (disk_list, "IDS", "which disks: ids such as 1,5,9"),
     "colour": (str, "WHAT", f"species, {', '.join(LABELS)} [species; speed if there is one]"),
 }
+
+
+#: Options that have another name now.
+RENAMED = {"--skip": "--equilibration", "--apart": "--min-separation", "--wave": "--wavenumber"}
+#: Other spellings of an option.
+SPELLINGS = {"colour": ["--color"]}
 
 
 class Parser(argparse.ArgumentParser):
@@ -95,6 +105,8 @@ class Parser(argparse.ArgumentParser):
         known, unknown = self.parse_known_args(words, namespace)
         if unknown:
             word = unknown[0].split("=")[0]
+            if RENAMED.get(word) in self._option_string_actions:
+                self.error(f"{word} is called {RENAMED[word]} now")
             self.error(f"unknown argument {word}{did_you_mean(word, self._option_string_actions)}")
         if hasattr(known, "runs"):
             paths = known.runs if known.paired else finished(known.runs)
@@ -172,7 +184,8 @@ def command_line(
     for name, default in defaults.items():
         convert, value, meaning = OPTIONS[name]
         meaning += "" if default is None else f" [{default:g}]"
-        parser.add_argument(f"--{name}", type=convert, default=default, metavar=value, help=meaning)
+        names = [f"--{name.replace('_', '-')}", *SPELLINGS.get(name, [])]
+        parser.add_argument(*names, type=convert, default=default, metavar=value, help=meaning)
     return parser
 
 
@@ -180,23 +193,26 @@ def chosen_frames(run: Run, which: Sequence[int | slice] | None, count: int | No
     """Numbers of the frames of --frames [all], at most --count of them, evenly spread."""
     frames: list[int] = []
     for part in which if which is not None else [slice(None)]:
-        if isinstance(part, int) and not -run.frames <= part < run.frames:
-            raise RunError(f"{run.path}: no frame {part}, there are {run.frames}")
-        frames += np.atleast_1d(np.arange(run.frames)[part]).tolist()
+        if isinstance(part, int) and not -run.n_frames <= part < run.n_frames:
+            raise RunError(f"{run.path}: no frame {part}, there are {run.n_frames}")
+        frames += np.atleast_1d(np.arange(run.n_frames)[part]).tolist()
     if not frames:
-        raise RunError(f"{run.path}: no such frames, there are {run.frames}")
+        raise RunError(f"{run.path}: no such frames, there are {run.n_frames}")
     if count is None or count >= len(frames):
         return frames
     return [frames[k] for k in np.linspace(0, len(frames) - 1, count).round().astype(int)]
 
 
 def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
-    """Of --frames those of the steady state, --apart; the last of them if none is that late.
+    """Frames of the steady state among --frames, --min-separation apart; the last if none is late.
 
     The notes of `args` say if these are fewer than were asked for, or early.
     """
-    frames, start = chosen_frames(run, args.frames, None), start_of_steady_state(run, args.skip)
-    used = frames_from(run, start, args.apart, frames)
+    frames, start = (
+        chosen_frames(run, args.frames, None),
+        start_of_steady_state(run, args.equilibration),
+    )
+    used = frames_from(run, start, args.min_separation, frames)
     says = f"{run.path.name}: "
     if not used:
         used = [max(frames)]
@@ -205,9 +221,9 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
         )
     elif args.frames is not None and len(used) < len(frames):
         some = f"takes {len(used)} of {len(frames)} frames, from t = {start:.4g} on and "
-        args.notes.append(f"{says}{some}{args.apart:g} collisions per disk apart")
+        args.notes.append(f"{says}{some}{args.min_separation:g} collisions per disk apart")
     tau = run.collisions_per_disk_at(run.time)[used[0]]
-    if args.skip is None and tau < SPEEDS_FORGET * (1 - 1e-9):
+    if args.equilibration is None and tau < SPEEDS_FORGET * (1 - 1e-9):
         early = f"begins {tau:.3g} collisions per disk after the start, which speeds remember for "
         args.notes.append(f"{says}{early}{SPEEDS_FORGET:g}; run longer")
     return used
@@ -216,8 +232,8 @@ def late_frames(run: Run, args: argparse.Namespace) -> list[int]:
 def chosen_disks(run: Run, ids: list[int]) -> list[int]:
     """Indices of the disks of --disks, whose ids count from 1."""
     for number in ids:
-        if not 1 <= number <= run.count:
-            raise RunError(f"{run.path}: no disk {number}, there are {run.count}")
+        if not 1 <= number <= run.n_disks:
+            raise RunError(f"{run.path}: no disk {number}, there are {run.n_disks}")
     return [number - 1 for number in ids]
 
 

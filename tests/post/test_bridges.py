@@ -32,8 +32,8 @@ def exported(run: Run, name: str, *options) -> Path:
 
 def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
     pipeline = reader("ovito.io").import_file(str(exported(run, "run.xyz")))
-    assert pipeline.source.num_frames == run.frames
-    for frame in (0, run.frames - 1):
+    assert pipeline.source.num_frames == run.n_frames
+    for frame in (0, run.n_frames - 1):
         data = pipeline.compute(frame)
         disks = data.particles
         assert data.cell.is2D and tuple(data.cell.pbc[:2]) == tuple(run.periodic)
@@ -45,7 +45,7 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
         np.testing.assert_allclose(disks["Velocity"][...][:, :2], run.velocity[frame], **one_bit)
         np.testing.assert_allclose(disks["Radius"][...], run.radius, rtol=1e-7)
         np.testing.assert_array_equal(disks["Mass"][...], run.mass)
-        np.testing.assert_array_equal(disks.identifiers[...], np.arange(1, run.count + 1))
+        np.testing.assert_array_equal(disks.identifiers[...], np.arange(1, run.n_disks + 1))
         names = {kind.id: kind.name for kind in disks.particle_types.types}
         assert [names[t] for t in disks.particle_types[...]] == [
             run.names[s - 1] for s in run.species
@@ -55,8 +55,8 @@ def test_ovito_opens_the_export_as_a_system_in_two_dimensions(run):
 def test_mdanalysis_reads_positions_velocities_times_and_species(run):
     reader("MDAnalysis")
     universe = mdanalysis_universe(run)
-    assert len(universe.trajectory) == run.frames
-    for frame in (0, run.frames - 1):
+    assert len(universe.trajectory) == run.n_frames
+    for frame in (0, run.n_frames - 1):
         step = universe.trajectory[frame]
         assert step.time == pytest.approx(run.time[frame] - run.time[0], rel=1e-6, abs=1e-9)
         np.testing.assert_allclose(universe.atoms.positions[:, :2], run.position[frame], atol=1e-6)
@@ -88,8 +88,8 @@ def test_xarray_gets_all_frames_and_is_asked_for_where_it_is_missing(run, monkey
             run.to_xarray()
     reader("xarray")
     table = run.to_xarray()
-    assert dict(table.sizes) == {"time": run.frames, "disk": run.count, "component": 2}
-    for name in ("position", "velocity", "image", "collisions"):
+    assert dict(table.sizes) == {"time": run.n_frames, "disk": run.n_disks, "component": 2}
+    for name in ("position", "velocity", "image", "event_count"):
         np.testing.assert_array_equal(table[name], getattr(run, name)[:])
     first = table.sel(disk=1, component="y", time=run.time[-1])
     assert first.position == run.position[-1][0, 1] and first.mass == run.mass[0]
@@ -99,11 +99,11 @@ def test_xarray_gets_all_frames_and_is_asked_for_where_it_is_missing(run, monkey
 def test_csv_is_read_by_numpy(run):
     path = exported(run, "run.csv", "--frames", "::2")
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=None)
-    frames = range(0, run.frames, 2)
-    assert len(table) == len(frames) * run.count
+    frames = range(0, run.n_frames, 2)
+    assert len(table) == len(frames) * run.n_disks
     speeds = np.concatenate([run.velocity[k][:, 0] for k in frames])
     np.testing.assert_array_equal(table["vx"], speeds)
-    np.testing.assert_array_equal(table["time"], np.repeat(run.time[frames], run.count))
+    np.testing.assert_array_equal(table["time"], np.repeat(run.time[frames], run.n_disks))
     assert set(table["species"]) == {"light", "heavy"}
 
 

@@ -22,7 +22,7 @@ import rates
 import trajectory
 from driven import demon_law, fuller, noise_law, temperature_law
 from ricochet import (
-    Events,
+    EventLog,
     RunError,
     cooling as cool,
     fields,
@@ -230,7 +230,7 @@ def test_kt_and_z_of_any_gas_are_right_or_refused(simulated, systems):
         if known.fluid and kt is None:  # the energy is shared by all momenta, and by all spins
             still = known.kept * (run.mass @ run.velocity[0])
             energy = run.kinetic_energy(0).sum() - np.sum(still**2) / (2 * run.mass.sum())
-            kt = energy / (run.count * (1 + known.rough / 2) - known.kept.sum() / 2)
+            kt = energy / (run.n_disks * (1 + known.rough / 2) - known.kept.sum() / 2)
         pairs = [(td.temperature(run), (kt, 0))] if known.settles and kt else []
         if known.fluid:
             ways, plain = td.z_ways(run), td.z_ways(simulated(known.plain, name="plain"))
@@ -270,7 +270,7 @@ def test_free_paths_weigh_each_flight_once_however_often_frames_meet_it(tmp_path
     collisions = {"collisions": np.zeros(len(time), int)}
     run = written(tmp_path / "run.h5", 0 * v, v, time=time, observables=collisions)
     zero = np.zeros(len(hits), int)
-    run.__dict__["events"] = Events(hits, zero + 1, zero, zero + 1.0)
+    run.__dict__["_event_log"] = EventLog(hits, zero + 1, zero, zero + 1.0)
     path, weight = rates.free_paths(run, skip=0)
     assert set(np.round(path, 9)) == {0.5, 2.0}
     assert np.sum(weight[path > 1]) / np.sum(weight) == pytest.approx(1 / 3, rel=0.02)
@@ -355,7 +355,7 @@ def test_a_gas_that_cools_has_a_structure_and_free_paths_and_haffs_law(bulk, tmp
     rows = {row["quantity"]: row["mean"] for row in drawn(tmp_path, "rates", bulk[2])}
     assert not any(name.startswith("pressure") for name in rows)
     eta, diameter = td.packing(run), 2 * run.radius[0]
-    density = (run.count - 1) / np.prod(run.edges)
+    density = (run.n_disks - 1) / np.prod(run.edges)
     contact = (hd.simulated(eta) - 1) / (2 * eta)  # a path does not know how fast it is flown
     enskog = 1 / (2 * np.sqrt(2) * density * diameter * contact)
     assert float(rows["mean_free_path"]) == pytest.approx(enskog, rel=0.1)
@@ -571,7 +571,7 @@ def test_moments_are_those_of_the_definition(gas):
     run = gas(count=10, packing=UNLIKE.format(1, 5), length=40, restitution=0.9, cadence=every)
     x, v, m, time = run.position[:], run.velocity[:], run.mass, run.time
     flown, handed = [np.zeros(5)], [np.zeros(5)]
-    for k in range(run.frames - 1):
+    for k in range(run.n_frames - 1):
         flown.append((time[k + 1] - time[k]) * carried(v[k], m))
         changed = np.flatnonzero(np.any(v[k + 1] != v[k], axis=1))
         handed.append(np.zeros(5))
@@ -693,7 +693,7 @@ def test_the_viscosity_of_grains_is_what_their_heat_takes(simulated):
     (time, lost), kt = run.observable("dissipated_energy"), run.observable("all/temperature").value
     later, found = driven.viscosity(run)[""]
     mean = np.average(found, weights=np.diff(later, prepend=0))
-    work = np.ptp(lost) + run.count * (kt[-1] - kt[0])
+    work = np.ptp(lost) + run.n_disks * (kt[-1] - kt[0])
     assert mean == pytest.approx(work / (0.25 * time[-1]), rel=0.05)
 
 

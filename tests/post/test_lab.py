@@ -262,7 +262,7 @@ def test_an_added_group_is_run_and_in_what_is_kept(address):
             text = await one.kept("input")
             assert b"&obstacle" in text and b"post" in text
             with Simulation(text.decode()) as again:
-                assert again.count == 1000
+                assert again.n_disks == 1000
 
     asyncio.run(visit())
 

@@ -218,7 +218,7 @@ def test_a_text_at_a_slider_is_the_value_that_runs_or_waits_with_one_message(ope
         wish = good | {key: f"0,{plain}" if key == "box.gravity" else plain}
         try:
             with Simulation._of(path.read_text(), told(wish)) as trial:
-                fine = trial.count <= DISKS
+                fine = trial.n_disks <= DISKS
         except ProgramError:
             fine = False
         if fine:

@@ -40,13 +40,13 @@ def test_the_event_log_gives_the_true_paths(simulated, system):
     text = SYSTEMS[system] + DISKS + "&stop time = 1 /\n"
     run = simulated(text, LOG, "output.frames_every_time=0.25")
     dense = simulated(text, "output.frames_every_time=0.01", name="dense")
-    frames, gap = list(range(run.frames)), 0.0
+    frames, gap = list(range(run.n_frames)), 0.0
     turns, truth = turns_of(run, frames), dense.unwrapped(slice(None))
-    assert not why_unknown(run, run.events) and len(turns.disk) > 20
+    assert not why_unknown(run, run.event_log()) and len(turns.disk) > 20
     for frame, (start, end) in enumerate(pairwise(run.time)):
         inside = (dense.time > start) & (dense.time < end)
         origin = truth[np.searchsorted(dense.time, start - 1e-9)]
-        for disk in range(run.count):
+        for disk in range(run.n_disks):
             own = (turns.frame == frame) & (turns.disk == disk)
             place, velocity = origin[disk], run.velocity[frame][disk]
             legs = [start, *turns.time[own], end]
@@ -64,12 +64,12 @@ def flown(run, place, velocity, t):
 
 
 def turns_of(run, frames):
-    return turns_between(run, run.events, frames, seen(run, run.events, frames))
+    return turns_between(run, run.event_log(), frames, seen(run, run.event_log(), frames))
 
 
 def test_a_part_of_the_frames_has_the_turns_between_them(simulated):
     run = simulated(DISKS + "&stop time = 2 /\n", LOG, "output.frames_every_time=0.25")
-    all_turns, some = turns_of(run, list(range(run.frames))), turns_of(run, [2, 3, 5])
+    all_turns, some = turns_of(run, list(range(run.n_frames))), turns_of(run, [2, 3, 5])
     own = (all_turns.frame >= 2) & (all_turns.frame < 5)
     assert sorted(some.time) == sorted(all_turns.time[own]) and set(some.frame) == {0, 1}
 
@@ -83,4 +83,4 @@ def test_a_part_of_the_frames_has_the_turns_between_them(simulated):
 )
 def test_where_more_than_collisions_acts_paths_are_not_known(simulated, more, why):
     run = simulated(more + DISKS + "&stop time = 0.1 /\n", LOG)
-    assert why in why_unknown(run, run.events)
+    assert why in why_unknown(run, run.event_log())

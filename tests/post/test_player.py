@@ -95,7 +95,7 @@ def test_a_film_keeps_to_its_room(tmp_path, rng, monkeypatch):
     monkeypatch.setattr(player, "ROOM", room)
     run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, frames=1000, count=40))
     frames = list(range(player.frames_that_fit(run, room)))
-    assert len(frames) < run.frames
+    assert len(frames) < run.n_frames
     page = player.page(run, player.texts(*filmed(run, frames)))
     assert len(page) - len(player.page(run, None)) < 1.05 * room
 
@@ -339,7 +339,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
         truth.time[frames].tolist(),
     )
     assert browser.run("return film.known && !$('between').textContent")
-    pairs, tops = run.events.time[run.events.j > 0], browser.run("return film.scales")
+    pairs, tops = run.event_log().time[run.event_log().j > 0], browser.run("return film.scales")
     heights = -run.mass * (truth.unwrapped(frames) @ run.gravity)
     worst, turned = 1e-6 if exact else 2e-4, []
     for k, (flight, kinetic, potential, count, speed, displacement, hits) in enumerate(found):
@@ -348,7 +348,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
         gap -= np.where(run.periodic, run.edges * np.round(gap / run.edges), 0)
         assert np.abs(gap).max() < (1e-6 if exact else 2 / 65535)
         turned.append(np.abs(np.hypot(vx, vy) - truth.speed(at)))
-        assert count == 2 * np.sum(pairs <= truth.time[at]) / run.count
+        assert count == 2 * np.sum(pairs <= truth.time[at]) / run.n_disks
         for s, kind in enumerate(run.by_species):
             true = truth.kinetic_energy(at)[kind.disks].mean()
             assert kinetic[s] == pytest.approx(true, rel=worst, abs=worst)
@@ -357,7 +357,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
         for codes, values, top in (
             (speed, truth.speed(at), tops["speed"][1]),
             (displacement, truth.displacement(at), tops["displacement"][1]),
-            (hits, np.log1p(truth.collisions[at]), np.log1p(tops["collisions"][1])),
+            (hits, np.log1p(truth.event_count[at]), np.log1p(tops["collisions"][1])),
         ):
             apart = np.abs(np.array(codes) - 255 * np.minimum(1, values / top))
             assert np.quantile(apart, 0.9) < 3
@@ -368,7 +368,7 @@ def test_paths_energies_and_colours_follow_the_log(simulated, playing, box, exac
 def test_events_to_come_are_those_of_the_log(simulated, playing, box):
     """Listed, and stepped to one by one."""
     run = simulated(BOXES[box] + FEW, *LOGGED)
-    browser, events = playing(run.path), run.events
+    browser, events = playing(run.path), run.event_log()
     times = events.time[:40]
     found = []
     for _ in times:
@@ -411,7 +411,7 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     samples = ("frames", "observables")
     every = [f"output.{what}_every_events=1" for what in samples]
     run = simulated(text, *every, "output.event_log=.true.")
-    events, reach = run.events, run.radius[:, None] + [-1e-9, -1e-9]
+    events, reach = run.event_log(), run.radius[:, None] + [-1e-9, -1e-9]
     (lower, upper), place = run.sides_at(run.time), run.position[:]
     assert np.all(place - reach >= lower[:, None]) and np.all(place + reach <= upper[:, None])
     assert np.all(lower >= run.room[0]) and np.all(upper <= run.room[1])

@@ -38,13 +38,13 @@ def small(tmp_path):
 
 def test_constants_are_those_of_the_input_and_energies_those_of_the_observables(simulated):
     run = simulated(FALLING + "&run seed = 7 / &stop time = 1 / " + BOTH.format(""))
-    assert (run.count, run.names, run.seed, run.restitution) == (16, ("A", "B"), 7, 1)
+    assert (run.n_disks, run.names, run.seed, run.restitution) == (16, ("A", "B"), 7, 1)
     np.testing.assert_array_equal([run.gravity, run.upper], [[0, -9.81], [4, 4]])
     for kind in run.by_species:
         energies = run.kinetic_energy(slice(None))[:, kind.disks].mean(axis=1)
         found = run.observable(f"{kind.name}/kinetic_energy").value
         np.testing.assert_allclose(energies, found, rtol=1e-9)
-    assert repr(run) == f"<Run {run.path}: 8 A, 8 B; {run.frames} frames, t = 0 to 1>"
+    assert repr(run) == f"<Run {run.path}: 8 A, 8 B; {run.n_frames} frames, t = 0 to 1>"
 
 
 def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
@@ -59,14 +59,14 @@ def test_frames_are_indexed_like_an_array_and_are_one_for_numpy(small):
         np.testing.assert_array_equal(run.position[index], whole[index])
     np.testing.assert_array_equal(np.array(list(run.position)), whole)
     np.testing.assert_array_equal(run.position, whole)
-    assert np.asarray(run.collisions, dtype=float).dtype == float
+    assert np.asarray(run.event_count, dtype=float).dtype == float
     for index, words in ((3, "0 with size 3"), ((0, 2), "1 with size 2"), ("x", "only integers")):
         with pytest.raises(RunError, match=f"small.h5: position.*{words}"):
             run.position[index]
 
 
 def frames_seen_by_another_program(path):
-    code = f"from ricochet import read_run; print(read_run({str(path)!r}).frames)"
+    code = f"from ricochet import read_run; print(read_run({str(path)!r}).n_frames)"
     result = ran(sys.executable, "-c", code, cwd=ROOT / "post")
     return int(result.stdout) if result.returncode == 0 else result.stderr.splitlines()[-1]
 
@@ -127,12 +127,12 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
     assert run.orientation[-1].any() and not run.orientation[0].any()
     assert {"sides/left/impulse", "walls/w/energy"} <= set(run.observables)
     assert run.observable("walls/w/impulse").value.shape[1:] == (2,)
-    size = np.hypot(*run.events.momentum_change.T)
-    assert size == pytest.approx(run.events.impulse)
+    size = np.hypot(*run.event_log().momentum_change.T)
+    assert size == pytest.approx(run.event_log().impulse)
     with pytest.raises(RunError, match="no wall_hits in its frames"):
         run.element("wall_hits")
     axes = plt.subplots()[1]
-    marks = radius_marks(axes, run, run.frames - 1)
+    marks = radius_marks(axes, run, run.n_frames - 1)
     dx, dy = np.transpose([b - a for a, b in marks.get_segments()])
     assert np.hypot(dx, dy) == pytest.approx(run.radius)
     turned = np.angle(np.exp(1j * (np.arctan2(dy, dx) - run.orientation[-1])))
@@ -225,7 +225,7 @@ STEPS = "&run dynamics = 'steps' dt = 4e-3 /\n"
 LOG = "helfand = .true. "
 GENERIC = ("speeds", "snapshot", "animate", "energy", "trajectory", "export", "player", "cooling")
 SETTLED = ("correlations", "equation_of_state", "rates", "melting", "transport")
-SOON = ("--skip", "1", "--apart", "1")
+SOON = ("--equilibration", "1", "--min-separation", "1")
 FROM_HEIGHT = {"gravity": SOON[:2], "driven": ("--show", "height")}
 #: Simulations: inputs, and the scripts that draw them, with their options.
 RUNNING = [
@@ -389,6 +389,11 @@ def test_results_are_written_into_files_of_ones_own(
     [
         ("snapshot run.h5 --cuont 3", "did you mean --count?"),
         ("snapshot run.h5 --colour=sped", "did you mean speed?"),
+        ("snapshot run.h5 --color=sped", "did you mean speed?"),
+        ("speeds run.h5 --skip 5", "--skip is called --equilibration now"),
+        ("speeds run.h5 --apart=5", "--apart is called --min-separation now"),
+        ("correlations run.h5 --wave 5", "--wave is called --wavenumber now"),
+        ("snapshot run.h5 --skip 5", "unknown argument --skip"),
         ("haff run.h5 --out a.png", "unknown argument --out; did you mean --output?"),
         ("haff run.h5 -o a.png --csv ./a.png", "a.png is the name of the figure, too"),
         ("snapshot rum.h5", "no such file; did you mean run.h5?"),
@@ -402,7 +407,7 @@ def test_results_are_written_into_files_of_ones_own(
         ("trajectory run.h5 --disks 0", "no disk 0"),
         ("fields run.h5 --cells 1", "there are 2 to 100000 cells"),
         ("fields run.h5 --cells 4 --grid 3,3", "not allowed with"),
-        ("fields run.h5 --skip nan", "is not a number from 0 on"),
+        ("fields run.h5 --equilibration nan", "is not a number from 0 on"),
         ("export run.h5 --count 0.5", "'0.5' is not a whole number above 0"),
     ],
 )

@@ -88,7 +88,9 @@ def test_equilibrium_frames_are_late_and_apart(tmp_path, rng):
 
     assert frames(skip=15, apart=5) == [15, 20, 25, 30, 35, 40]
     assert frames(skip=39, apart=0) == [39, 40]
-    with pytest.raises(RunError, match="ends after 40 collisions per disk, before --skip 50"):
+    with pytest.raises(
+        RunError, match="ends after 40 collisions per disk, before --equilibration 50"
+    ):
         frames(skip=50, apart=5)
     hits, ends = np.full((200, 41), 3 * np.arange(41)).T, {"collisions": [0, 100 * 40]}
     v, time = maxwell_velocities(rng, 41, 200), np.arange(41.0) ** 2
@@ -177,7 +179,7 @@ def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, fig
     with h5py.File(made_to_cool(path, -drift), "r+") as file:
         velocity, y = (file[f"particles/disks/{name}/value"] for name in ("velocity", "position"))
         velocity[...] += 10 * y[..., 1:] * [1, 0]
-    drawn(tmp_path, "speeds", path, "--skip", 20)
+    drawn(tmp_path, "speeds", path, "--equilibration", 20)
     printed, said = capsys.readouterr()
     row, words = cells(printed), words_on(figures[0])
     if drift:
@@ -553,7 +555,7 @@ def test_runs_with_equal_seeds_are_compared_and_others_named(tmp_path, rng, caps
     assert rows[1]["missed_percent_error"] == pytest.approx(5 * TWO)
     assert rows[1]["rate"] == pytest.approx(12.5 * 2 / 60 * 49 / 100)
     paths = [run.path for run in (*events, *steps)]
-    drawn(tmp_path, "missed", *paths, "--skip", 2)
+    drawn(tmp_path, "missed", *paths, "--equilibration", 2)
     assert capsys.readouterr().err.endswith(f"left out, as no event-driven run has their seeds: {paths[-1]}\n")  # fmt: skip  # noqa: E501
     for runs, problem in ((steps, "event-driven"), ([events[2], steps[0]], "no seed")):
         with pytest.raises(RunError, match=problem):

@@ -423,9 +423,9 @@ def look_at_bars(run, folder):
         from ricochet.analysis.paths import seen, turns_between
         run = read_run("all.h5")
         assert run.walls.tolist() == [[[1, 0.1], [1, 0.9]]]
-        frames = list(range(0, run.frames, 50))
-        turns = turns_between(run, run.events, frames, seen(run, run.events, frames))
-        assert len(turns.time) == (run.events[0] <= run.time[300]).sum() > 200
+        frames = list(range(0, run.n_frames, 50))
+        turns = turns_between(run, run.event_log(), frames, seen(run, run.event_log(), frames))
+        assert len(turns.time) == (run.event_log()[0] <= run.time[300]).sum() > 200
     """
     own = environment(PYTHONPATH=folder / "post")
     ran(sys.executable, "-c", code, cwd=folder, env=own, check=True)

@@ -66,9 +66,9 @@ def test_a_pair_meets_across_the_seam_as_inside(run_of):
         numbers = np.concatenate([x, v], axis=1).ravel()
         runs.append(run_of(system.format(shear, *map(float, numbers))))
     inside, across = runs
-    assert len(inside.events.time) == len(across.events.time) == 1
-    assert across.events.time == pytest.approx(inside.events.time, rel=1e-13)
-    assert across.events.impulse == pytest.approx(inside.events.impulse, rel=1e-13)
+    assert len(inside.event_log().time) == len(across.event_log().time) == 1
+    assert across.event_log().time == pytest.approx(inside.event_log().time, rel=1e-13)
+    assert across.event_log().impulse == pytest.approx(inside.event_log().impulse, rel=1e-13)
     # b is now as it was: below the seam, and slower by the slip, or above it
     rows = across.image[-1][1, 1] - across.image[0][1, 1]
     frame = np.array([[0, 0], [slip * (1 + rows), 0]])

@@ -47,7 +47,7 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
     """Arrays, observables, counts and the collisions to come, at the start and at the end."""
     with Simulation(GAS) as gas:
         assert {*COLUMNS} < {*dir(gas)}
-        log = whole.events
+        log = whole.event_log()
         assert gas.next_events(9) == list(zip(log.time[:9], log.i[:9], log.j[:9], strict=True))
         for frame in (0, -1):
             for name in COLUMNS:
@@ -58,7 +58,7 @@ def test_a_simulation_shows_what_the_file_of_its_run_has(whole):
                 assert np.array_equal(gas.observable(name), whole.observable(name).value[frame])
             gas.advance()
         assert {*gas.observables} == {*whole.observables}
-        assert (gas.time, gas.collisions, gas.count) == (whole.time[-1], 400, 80)
+        assert (gas.time, gas.collisions, gas.n_disks) == (whole.time[-1], 400, 80)
         assert gas.events == len(log.time)
 
 

@@ -159,7 +159,7 @@ def test_radii_that_are_drawn_fill_what_was_asked_and_go_on(
     assert run.by_species[1].radius == pytest.approx(mean / 2, rel=0.3)
     apart = run.position[0][:, None] - run.position[0]
     apart[..., 0] -= np.round(apart[..., 0])
-    gaps = np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(run.count)
+    gaps = np.hypot(*apart.T) - run.radius - run.radius[:, None] + np.eye(run.n_disks)
     assert gaps.min() > -1e-13
     finished(ricochet, "new.h5", "--set=run.seed=2")
     assert (read_run(tmp_path / "new.h5").radius != run.radius).all()

@@ -161,7 +161,7 @@ def test_an_installed_engine_is_found_by_its_module(installed, tmp_path):
     assert (installed / "lib/libricochet.so").exists()
     assert (installed / "include/ricochet.h").exists()
     place = told["PYTHONPATH"].replace("/usr", str(installed), 1)
-    code = "import ricochet; print(ricochet.Simulation('&species radius = .1 count = 2 /').count)"
+    code = "import ricochet; print(ricochet.Simulation('&species radius = .1 count = 2 /').n_disks)"
     own = environment(PYTHONPATH=place)
     done = ran(sys.executable, "-c", code, cwd=tmp_path, env=own)
     assert (done.returncode, done.stdout.strip()) == (0, "2"), done.stderr

@@ -25,7 +25,7 @@ ROUND = Member(
 
 def angles(run: Run) -> np.ndarray:
     """Polar angles of the hits, without jumps."""
-    x = run.position[1 : len(run.events.time) + 1][:, 0]
+    x = run.position[1 : len(run.event_log().time) + 1][:, 0]
     return np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
 
 
@@ -103,7 +103,7 @@ CASES = [
         "P12-01", "round container: first hit, place; interval; polar step",
         (ROUND,),
         lambda run: [
-            run.events.time[0], *run.position[1][0], np.diff(run.events.time[:2])[0],
+            run.event_log().time[0], *run.position[1][0], np.diff(run.event_log().time[:2])[0],
             np.diff(angles(run)[:2])[0],
         ],
         [0.739184421103839, 0.743510652662303, 0.591347536883071, 1.83836884220768, STEP],
@@ -116,7 +116,7 @@ CASES = [
     ),
     Case(
         "P12-02", "round container, hit 101: time and polar angle",
-        (ROUND,), lambda run: [run.events.time[100], angles(run)[100] % (2 * pi)],
+        (ROUND,), lambda run: [run.event_log().time[100], angles(run)[100] % (2 * pi)],
         [184.576068641872, 6.14074471547], relative(1e-9), "D",
     ),
     Case(

@@ -38,7 +38,7 @@ def crater(count: int, seed: int = 1, mass: float = 25, exit_codes=(0,), **more)
 
 def hit(run: Run) -> int:
     """Bed disks that had a collision with a disk."""
-    log = run.events
+    log = run.event_log()
     pairs = log.j > 0
     return len(np.union1d(log.i[pairs], log.j[pairs])) - 1
 

@@ -35,7 +35,7 @@ def watched(seeds: int, eta: float, step: float, frames: int) -> tuple[Member, .
 
 def mean_free_time(run: Run) -> float:
     """1 / w of this run: its energy is its own."""
-    return run.count * run.time[-1] / (2 * run.observable("collisions").value[-1])
+    return run.n_disks * run.time[-1] / (2 * run.observable("collisions").value[-1])
 
 
 def found(run: Run, free_times: np.ndarray) -> dict:
@@ -56,7 +56,7 @@ def half_and_one(run: Run) -> list[float]:
 def enskog_ratio(run: Run) -> float:
     """Slope of <dx^2> / 4 between w t = 8 and 28, over the Enskog value."""
     t, msd, _ = found(run, np.array([8, 28]))["msd"]
-    kt = np.sum(run.kinetic_energy(0)) / (run.count - 1)
+    kt = np.sum(run.kinetic_energy(0)) / (run.n_disks - 1)
     eta = 0.05
     expected = hd.enskog(float(hd.simulated(eta)), eta, 2 * run.radius[0], kt)["D"]
     return (msd[1] - msd[0]) / (4 * (t[1] - t[0])) / expected

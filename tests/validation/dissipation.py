@@ -39,9 +39,9 @@ def left(run: Run, tau: float) -> float:
 def left_at_time(run: Run, w0_t: float) -> float:
     """The same after a time in units of the first mean free time."""
     time, energy = run.observable("all/kinetic_energy")
-    kt = energy[0] * run.count / (run.count - 1)
-    z = hd.simulated_finite(ETA, run.count)
-    w0 = hd.collision_rate(z, 2 * run.radius[0], run.count - 1, kt)
+    kt = energy[0] * run.n_disks / (run.n_disks - 1)
+    z = hd.simulated_finite(ETA, run.n_disks)
+    w0 = hd.collision_rate(z, 2 * run.radius[0], run.n_disks - 1, kt)
     return float(np.interp(w0_t / w0, time, energy) / energy[0])
 
 
@@ -100,7 +100,7 @@ def loss_per_hit(run: Run) -> float:
     """Mean energy lost per hit on a side, over (1 - xi^2) kT."""
     energy = run.observable("total_energy").value
     hits = run.observable("wall_collisions").value.sum(axis=1)
-    return -log(energy[-1] / energy[0]) * run.count / hits[-1] / (1 - SLOW**2)
+    return -log(energy[-1] / energy[0]) * run.n_disks / hits[-1] / (1 - SLOW**2)
 
 
 GAS = [
@@ -193,8 +193,8 @@ MIXTURE = [
 
 def since_last(run: Run) -> np.ndarray:
     """Time since the last event of either partner, for each event."""
-    log = run.events
-    last = [-np.inf] * (run.count + 1)
+    log = run.event_log()
+    last = [-np.inf] * (run.n_disks + 1)
     since = np.empty(len(log.time))
     for k, (t, i, j) in enumerate(zip(*(part.tolist() for part in log[:3]), strict=True)):
         partners = (i, j) if j > 0 else (i,)
@@ -222,8 +222,8 @@ ELASTIC = tuple(
 
 def flag_fractions(run: Run) -> np.ndarray:
     """Fractions of collisions that would be elastic, at w t_c of `FLAG_TIMES`."""
-    rate = 2 * len(run.events.time) / run.count / run.time[-1]
-    since = since_last(run)[run.events.time > 10 / rate] * rate
+    rate = 2 * len(run.event_log().time) / run.n_disks / run.time[-1]
+    since = since_last(run)[run.event_log().time > 10 / rate] * rate
     return np.mean(since[:, None] < FLAG_TIMES, axis=0)
 
 
@@ -304,18 +304,19 @@ COLLAPSE = [
     ),
     Case(
         "P9-11", "xi = .05: times of the first six collisions",
-        (COLLAPSED,), lambda run: run.events.time[:6], FIRST_SIX, within(1e-12), "D, 120 digits",
+        (COLLAPSED,), lambda run: run.event_log().time[:6], FIRST_SIX,
+        within(1e-12), "D, 120 digits",
     ),
     Case(
         "P9-11", "xi = .05: time, velocities, place of the collapse",
         (COLLAPSED,),
-        lambda run: [run.events.time[26], *run.velocity[-1][:, 0], run.position[27][1, 0]],
+        lambda run: [run.event_log().time[26], *run.velocity[-1][:, 0], run.position[27][1, 0]],
         [7 / 45, 1 / 6, 1 / 6, 1 / 6, 0.525925925925926], within(1e-9), "D, 120 digits",
     ),
     Case(
         "P9-11", "xi = .1: collisions, time of the last, velocities",
         (DISPERSED,),
-        lambda run: [len(run.events.time), run.events.time[-1], *run.velocity[-1][:, 0]],
+        lambda run: [len(run.event_log().time), run.event_log().time[-1], *run.velocity[-1][:, 0]],
         [6, 0.195077620020993, 0.1659559375, 0.166739203125, 0.167304859375],
         within(1e-12), "D",
     ),

@@ -35,13 +35,13 @@ def bulk(eta: float) -> tuple[Member, ...]:
 
 def reduced_rate(run: Run) -> SeriesMean:
     """The w at kT = m = 1."""
-    scale = sqrt(run.count / (run.count - 1))  # speeds sqrt 2, at rest as a whole
+    scale = sqrt(run.n_disks / (run.n_disks - 1))  # speeds sqrt 2, at rest as a whole
     return collision_rate(run).scaled(1 / scale)
 
 
 def pair_rate(run: Run) -> SeriesMean:
     """Pair collisions per time."""
-    return collision_rate(run).scaled(run.count / 2)
+    return collision_rate(run).scaled(run.n_disks / 2)
 
 
 def rate_reference(eta: float) -> float:
@@ -194,14 +194,14 @@ def radii_for(eta: float, factor: float) -> tuple[float, float]:
 
 def species_rates(run: Run) -> np.ndarray:
     """w_11, w_12, w_21, w_22 at kT = 1."""
-    log = run.events
+    log = run.event_log()
     pairs = log.j > 0
     kinds = run.species[np.stack([log.i[pairs], log.j[pairs]]) - 1] - 1
     counts = np.zeros((2, 2))
     np.add.at(counts, (kinds[0], kinds[1]), 1)
     np.add.at(counts, (kinds[1], kinds[0]), 1)
     per_disk = counts / np.bincount(run.species)[1:, None] / run.time[-1]
-    kt = np.sum(run.kinetic_energy(0)) / (run.count - 1)
+    kt = np.sum(run.kinetic_energy(0)) / (run.n_disks - 1)
     return (per_disk / sqrt(kt)).ravel()
 
 

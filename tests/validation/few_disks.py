@@ -57,7 +57,7 @@ def dissipating(run: Run) -> int:
 
 def last_flight(run: Run) -> float:
     """Mean length of the flights when no more energy is lost."""
-    return float(np.diff(run.events.time[dissipating(run) - 1 :]).mean())
+    return float(np.diff(run.event_log().time[dissipating(run) - 1 :]).mean())
 
 
 def apexes(run: Run) -> np.ndarray:
@@ -89,24 +89,24 @@ ONE = [
     Case(
         "P1-04", "closed path: order and times of the hits",
         (square_path(events=4),),
-        lambda run: [*run.events.j, *run.events.time],
+        lambda run: [*run.event_log().j, *run.event_log().time],
         [-1, -3, 0, -2, 0.4, 0.65, 1.2, 1.45], within(1e-14), "EX B.1",
     ),
     Case(
         "P1-04", "from the middle, into corners: back after 4 hits",
         (square_path((0.5, 0.5), time=1.6),),
-        lambda run: [*run.position[-1][0], *final(run), len(run.events.time)],
+        lambda run: [*run.position[-1][0], *final(run), len(run.event_log().time)],
         [0.5, 0.5, 1, 1, 4], within(1e-14), "EX B.1",
     ),
     Case(
         "P1-05", "walls without rebound: velocity and events",
         (square_path(contact={"wall_restitution": 0}, time=2),),
-        lambda run: [*final(run), len(run.events.time), run.time[-1]],
+        lambda run: [*final(run), len(run.event_log().time), run.time[-1]],
         [0, 0, 1, 2], EXACT, "EX B.1",
     ),
     Case(
         "P1-06", "walls with 0.9, whole velocity: times of 6 hits",
-        (SLOWED,), lambda run: run.events.time, PATH_TIMES, within(1e-13), "D",
+        (SLOWED,), lambda run: run.event_log().time, PATH_TIMES, within(1e-13), "D",
     ),
     Case(
         "P1-06", "walls with 0.9, whole velocity: speeds .9^k",
@@ -116,31 +116,31 @@ ONE = [
     Case(
         "P1-07", "walls with 0.9, normal velocity: 4 hits, velocity",
         (square_path(contact={"wall_restitution": 0.9, "wall_rule": "normal"}, events=4),),
-        lambda run: [*run.events.time, *final(run)],
+        lambda run: [*run.event_log().time, *final(run)],
         [0.4, 0.65, 1.288888888888889, 1.538888888888889, 0.81, 0.81], within(1e-13), "D",
     ),
     Case(
         "P1-08", "bounces from a height of 1: mean time of 10 000, apex of all",
-        (dropped(1.04, 10001),), lambda run: [np.diff(run.events.time).mean(), *apexes(run)],
+        (dropped(1.04, 10001),), lambda run: [np.diff(run.event_log().time).mean(), *apexes(run)],
         [0.903047281971462, *[1.04] * 10001], relative(1e-9), "D",
     ),
     Case(
         "P1-10", "thrown up with 20: time to ceiling and back, speed at the ceiling",
         (dropped(SMALL, 2, (0, 20)),),
-        lambda run: [run.events.time[1], -run.velocity[1][0, 1]],
+        lambda run: [run.event_log().time[1], -run.velocity[1][0, 1]],
         [2.16877950901169, 9.36213650829766], relative(1e-12), "D",
     ),
     *[
         Case(
             "P1-12", f"restitution {xi}: all impacts until flights of 1e-12",
-            (member,), lambda run: run.events.time, impacts(xi, until_rest(xi)),
+            (member,), lambda run: run.event_log().time, impacts(xi, until_rest(xi)),
             relative(1e-12), "D",
         )
         for xi, member in zip(REST, bouncing(), strict=True)
     ],
     Case(
         "P1-12", "restitution .5, .8, .9, .95: comes to rest at t0 (1 + xi) / (1 - xi)",
-        bouncing(), each(lambda run: run.events.time[-1]), REST_TIMES, relative(1e-11), "D",
+        bouncing(), each(lambda run: run.event_log().time[-1]), REST_TIMES, relative(1e-11), "D",
     ),
     Case(
         "P1-13", "distance until rest, normal velocity reduced",
@@ -193,7 +193,7 @@ TWO = [
         "P2-04", "unequal disks, .7: time, velocities, energy lost",
         (UNEQUAL,),
         lambda run: [
-            run.events.time[0], *final(run), run.observable("dissipated_energy").value[-1]
+            run.event_log().time[0], *final(run), run.observable("dissipated_energy").value[-1]
         ],
         [
             0.216327631153395, 0.367472195926245, -0.781276238886498, -0.289157398642082,
@@ -203,13 +203,13 @@ TWO = [
     ),
     Case(
         "P2-06", "grazing, receding, at relative rest: collisions",
-        NO_MEETING, each(lambda run: np.sum(run.events.j > 0)),
+        NO_MEETING, each(lambda run: np.sum(run.event_log().j > 0)),
         [0, 0, 0], EXACT, "EX eq. 7",
     ),
     Case(
         "P2-07", "both falling: time, places, velocities",
         (MONKEY,),
-        lambda run: [run.events.time[0], *run.position[-1].ravel(), *final(run)],
+        lambda run: [run.event_log().time[0], *run.position[-1].ravel(), *final(run)],
         [0.492, 3.952, 10.74867608, 4, 10.81267608, 0, -4.82652, 6, 3.17348],
         within(1e-12), "D",
     ),
@@ -217,7 +217,7 @@ TWO = [
         "P2-09", "two disks in a box: first three events",
         (LAB,),
         lambda run: [
-            *run.events.time, *run.position[1][:, 0], *run.velocity[1][:, 0],
+            *run.event_log().time, *run.position[1][:, 0], *run.velocity[1][:, 0],
             run.position[2][1, 0], run.position[3][0, 0],
         ],
         [0.15, 0.7, 1.2, 0.15, 0.35, -1, 1, 0.9, -0.9], within(1e-14), "LAB; D",

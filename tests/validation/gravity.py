@@ -56,7 +56,7 @@ def temperature_of(energy: float) -> float:
 
 def start_energy(run: Run) -> float:
     """E/N."""
-    return float(run.observable("total_energy").value[0]) / run.count
+    return float(run.observable("total_energy").value[0]) / run.n_disks
 
 
 def settled(run: Run, name: str) -> np.ndarray:
@@ -79,7 +79,7 @@ def pair_rate(run: Run) -> float:
     """Pair collisions per disk and time after `START`."""
     time, collisions = run.observable("collisions")
     first = int(np.searchsorted(time, START))
-    return 2 * (collisions[-1] - collisions[first]) / run.count / (time[-1] - time[first])
+    return 2 * (collisions[-1] - collisions[first]) / run.n_disks / (time[-1] - time[first])
 
 
 SEEDS = {0.1: (1,), 0.5: (2, 3), 1: (4,), 2: (5,)}

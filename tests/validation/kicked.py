@@ -55,7 +55,7 @@ def steady_temperature(run: Run) -> float:
 
 def steady_kurtosis(run: Run) -> float:
     """a2 of all velocities after a fifth of the run."""
-    return float(np.mean([excess_kurtosis(v) for v in run.speed(slice(run.frames // 5, None))]))
+    return float(np.mean([excess_kurtosis(v) for v in run.speed(slice(run.n_frames // 5, None))]))
 
 
 def diffusion(run: Run) -> float:
@@ -64,7 +64,7 @@ def diffusion(run: Run) -> float:
     In first approximation: of a mean velocity a collision takes (1 + xi) / 2 of what an elastic one
     does; V. Garzo, Physica A 343, 105 (2004), for disks alike.
     """
-    time = run.time[run.frames // 5 : -1]
+    time = run.time[run.n_frames // 5 : -1]
     lags = (time[1] - time[0]) * np.array([2, 6])
     t, msd, _ = curves([Correlator(run, time, lags=lags).follow(run)])["all"]["msd"]
     theory = hd.enskog(float(hd.henderson(ETA)), ETA, 1.0, steady_temperature(run))["D"]

@@ -36,7 +36,7 @@ STRUCK = tuple(bouncing(1, motion="sawtooth", velocity=V, restitution=xi) for xi
 
 def leaving(run: Run) -> np.ndarray:
     """Upward velocities right after the last 40 bounces."""
-    return run.velocity[run.frames - 41 : run.frames - 1][:, 0, 1]
+    return run.velocity[run.n_frames - 41 : run.n_frames - 1][:, 0, 1]
 
 
 def shaken(xi: float, strength: float) -> Member:
@@ -188,7 +188,7 @@ def chambers(velocity: float) -> tuple[Member, ...]:
 def fuller_share(run: Run) -> float:
     """Mean share of the half that has more of them, in the second half of the time."""
     _, left = share(run)[""]
-    return float(fuller(left[run.frames // 2 :]).mean())
+    return float(fuller(left[run.n_frames // 2 :]).mean())
 
 
 CASES = [

@@ -73,13 +73,13 @@ def large(run: Run) -> tuple:
 
 def finite(run: Run) -> tuple:
     """N disks share a fixed energy."""
-    return reduced(run), finite_n_cdf(run.count)
+    return reduced(run), finite_n_cdf(run.n_disks)
 
 
 def component(run: Run) -> tuple:
     """The share m vx^2 / 2E has the law Beta(1/2, N - 1/2)."""
-    share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.count)
-    return share, stats.beta(0.5, run.count - 0.5).cdf
+    share = run.velocity[after(run, 15)][..., 0].ravel() ** 2 / (2 * run.n_disks)
+    return share, stats.beta(0.5, run.n_disks - 0.5).cdf
 
 
 LAWS = [
@@ -105,14 +105,14 @@ def hits_on_record(periodic: bool) -> tuple[Member, ...]:
 
 def wall_speeds(run: Run) -> tuple:
     """|v_n| of hits on the sides, over sqrt(2 kT / m)."""
-    log = run.events
+    log = run.event_log()
     hit = log.j <= 0
     return log.impulse[hit] / (2 * sqrt(2 * kt_at_start(run))), maxwell_cdf
 
 
 def wall_energies(run: Run) -> np.ndarray:
     """K of a disk that hits a side, over kT; exact for fixed energy."""
-    log = run.events
+    log = run.event_log()
     hit = np.flatnonzero(log.j <= 0)
     return run.kinetic_energy(slice(1, None))[hit, log.i[hit] - 1] / kt_at_start(run)
 
@@ -125,13 +125,13 @@ def in_parts(measure, runs: tuple[Run, ...]) -> Estimate:
 
 def approach_speeds(run: Run) -> tuple:
     """g_n of pair collisions over sqrt(4 kT / m)."""
-    log = run.events
+    log = run.event_log()
     return log.impulse[log.j > 0] / sqrt(4 * kt_at_start(run)), maxwell_cdf
 
 
 def contacts(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Direction of contact [turns of the mirror image] and |b| / s of the pair collisions."""
-    log = run.events
+    log = run.event_log()
     at = np.flatnonzero(log.j > 0)
     i, j = log.i[at] - 1, log.j[at] - 1
     x, v = run.position[1:], run.velocity[1:]

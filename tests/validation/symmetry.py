@@ -83,17 +83,17 @@ LISTED, RELABELLED = (
 
 def boost_error(run: Run, boosted: Run) -> float:
     """Largest difference of places (shifted back) and collision times."""
-    if len(run.events.time) < 90:
+    if len(run.event_log().time) < 90:
         raise ValueError("too few collisions")
     apart = boosted.unwrapped(-1) - BOOST * SHORT - run.unwrapped(-1)
-    times = boosted.events.time - run.events.time
+    times = boosted.event_log().time - run.event_log().time
     return float(max(np.max(np.abs(apart)), np.max(np.abs(times))))
 
 
 def label_error(run: Run, relabelled: Run) -> float:
     """Largest difference of places and event times."""
     apart = relabelled.position[-1] - run.position[-1][ORDER]
-    times = relabelled.events.time - run.events.time
+    times = relabelled.event_log().time - run.event_log().time
     return float(max(np.max(np.abs(apart)), np.max(np.abs(times))))
 
 

@@ -187,11 +187,11 @@ def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:
             yield source.position + images, source.velocity
         return
     frames = np.searchsorted(source.time, times * (1 - 1e-12))
-    frames = frames[frames < source.frames]
+    frames = frames[frames < source.n_frames]
     off = np.abs(source.time[frames] - times[: len(frames)]) > 1e-9 * np.abs(times[: len(frames)])
     if off.any():
         raise RunError(f"{source.path}: has no frame at t = {times[np.argmax(off)]:.9g}")
-    for some in np.array_split(frames, len(frames) * source.count // CHUNK + 1):
+    for some in np.array_split(frames, len(frames) * source.n_disks // CHUNK + 1):
         yield from zip(source.unwrapped(some), source.velocity[some], strict=True)
 
 

@@ -47,12 +47,12 @@ def ended_by_time(run: Run, size: Crater) -> bool:
 
 def box_takes_part(run: Run, wall_collisions: float) -> bool:
     """The crater reaches the floor or the sides; `wall_collisions` may be a mean over runs."""
-    return wall_collisions > FEW_HITS * run.count
+    return wall_collisions > FEW_HITS * run.n_disks
 
 
 def projectile(run: Run) -> int:
     """Index of the projectile."""
-    if run.count < 2:
+    if run.n_disks < 2:
         raise RunError(f"{run.path}: holds one disk; a crater needs a projectile and a bed")
     if "projectile" in run.names:
         return int(np.flatnonzero(run.of_species("projectile"))[0])
@@ -64,7 +64,7 @@ def projectile(run: Run) -> int:
 
 def bed(run: Run) -> np.ndarray:
     """(N,) mask of the disks at rest at the start."""
-    mask = np.ones(run.count, dtype=bool)
+    mask = np.ones(run.n_disks, dtype=bool)
     mask[projectile(run)] = False
     return mask
 
@@ -78,14 +78,14 @@ def crater(run: Run) -> Crater:
     """The sizes of the crater in the last frame."""
     law = "a crater is what a projectile does to a bed that lies still without it"
     allow(run, law, *QUIET)
-    if run.collisions is None:
+    if run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     moved, lying, outline = displaced(run), bed(run), hole(run)
     start = run.position[0]
     rim = np.max((start[:, 1] + run.radius)[lying])
     bottom = np.min((start[:, 1] - run.radius)[moved], initial=rim)
     return Crater(
-        hit=int(np.sum(run.collisions[-1][lying] > 0)),
+        hit=int(np.sum(run.event_count[-1][lying] > 0)),
         displaced=int(moved.sum()),
         width=float(np.ptp(start[moved, 0])) if moved.any() else 0.0,
         depth=float(rim - bottom),

@@ -289,7 +289,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
     weights = parts[:, np.where(BY_FRAMES, 0, 1)]
     values, share = jackknife(lambda total: of_sums(total, run, cells), parts, weights)
     # All disks share what the conserved motion of them all does not have (docs/theory.md).
-    values[:, NAMES.index("temperature")] *= run.count / free_disks(run)
+    values[:, NAMES.index("temperature")] *= run.n_disks / free_disks(run)
     members = Members(values, share)
     near = kinship(members, blocks, most)
     mean, error = members.estimate(near[:, None])

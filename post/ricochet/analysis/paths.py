@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..reading.nature import KICKED
-from ..reading.reader import Events, Run
+from ..reading.reader import EventLog, Run
 
 
 class Turns(NamedTuple):
@@ -17,7 +17,7 @@ class Turns(NamedTuple):
     velocity: np.ndarray  # (M, 2) afterwards
 
 
-def why_unknown(run: Run, log: Events) -> str:
+def why_unknown(run: Run, log: EventLog) -> str:
     """Why the log does not tell the paths between frames; empty if it does."""
     if log.momentum_change is None:
         return "the log has no momentum_change"
@@ -26,16 +26,16 @@ def why_unknown(run: Run, log: Events) -> str:
     return "images slide" if run.shear_rate else ""
 
 
-def seen(run: Run, log: Events, frames: list[int]) -> np.ndarray:
+def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
     """(T,) how many events of the log each frame has behind it."""
-    if run.collisions is None:
+    if run.event_count is None:
         return np.searchsorted(log.time, run.time[frames], "right")
     # This is clear even if several events have the same time.
-    hits = run.collisions[frames].sum(axis=1, dtype=np.int64)
+    hits = run.event_count[frames].sum(axis=1, dtype=np.int64)
     return np.searchsorted(np.cumsum(1 + (log.j > 0)), hits, "right")
 
 
-def turns_between(run: Run, log: Events, frames: list[int], ends: np.ndarray) -> Turns:
+def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
     """All turns from the first of these frames, which have seen so many events, to the last."""
     some = slice(ends[0], ends[-1])
     i, j = log.i[some], log.j[some]
@@ -48,7 +48,7 @@ def turns_between(run: Run, log: Events, frames: list[int], ends: np.ndarray) ->
     event, disk, frame = event[order] + ends[0], disk[order], frame[order]
     gain = signs * log.momentum_change[event] / run.mass[disk, None]
     # Sums that begin anew with each disk and each frame.
-    first = np.flatnonzero(np.diff(frame * run.count + disk, prepend=-1))
+    first = np.flatnonzero(np.diff(frame * run.n_disks + disk, prepend=-1))
     sums = np.cumsum(gain, axis=0)
     sums -= np.repeat(sums[first] - gain[first], np.diff(first, append=len(disk)), axis=0)
     fallen = (log.time[event] - run.time[frames][frame])[:, None] * run.gravity

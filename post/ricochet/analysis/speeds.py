@@ -24,7 +24,7 @@ def thermal_energy(run: Run, frames: slice | list[int]) -> np.ndarray:
 
 def kt_of_frames(run: Run, frames: slice | list[int]) -> np.ndarray:
     """(F,) kT, of the momenta that are free."""
-    free = run.count - 1 if run.shear_rate else free_disks(run)
+    free = run.n_disks - 1 if run.shear_rate else free_disks(run)
     return thermal_energy(run, frames).sum(axis=1) / free
 
 
@@ -71,17 +71,17 @@ def relaxation(
     """
     tau = run.collisions_per_disk_at(run.time)
     until_then = (k for k in np.flatnonzero(tau <= until) if all_move(run, k))
-    chosen = list(until_then if frames is None else range(min(frames, run.frames)))
+    chosen = list(until_then if frames is None else range(min(frames, run.n_frames)))
     return tau[chosen], np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in chosen])
 
 
 def exact_law(run: Run) -> Law | None:
     """The law of N disks that share a fixed kinetic energy, for runs that have one."""
     axes = int(conserved(run).sum())
-    free = not run.nature.keeps_kinetic_energy or run.count < 2 + axes / 2
+    free = not run.nature.keeps_kinetic_energy or run.n_disks < 2 + axes / 2
     if free or "round" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None
-    return finite_n_cdf(run.count, axes == 2)
+    return finite_n_cdf(run.n_disks, axes == 2)
 
 
 def means(runs: list[Run], frames: list[list[int]], name: str) -> tuple[Estimate, Estimate]:

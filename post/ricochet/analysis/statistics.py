@@ -253,7 +253,7 @@ def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
         more = "above" if whole.drift > 0 else "below"
         found.append(
             f"{name}: still drifts, the second half is {abs(whole.drift):.1f} errors {more} the "
-            "first; run longer, or --skip more"
+            "first; run longer, or set a longer --equilibration"
         )
     return found
 

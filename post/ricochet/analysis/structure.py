@@ -72,7 +72,7 @@ def structure_factor(
     refuse(run, "sheared", "walled")
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
-    step = int(np.ceil(np.sqrt(2 * run.count * np.prod(most + 1) / MOST_TERMS)))
+    step = int(np.ceil(np.sqrt(2 * run.n_disks * np.prod(most + 1) / MOST_TERMS)))
     along_x = step * np.arange(most[0] // step + 1)
     along_y = step * np.arange(-(most[1] // step), most[1] // step + 1)
     k = np.hypot(*np.meshgrid(along_x * unit[0], along_y * unit[1], indexing="ij"))
@@ -96,7 +96,7 @@ def structure_factor(
 
 def evenly(run: Run, frames: slice = slice(None), most: int = 50) -> list[int]:
     """At most so many of the frames [all], those next to even steps of time."""
-    which = np.arange(run.frames)[frames]
+    which = np.arange(run.n_frames)[frames]
     time = run.time[which]
     at = np.interp(np.linspace(time[0], time[-1], most), time, np.arange(len(time)))
     return which[np.unique(at.round().astype(int))].tolist()
@@ -130,14 +130,16 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int:
     apart = x[i] - x[j]
     apart -= np.where(run.periodic, run.edges * np.round(apart / run.edges), 0.0)
     near = np.hypot(*apart.T) < run.radius[i] + run.radius[j] + gap
-    links = scipy.sparse.coo_array((near[near], (i[near], j[near])), shape=(run.count, run.count))
+    links = scipy.sparse.coo_array(
+        (near[near], (i[near], j[near])), shape=(run.n_disks, run.n_disks)
+    )
     _, cluster = scipy.sparse.csgraph.connected_components(links, directed=False)
     return int(np.bincount(cluster).max())
 
 
 def bond_order(run: Run, frame: int) -> np.ndarray:
     """(N,) complex psi6 of each disk, over its Delaunay neighbours."""
-    near = 4 * np.sqrt(np.prod(run.edges) / run.count)
+    near = 4 * np.sqrt(np.prod(run.edges) / run.n_disks)
     points = run.position[frame]  # then their periodic copies near the box
     for axis in np.flatnonzero(run.periodic):
         shift = np.where(np.arange(2) == axis, run.edges, 0.0)
@@ -146,13 +148,13 @@ def bond_order(run: Run, frame: int) -> np.ndarray:
         points = np.concatenate([points, points[low] + shift, points[high] - shift])
     start, neighbours = scipy.spatial.Delaunay(points).vertex_neighbor_vertices
     centre = np.repeat(np.arange(len(points)), np.diff(start))
-    inside = centre < run.count
+    inside = centre < run.n_disks
     bonds = points[neighbours[inside]] - points[centre[inside]]
     turns = np.exp(6j * np.arctan2(bonds[:, 1], bonds[:, 0]))
-    sums = np.bincount(centre[inside], turns.real, run.count) + 1j * np.bincount(
-        centre[inside], turns.imag, run.count
+    sums = np.bincount(centre[inside], turns.real, run.n_disks) + 1j * np.bincount(
+        centre[inside], turns.imag, run.n_disks
     )
-    return sums / np.bincount(centre[inside], minlength=run.count)
+    return sums / np.bincount(centre[inside], minlength=run.n_disks)
 
 
 def bond_correlation(
@@ -162,7 +164,7 @@ def bond_correlation(
 
     `psi` is the bond order of each of the frames.  Of many disks only some are centres.
     """
-    few = np.linspace(0, run.count - 1, min(run.count, max(16, MOST_PAIRS // run.count)))
+    few = np.linspace(0, run.n_disks - 1, min(run.n_disks, max(16, MOST_PAIRS // run.n_disks)))
     centres = few.astype(int)
     sums, pairs = np.zeros((2, len(edges) + 1))
     for frame, own in zip(frames, psi, strict=True):

@@ -60,7 +60,7 @@ def after_start(run: Run, skip: float | None = None) -> float:
     tau = run.collisions_per_disk_at(time)
     if skip is not None and tau[-1] < skip * (1 - 1e-9):
         ends = f"ends after {tau[-1]:.4g} collisions per disk"
-        raise RunError(f"{run.path}: {ends}, before --skip {skip:g}")
+        raise RunError(f"{run.path}: {ends}, before --equilibration {skip:g}")
     if skip is not None:
         return float(time[np.searchsorted(tau, skip * (1 - 1e-9))])
     if not tau[-1] > 0:
@@ -86,7 +86,7 @@ def start_of_steady_state(run: Run, skip: float | None = None) -> float:
     series = [np.diff(run.collisions_per_disk_at(time)) / apart]
     if len(run.names) > 1 or not run.nature.keeps_kinetic_energy:
         if few:
-            energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.frames)])
+            energy = np.array([run.kinetic_energy(frame) for frame in range(1, run.n_frames)])
             series += [energy[:, kind.disks].mean(axis=1) for kind in run.by_species]
         else:
             kinds = ("kinetic_energy", "rotational_energy", "potential_energy")
@@ -108,7 +108,7 @@ def frames_from(
     """Of the frames [all] those from a time on, each `apart` collisions per disk from the last."""
     chosen, last = [], -np.inf
     tau = run.collisions_per_disk_at(run.time)
-    for frame in range(run.frames) if frames is None else sorted(frames):
+    for frame in range(run.n_frames) if frames is None else sorted(frames):
         if run.time[frame] >= start and tau[frame] >= last + apart * (1 - 1e-9):
             chosen.append(frame)
             last = tau[frame]
@@ -121,9 +121,9 @@ def later(run: Run, skip: float | None = None) -> slice:
     Without the last, which may be out of step.
     """
     first = int(np.searchsorted(run.time, start_of_steady_state(run, skip)))
-    if run.frames - 1 - first < 2:
+    if run.n_frames - 1 - first < 2:
         raise RunError(f"{run.path}: needs more frames after the start")
-    return slice(first, run.frames - 1)
+    return slice(first, run.n_frames - 1)
 
 
 # --- temperature ---
@@ -152,7 +152,7 @@ def conserved(run: Run) -> np.ndarray:
 
 def free_disks(run: Run) -> float:
     """N, less a half for each axis along which the total momentum is conserved."""
-    return run.count - conserved(run).sum() / 2
+    return run.n_disks - conserved(run).sum() / 2
 
 
 def drift(run: Run) -> np.ndarray:
@@ -176,15 +176,15 @@ def kt_at_start(run: Run) -> float:
 
 def has_few_observables(run: Run) -> bool:
     """Whether frames are to tell how a run went, as they are more, and observables too few."""
-    return len(run.collisions_per_disk.time) < min(run.frames, 2 * FEWEST)
+    return len(run.collisions_per_disk.time) < min(run.n_frames, 2 * FEWEST)
 
 
 def kt_in_time(run: Run) -> tuple[str, np.ndarray, np.ndarray]:
     """Times and kT of the observables, or of the frames if those are few."""
     if not has_few_observables(run):
         time, energy = run.observable("all/kinetic_energy")
-        return "observables", time, kt_of(run, run.count * energy)
-    energy = np.array([run.kinetic_energy(k).sum() for k in range(run.frames)])
+        return "observables", time, kt_of(run, run.n_disks * energy)
+    energy = np.array([run.kinetic_energy(k).sum() for k in range(run.n_frames)])
     return "frames", run.time, kt_of(run, energy)
 
 
@@ -211,7 +211,7 @@ def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def mean_energy(run: Run, mass: float, skip: float | None = None) -> SeriesMean:
     """What <K> of a disk of this mass is in equilibrium, without gravity."""
-    bound = (run.count - free_disks(run)) * mass / run.mass.sum()
+    bound = (run.n_disks - free_disks(run)) * mass / run.mass.sum()
     moving = 0.5 * mass * float(np.sum(drift(run) ** 2))
     return temperature(run, skip).scaled(1 - bound, moving)
 
@@ -271,7 +271,7 @@ def steps(run: Run, skip: float | None = None) -> Steps:
     if run.nature.keeps_kinetic_energy:
         kt = np.full(len(time), kt_at_start(run))
     else:
-        kt = kt_of(run, run.count * run.observable("all/kinetic_energy").value[first:])
+        kt = kt_of(run, run.n_disks * run.observable("all/kinetic_energy").value[first:])
     step, heat = between(time, kt)
     mean = temperature(run, skip).mean / (heat.sum() / step.sum()) * (kt[1:] + kt[:-1]) / 2
     return Steps(step, mean, collisions, virial, hits.sum(axis=1), impulse)
@@ -289,13 +289,13 @@ def over_kt(amount: np.ndarray, s: Steps, power: float) -> tuple[np.ndarray, np.
 def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Series whose ratio of means is Z - 1, by the virial."""
     s = steps(run, skip)
-    return over_kt(s.virial / (2 * run.count), s, 1)
+    return over_kt(s.virial / (2 * run.n_disks), s, 1)
 
 
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """Pair collisions per disk and time."""
     s = steps(run, skip)
-    return series_mean(s.collisions, s.time).scaled(2 / run.count)
+    return series_mean(s.collisions, s.time).scaled(2 / run.n_disks)
 
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
@@ -306,10 +306,10 @@ def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the collision rate; equal masses."""
     s = steps(run, skip)
-    turning = run.count / 2 if run.nature & {"rough", "turning"} else 0.0
+    turning = run.n_disks / 2 if run.nature & {"rough", "turning"} else 0.0
     share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
     unit = hard_disks.collision_rate(2.0, 2 * run.radius[0], share, 1.0, run.mass[0])
-    return series_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.count * unit), 1.0)
+    return series_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.n_disks * unit), 1.0)
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
@@ -317,7 +317,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
-    return series_mean(*over_kt(work, s, 1)).scaled(1 / (2 * run.count))
+    return series_mean(*over_kt(work, s, 1)).scaled(1 / (2 * run.n_disks))
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
@@ -332,7 +332,7 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """By the virial, and by the sides that are walls; a side feels force per length."""
     s = steps(run, skip)
-    inside = series_mean(run.count * s.kt * s.time + s.virial / 2, s.time)
+    inside = series_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
     found = {"pressure_virial": inside.scaled(1 / np.prod(run.edges))}
     for k, side in enumerate(SIDES):
         if not run.periodic[k // 2]:
@@ -348,7 +348,7 @@ def has_log(run: Run) -> bool:
 
 def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """w_ij from the event log: of a disk of species i with disks of species j, per time."""
-    log, species = run.events, run.species - 1
+    log, species = run.event_log(), run.species - 1
     cuts = np.linspace(start_of_equilibrium(run, skip), run.time[-1], FINE + 1)
     pairs = log.j > 0
     one, other = species[log.i[pairs] - 1], species[log.j[pairs] - 1]

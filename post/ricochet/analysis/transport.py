@@ -237,7 +237,7 @@ def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:
 
 def frames_in_step(run: Run, start: float) -> slice:
     """Frames in equilibrium that are equally far apart, as all but the last must be."""
-    frames = slice(int(np.searchsorted(run.time, start)), run.frames - 1)
+    frames = slice(int(np.searchsorted(run.time, start)), run.n_frames - 1)
     if len(run.time[frames]) < 17 or not in_step(run.time[frames]):
         raise RunError(
             f"{run.path}: D takes 17 frames and more in equilibrium, equally far apart; set "
@@ -273,6 +273,6 @@ def coefficients(runs: list[Run], skip: float | None = None) -> dict[str, Found]
         allow(run, TAKES, "mixture")
     starts = [td.start_of_equilibrium(run, skip) for run in runs]
     found = of_moments(runs, starts)
-    if "conductivity" in found and any(run.frames > 2 for run in runs):
+    if "conductivity" in found and any(run.n_frames > 2 for run in runs):
         found["D"] = of_displacements(runs, starts)
     return found

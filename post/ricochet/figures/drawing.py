@@ -35,7 +35,7 @@ LABELS = {
 
 def caption(runs: list[Run]) -> str:
     """What a reader must know: number of disks, restitution, what else varies, seeds."""
-    parts = [f"N = {listed({run.count for run in runs})}"]
+    parts = [f"N = {listed({run.n_disks for run in runs})}"]
     restitutions = {run.restitution for run in runs}
     if all(map(np.isfinite, restitutions)):
         parts.append(f"ξ = {listed(restitutions)}")
@@ -99,7 +99,7 @@ def panel_grid(count: int, aspect: float) -> tuple[int, int]:
 def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
     """(..., N) the number that colours each disk, see `LABELS`; psi6 of one frame only."""
     if colour == "collisions":
-        return run.collisions[frame].astype(float)
+        return run.event_count[frame].astype(float)
     if colour == "psi6":
         psi = bond_order(run, frame)
         return np.degrees(np.angle(psi * psi.mean().conj()))
@@ -128,7 +128,7 @@ def chosen_colour(run: Run, wish: str | None) -> str:
     if wish not in (None, *known):
         hint = did_you_mean(wish, known)
         raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")
-    if wish == "collisions" and run.collisions is None:
+    if wish == "collisions" and run.event_count is None:
         raise RunError(f"{run.path}: has no collisions per disk")
     return wish or ("species" if len(run.names) > 1 else "speed")
 
@@ -211,7 +211,7 @@ def name_walls(axes: plt.Axes, run: Run) -> None:
 
 def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices and places of the disks, and of their periodic images that reach into the box."""
-    which, places = [np.arange(run.count)], [position]
+    which, places = [np.arange(run.n_disks)], [position]
     for shift in periods(run):
         if shift.any():
             place = position + shift

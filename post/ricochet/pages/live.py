@@ -161,7 +161,7 @@ class Live:
             # Caught at an unlucky moment, as when the file is renamed: the next look will do.
             with suppress(RunError, FileNotFoundError):
                 run = read_run(self.part if self.part.exists() else self.final)
-                stamp = f"{run.frames} {end}"
+                stamp = f"{run.n_frames} {end}"
                 if stamp != self.stamp:
                     news = {"stamp": stamp, "end": end, "warning": run.shortcoming}
                     self.news = json.dumps(news | self.filmed(run), allow_nan=False).encode()

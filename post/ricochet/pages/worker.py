@@ -83,8 +83,8 @@ class Bench:
         pace = max(0.0, float(wish["pace"] or 0.0))
         try:
             other = Simulation._of(wish["text"], told(wish["settings"]))
-            if other.count > DISKS:
-                raise ProgramError(f"{other.count} disks; here a run may have {DISKS}", 2)
+            if other.n_disks > DISKS:
+                raise ProgramError(f"{other.n_disks} disks; here a run may have {DISKS}", 2)
         except (ProgramError, ValueError) as problem:
             refuse(problem)
             return
@@ -239,14 +239,21 @@ class Bench:
         if np.any(lower < run.room[0]) or np.any(upper > run.room[1]):
             self.renew(changed=True)
             return
-        head = [now, 2 * simulation.collisions / run.count, lower[0], upper[0], lower[1], upper[1]]
+        head = [
+            now,
+            2 * simulation.collisions / run.n_disks,
+            lower[0],
+            upper[0],
+            lower[1],
+            upper[1],
+        ]
         parts = [simulation.position, simulation.velocity]
         if TURNS in run.elements:
             parts.append(simulation.orientation)
         body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
         send(b"b", struct.pack("6d", *head) + body)
         self.unseen += 1
-        if run.count <= FEW and not run.time_step and not self.ended:
+        if run.n_disks <= FEW and not run.time_step and not self.ended:
             coming = simulation.next_events(COMING)
             tell({"is": "events", "next": coming, "happened": self.happened})
             self.happened = None
@@ -277,7 +284,7 @@ class Bench:
         if TURNS not in run.elements:
             energies["rotational"] = None
         own = value["all/temperature"], value["all/mean_speed"]
-        sample = (*sampled(run.count, value), *own)
+        sample = (*sampled(run.n_disks, value), *own)
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample)
         hit = value["collisions"] > 0
@@ -332,7 +339,7 @@ def pictured_run(simulation: Simulation) -> Pictured:
         position=simulation.position[None],
         velocity=simulation.velocity[None],
         image=None,
-        collisions=None,
+        event_count=None,
         elements=elements,
         mass=simulation.mass,
         radius=simulation.radius,
@@ -390,7 +397,7 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
             for name, one in (
                 ("temperature", series_mean(kt[first:])),
                 ("mean_speed", series_mean(speed[first:])),
-                ("mean_pressure", pressure_between(late, run.count)),
+                ("mean_pressure", pressure_between(late, run.n_disks)),
             ):
                 known = one.mean, one.error
                 found[name] = tuple(float(x) if np.isfinite(x) else None for x in known)
@@ -398,10 +405,10 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     if settles and len(run.by_species) == 1 and run.by_species[0].alike:
         now, mass = found["temperature"][0], run.mass[0]
         theory["mean_speed"] = float(np.sqrt(np.pi * now / (2 * mass)))
-        if run.periodic.all() and not run.nature & {"obstructed", "stepped"} and run.count > FEW:
+        if run.periodic.all() and not run.nature & {"obstructed", "stepped"} and run.n_disks > FEW:
             area = float(np.prod(run.edges))
             eta = float(np.pi * np.sum(run.radius**2)) / area
-            theory["mean_pressure"] = float(hard_disks.henderson(eta)) * run.count * now / area
+            theory["mean_pressure"] = float(hard_disks.henderson(eta)) * run.n_disks * now / area
     return {
         name: {"value": mean, "error": error, "theory": theory[name]}
         for name, (mean, error) in found.items()
@@ -504,7 +511,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
     """
     samples, began = [], time.perf_counter()
     with Simulation._of(text, lines) as simulation:
-        count, settles = simulation.count, simulation.nature.in_equilibrium
+        count, settles = simulation.n_disks, simulation.nature.in_equilibrium
         step = max(count, SOME) // 4
         while len(samples) < LOOKS and time.perf_counter() < began + LONGEST:
             value = observed(simulation)

@@ -14,9 +14,9 @@ def mdanalysis_universe(run: Run):
     """
     import MDAnalysis
 
-    universe = MDAnalysis.Universe.empty(run.count, trajectory=True, velocities=True)
+    universe = MDAnalysis.Universe.empty(run.n_disks, trajectory=True, velocities=True)
     flat = [np.pad(a[:], ((0, 0), (0, 0), (0, 1))) for a in (run.position, run.velocity)]
-    step = (run.time[-1] - run.time[0]) / (run.frames - 1) if run.frames > 1 else 1.0
+    step = (run.time[-1] - run.time[0]) / (run.n_frames - 1) if run.n_frames > 1 else 1.0
     universe.load_new(flat[0], velocities=flat[1], order="fac", dt=step)
     universe.add_TopologyAttr("masses", run.mass)
     universe.add_TopologyAttr("radii", run.radius)

@@ -26,7 +26,13 @@ from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
-TENSORS = ("virial_tensor", "stress_tensor", "helfand_stress")
+#: Names in the file of what the package calls otherwise.
+EVENT_COUNT, KINETIC_TENSOR = "collisions", "stress_tensor"
+TENSORS = ("virial_tensor", KINETIC_TENSOR, "helfand_stress")
+DRIFTING = (
+    "constant_velocity",
+    "piston",
+)  # motions of a side that change the area of the box for good
 WHOLE = (type(None), type(...), bool, np.bool_)  # as first index they do not choose frames
 
 
@@ -41,7 +47,7 @@ class Series(NamedTuple):
     value: np.ndarray
 
 
-class Events(NamedTuple):
+class EventLog(NamedTuple):
     """The event log: collisions of any kind in chronological order, (E,) each.
 
     `j` is the id of the other disk, or 0, -1, -2, -3 for the left, right, bottom and top side, then
@@ -183,7 +189,7 @@ class Run:
     position: Frames  # (T, N, 2), wrapped into the box along a periodic axis
     velocity: Frames  # (T, N, 2); to read it fails where `output.frame_columns` has left it out
     image: Frames | None  # (T, N, 2) periods a disk has travelled; None: no side is periodic
-    collisions: Frames | None  # (T, N) of any kind since the start; None: not in the frames
+    event_count: Frames | None  # (T, N) of each disk since the start; None: not in the frames
     elements: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
@@ -200,16 +206,16 @@ class Run:
     def __repr__(self) -> str:
         """One line, however many disks there are."""
         kinds = ", ".join(f"{np.sum(kind.disks)} {kind.name}" for kind in self.by_species)
-        frames = f"{self.frames} frame{'s' * (self.frames > 1)}, t = {span(self.time)}"
+        frames = f"{self.n_frames} frame{'s' * (self.n_frames > 1)}, t = {span(self.time)}"
         return f"<Run {self.path}: {kinds}; {frames}>"
 
     @property
-    def count(self) -> int:
+    def n_disks(self) -> int:
         """N, the number of disks."""
         return len(self.mass)
 
     @property
-    def frames(self) -> int:
+    def n_frames(self) -> int:
         """T, the number of frames."""
         return len(self.time)
 
@@ -360,27 +366,30 @@ class Run:
 
         dimensions = ("time", "disk", "component")
         frames = {"position": self.position, "velocity": self.velocity, **self.elements}
-        frames |= {"image": self.image, "collisions": self.collisions}
+        frames |= {"image": self.image, "event_count": self.event_count}
         data = {
             name: (dimensions[: values.ndim], values[:])
             for name, values in frames.items()
             if values is not None
         }
         data |= {name: ("disk", getattr(self, name)) for name in ("mass", "radius", "species")}
-        axes = {"time": self.time, "disk": np.arange(self.count) + 1, "component": ["x", "y"]}
+        axes = {"time": self.time, "disk": np.arange(self.n_disks) + 1, "component": ["x", "y"]}
         return xarray.Dataset(data, axes, {"path": str(self.path), "seed": self.seed})
 
+    def event_log(self) -> EventLog:
+        """The event log; the input file must have `output.event_log = .true.`."""
+        return self._event_log
+
     @cached_property
-    def events(self) -> Events:
-        """All collisions; needs `output.event_log = .true.` in the input file."""
+    def _event_log(self) -> EventLog:
         with open_file(self.path) as file:
             if "events" not in file:
                 raise Unsound("has no event log, set output.event_log = .true.")
             count = committed(file, "events")
-            return Events(
+            return EventLog(
                 **{
                     name: rows(file["events"][name], count)
-                    for name in Events._fields
+                    for name in EventLog._fields
                     if name in file["events"]
                 }
             )
@@ -389,7 +398,7 @@ class Run:
     def collisions_per_disk(self) -> Series:
         """2 C / N, C the pair collisions since the start, at the times of the observables."""
         time, collisions = self.observable("collisions")
-        return Series(time, 2 * collisions / self.count)
+        return Series(time, 2 * collisions / self.n_disks)
 
     def collisions_per_disk_at(self, time: np.ndarray) -> np.ndarray:
         """The same at other times, by linear interpolation.
@@ -397,9 +406,9 @@ class Run:
         Between few observables it goes with the collisions of any kind, which frames know better.
         """
         known, tau = self.collisions_per_disk
-        if self.collisions is None or len(known) >= self.frames:
+        if self.event_count is None or len(known) >= self.n_frames:
             return np.interp(time, known, tau)
-        hits, rising = self.hits_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # even without hits
+        hits, rising = self.events_per_disk, 1e-12 / max(self.time[-1], 1e-300)  # even without hits
 
         def clock(t: np.ndarray) -> np.ndarray:
             return np.interp(t, self.time, hits) + rising * np.asarray(t)
@@ -407,9 +416,60 @@ class Run:
         return np.interp(clock(time), clock(known), tau)
 
     @cached_property
-    def hits_per_disk(self) -> np.ndarray:
-        """(T,) collisions of any kind per disk, at the frames."""
-        return np.array([hits.mean() for hits in self.collisions])
+    def events_per_disk(self) -> np.ndarray:
+        """(T,) events per disk since the start, at the frames."""
+        return np.array([count.mean() for count in self.event_count])
+
+    def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
+        """(...) area that disks can reach, of the box less its obstacles, or of a round container.
+
+        The box is that of the moment where a side moves at constant velocity or is a piston.  A
+        side that oscillates counts at its mean position, as in the program's own pressure.
+        """
+        drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
+        lower, upper = self.sides_at(time)
+        lower = np.where(drifts[::2], lower, self.lower)
+        upper = np.where(drifts[1::2], upper, self.upper)
+        area = np.prod(upper - lower, axis=-1)
+        for circle in sorted(self.obstacles, key=lambda circle: not circle.inside):
+            own = np.pi * circle.radius**2
+            area = np.minimum(area, own) if circle.inside else area - own
+        return area
+
+    def pressure(self, t1: float, t2: float) -> float:
+        """The pressure from t1 to t2, moved to the nearest samples of the observables.
+
+        It is (<K> + dW / 2 dt) / <A>: K the kinetic energy relative to the flow of a sheared box, W
+        the virial, A the accessible area; means over time are by trapezoids over the samples.
+        """
+        if self.shear_rate:
+            return float(np.trace(self.pressure_tensor(t1, t2)) / 2)
+        time, kinetic = self._between("all/kinetic_energy", t1, t2)
+        virial = np.diff(self._between("virial", t1, t2).value[[0, -1]])[0]
+        duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
+        return float((self.n_disks * time_mean(time, kinetic) + virial / (2 * duration)) / area)
+
+    def pressure_tensor(self, t1: float, t2: float) -> np.ndarray:
+        """(2, 2) pressure tensor from t1 to t2, moved to the nearest samples of the observables.
+
+        It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the tensor W of the virial; its trace is
+        twice the `pressure`.  It takes `output.virial_tensor`, unless the run has that anyway.
+        """
+        time, kinetic = self._between(KINETIC_TENSOR, t1, t2)
+        virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
+        duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
+        return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
+
+    def _between(self, name: str, t1: float, t2: float) -> Series:
+        """The samples of an observable from the one nearest to t1 to the one nearest to t2."""
+        time, value = self.observable(name)
+        first, last = (int(np.argmin(np.abs(time - t))) for t in (t1, t2))
+        if not time[first] < time[last]:
+            raise RunError(
+                f"{self.path}: has no two samples of the observables from t = {t1:g} to {t2:g}; "
+                "set output.observables_every_time"
+            )
+        return Series(time[first : last + 1], value[first : last + 1])
 
     def parameter(self, group: str, variable: str, default: object = None) -> object:
         """A variable of the input file as it was used."""
@@ -440,7 +500,7 @@ class Run:
     def nature(self) -> Nature:
         """What kind of run this is: see `ricochet.nature`."""
         lost = self.observable("dissipated_energy").value[-1]
-        most = self.count * self.observable("all/kinetic_energy").value[[0, -1]].max()
+        most = self.n_disks * self.observable("all/kinetic_energy").value[[0, -1]].max()
         return nature_of(
             self.parameters,
             self.mass,
@@ -508,7 +568,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         position=frames.pop("position"),
         velocity=frames.pop("velocity", Frames(path, "velocity", plane)),
         image=frames.pop("image", Frames(path, "image", plane) if any(periodic) else None),
-        collisions=frames.pop("collisions", None),
+        event_count=frames.pop(EVENT_COUNT, None),
         elements=frames,
         mass=rows(disks["mass"]),
         radius=rows(disks["radius"]),
@@ -542,6 +602,11 @@ def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
     if side["motion"] == "sine":
         return side["amplitude"] * np.sin(2 * np.pi * s)
     return side["amplitude"] * 16 * np.where(s < 0.5, s * (0.5 - s), (s - 0.5) * (s - 1))
+
+
+def time_mean(time: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Mean over time of samples (T, ...), by trapezoids."""
+    return np.trapezoid(value, time, axis=0) / (time[-1] - time[0])
 
 
 def span(values: np.ndarray) -> str:

@@ -85,7 +85,7 @@ class Simulation:
         self._handle, self._lock = handle, threading.RLock()
         self._settled = -1.0  # a time at which all has happened
         ALIVE.add(self)
-        self._start_energy = self.observable("all/kinetic_energy") * self.count
+        self._start_energy = self.observable("all/kinetic_energy") * self.n_disks
 
     @classmethod
     def load(cls, path: str | Path, threads: int | None = None) -> Self:
@@ -140,8 +140,8 @@ class Simulation:
         if name != "velocity":
             raise AttributeError(f"{name} cannot be set in a simulation at work; velocity can")
         array = np.ascontiguousarray(value, dtype=float)
-        if array.shape != (self.count, 2):
-            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.count}, 2)")
+        if array.shape != (self.n_disks, 2):
+            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.n_disks}, 2)")
         if not np.abs(array).max() < FASTEST:
             raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
         with self._open() as handle:
@@ -263,7 +263,7 @@ class Simulation:
     @property
     def nature(self) -> Nature:
         """What kind of run this is so far: see `ricochet.nature`."""
-        energy = self.observable("all/kinetic_energy") * self.count
+        energy = self.observable("all/kinetic_energy") * self.n_disks
         lost = self.observable("dissipated_energy")
         return nature_of(
             self.parameters,
@@ -287,8 +287,8 @@ class Simulation:
         return list(counts)
 
     @property
-    def count(self) -> int:
-        """How many disks there are."""
+    def n_disks(self) -> int:
+        """N, the number of disks."""
         return self._counts()[0]
 
     @property
@@ -305,7 +305,7 @@ class Simulation:
         """An array of `COLUMNS`, (N,) or (N, 2): a copy, disks in the order of the input."""
         if name not in COLUMNS:
             raise AttributeError(f"a simulation has no {name}")
-        values = np.empty((self.count, 2))
+        values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
         if width == 0:

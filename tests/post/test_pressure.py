@@ -1,0 +1,87 @@
+"""Pressure between two times, and the area that it is divided by."""
+
+import numpy as np
+import pytest
+from synthetic_run import written
+
+import ricochet
+from ricochet import RunError
+
+GAS = "&species name = 'a' radius = 0.02 count = 40 temperature = 1 /\n&stop time = 2 /\n"
+OFTEN = "&output observables_every_time = 0.125 virial_tensor = .true. /\n"
+SIDES = "&side name = 'right' {} /\n"
+INPUTS = {
+    "walls": "",
+    "periodic": "&box boundary = 'periodic', 'periodic' /\n",
+    "obstacle": "&obstacle centre = 0.5, 0.5 radius = 0.2 /\n",
+    "container": "&obstacle centre = 0.5, 0.5 radius = 0.45 side = 'inside' /\n",
+    "heated": SIDES.format("temperature = 2"),
+    "oscillating": SIDES.format("motion = 'sine' amplitude = 0.05 period = 0.7"),
+    "compressed": SIDES.format(
+        "motion = 'constant_velocity' velocity = 0.1 start_time = 0.2 end_time = 1.5"
+    ),
+    "piston": SIDES.format("motion = 'piston' mass = 10 force = 50"),
+    "sheared": "&box boundary = 'periodic', 'periodic' shear_rate = 1 /\n",
+}
+
+
+@pytest.fixture
+def simulated(program, tmp_path, monkeypatch):
+    """Runs a gas with some more input."""
+    monkeypatch.setenv("RICOCHET", str(program))
+    return lambda more: ricochet.run(GAS + OFTEN + more, output=tmp_path / "gas.h5")
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
+    """The program divides K + W / 2t by it, at each sample."""
+    run = simulated(INPUTS[kind])
+    time, pressure = run.observable("pressure")
+    virial = run.observable("virial").value
+    kinetic = run.n_disks * run.observable("all/kinetic_energy").value
+    if run.shear_rate:  # K is relative to the flow
+        kinetic = run.observable("stress_tensor").value[:, [0, 3]].sum(axis=1) / 2
+    late = time > 0
+    own = (kinetic + virial / (2 * np.where(late, time, 1)))[late] / pressure[late]
+    assert run.accessible_area(time)[late] == pytest.approx(own, rel=1e-12)
+
+
+def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
+    """Where nothing changes the kinetic energy."""
+    run = simulated(INPUTS["obstacle"])
+    assert run.pressure(0, 2) == pytest.approx(run.observable("pressure").value[-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["walls", "heated", "sheared", "container"])
+def test_the_trace_of_the_tensor_is_twice_the_pressure(simulated, kind):
+    """Over any part of a run; parts of equal length average to the whole."""
+    run = simulated(INPUTS[kind])
+    for start, end in ((0, 2), (0.5, 1.25), (0.51, 1.2)):
+        tensor = run.pressure_tensor(start, end)
+        assert tensor.shape == (2, 2)
+        assert np.trace(tensor) == pytest.approx(2 * run.pressure(start, end), rel=1e-12)
+        assert tensor[0, 1] == pytest.approx(tensor[1, 0], rel=1e-9, abs=1e-9)
+    halves = (run.pressure(0, 1) + run.pressure(1, 2)) / 2
+    assert halves == pytest.approx(run.pressure(0, 2), rel=1e-12)
+    assert run.pressure(0.51, 1.2) == run.pressure(0.5, 1.25)
+
+
+def test_the_means_are_over_time(tmp_path):
+    """By trapezoids, of samples that are not equally far apart, in a box that shrinks."""
+    still = np.zeros((3, 4, 2))
+    steady = {"motion": "constant_velocity", "velocity": 0.25, "start_time": 0.0, "end_time": 2.0}
+    run = written(
+        tmp_path / "a.h5",
+        still,
+        still,
+        time=[0.0, 0.5, 2.0],
+        parameters={"side/right": steady},
+        observables={"all/kinetic_energy": [1.0, 2.0, 4.0], "virial": [0.0, 1.0, 6.0]},
+    )
+    assert run.accessible_area(run.time) == pytest.approx([1, 0.875, 0.5])
+    kinetic, area = (0.5 * 1.5 + 1.5 * 3) / 2, 0.75
+    assert run.pressure(0, 2) == pytest.approx((4 * kinetic + 6 / (2 * 2)) / area)
+    assert run.pressure(0.5, 2) == pytest.approx((4 * 3 + 5 / (2 * 1.5)) / 0.6875)
+    for times in ((0, 0.1), (2, 0), (1, 1)):
+        with pytest.raises(RunError, match="no two samples"):
+            run.pressure(*times)
