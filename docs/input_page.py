@@ -39,6 +39,10 @@ writes this page from what the program says of itself.
 On the command line: `--set GROUP.VARIABLE=VALUE`; a species, an obstacle or a wall is addressed by
 its name, as in `--set species.projectile.mass=50`. The file chooses the units of length, time and
 mass. What has no default has an example instead: *e.g.*
+
+The last column says when a variable may have another value than at the start: when a run continues
+(`--resume`), because it has no effect on the trajectory; or while a simulation runs, in Python and
+on the laboratory page. All other variables make another run.
 """
 
 
@@ -78,7 +82,8 @@ def row(name: str, entry: dict) -> str:
     """A line of the table."""
     value = "e.g. " * (entry["default"] is None) + f"`{written(entry)}`"
     meaning = entry["help"] + (f" [{entry['unit']}]" if entry["unit"] else "")
-    cells = (f"`{name}`", meaning, entry["allowed"], value)
+    change = "`--resume`" * entry["resumable"] + "while it runs" * entry["changeable"]
+    cells = (f"`{name}`", meaning, entry["allowed"], value, change)
     return "| " + " | ".join(cell.replace("|", "\\|").replace("**", "^") for cell in cells) + " |"
 
 
@@ -88,7 +93,10 @@ def page(program: Path) -> str:
     for group, entries in variables(program).items():
         title = group.capitalize() if group == LAW else f"&{group}"
         lines += [f"## {title}", "", GROUPS[group], ""]
-        lines += ["| variable | meaning [unit] | allowed | default |", "|---|---|---|---|"]
+        lines += [
+            "| variable | meaning [unit] | allowed | default | may change |",
+            "|---|---|---|---|---|",
+        ]
         lines += [*(row(*one) for one in entries.items()), ""]
     return "\n".join(lines)
 

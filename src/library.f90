@@ -24,7 +24,7 @@ module library
   use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
   use timeline, only: adapted, advance_once, passed_collapse
   use variable_help, only: input_of
-  use variables, only: may_change_at_work
+  use variables, only: change_of, in_motion
   implicit none
   private
   public :: answer, begin, session_of, session_t, text_of
@@ -167,8 +167,8 @@ contains
     end do
     do k = 1, size(lines)
       associate (line => lines(k)%text)
-        if (.not. may_change_at_work(line(:index(line, "=") - 1)) .and. .not. allocated(error)) &
-          call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a simulation at work")
+        if (change_of(line(:index(line, "=") - 1)) /= in_motion .and. .not. allocated(error)) &
+          call fail(error, exit_usage, line(:index(line, "=") - 1)//": cannot change in a running simulation")
         list = list//written_exactly(session%sim%time())//" "//line//eol
       end associate
     end do

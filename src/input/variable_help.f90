@@ -4,8 +4,8 @@ module variable_help
   use errors, only: error_t, exit_usage, fail
   use input_groups, only: group_t, json_text
   use old_names, only: present_names
-  use variables, only: allowed, free_to_change, group_names, is_repeated, largest, name_length, smallest, table, variable_t, &
-    wall_groups, words_of
+  use variables, only: allowed, group_names, in_motion, is_repeated, largest, name_length, never, on_resume, smallest, table, &
+    variable_t, wall_groups, words_of
   use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
   implicit none
   private
@@ -107,6 +107,8 @@ contains
     else
       text = text//"example: "//trim(row%value)
     end if
+    if (row%may_change == on_resume) text = text//indent//"may change on --resume"
+    if (row%may_change == in_motion) text = text//indent//"may change in a running simulation"
   end function explanation
 
   !> The table: an object for each group, and in it one for each variable.
@@ -160,7 +162,8 @@ contains
     if (size(words) > 0) text = text//json_text(words(1))//": "//list(words(2:))
     text = text//"}"//member("excludes", row%excludes /= "", list(words_of(row%excludes)))// &
       member("repeated", .true., trim(merge("true ", "false", is_repeated(row%group))))// &
-      member("resumable", .true., trim(merge("true ", "false", free_to_change(trim(row%group)//"."//row%name))))
+      member("resumable", .true., trim(merge("true ", "false", row%may_change == on_resume)))// &
+      member("changeable", .true., trim(merge("true ", "false", row%may_change == in_motion)))
   end function row_text
 
   !> The groups of an input in the order of the file, each with what is given in it. `from` and `to` are its place in the

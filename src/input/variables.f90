@@ -9,13 +9,17 @@ module variables
   implicit none
   private
   public :: variable_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
-  public :: free_to_change, may_change_at_work, full_names
+  public :: change_of, full_names, in_motion, never, on_resume
   public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37, help_length = 1000
   integer, parameter :: most_threads = 1024, most_disks = 100000000
   real(real64), parameter :: smallest = 1.0e-100_real64    !! numbers beyond these would overflow when
   real(real64), parameter :: largest = 1.0e100_real64      !! squared or multiplied
+
+  !> When a variable may have another value than at the start of a run: never; on `--resume`, because it has no effect on
+  !> the trajectory; or in a running simulation, because it acts on disks and neither places nor describes them.
+  character(len=9), parameter :: never = "never", on_resume = "on resume", in_motion = "running"
 
   type :: range_t
     real(real64) :: lower, upper             !! both belong to the range
@@ -54,6 +58,7 @@ module variables
     character(len=100) :: choices = ""        !! of texts, separated by blanks; none: free text
     character(len=60) :: goes_with = ""      !! a choice, then its words with which this variable has an effect
     character(len=80) :: excludes = ""       !! variables of the same group that are not given with it
+    character(len=9) :: may_change = never   !! when it may have another value than at the start
   end type variable_t
 
   ! status     value                           line in the reference file
@@ -67,7 +72,7 @@ module variables
     "run", "box", "side", "obstacle", "wall", "species", "contact", "drive", "stop", "output"]
 
   type(variable_t), parameter :: run_rows(*) = [ &
-    variable_t("run", "title", "text", 1, "default", "''", "one line that describes the run"), &
+    variable_t("run", "title", "text", 1, "default", "''", "one line that describes the run", may_change=on_resume), &
     variable_t("run", "seed", "integer", 1, "default", "1", &
       "seed of the random numbers: the same seed gives the same run", not_negative), &
     variable_t("run", "dynamics", "text", 1, "default", "'events'", &
@@ -75,11 +80,11 @@ module variables
     variable_t("run", "dt", "real", 1, "optional", "0.001", &
       "time step; needed with dynamics = 'steps'", positive, "time"), &
     variable_t("run", "search", "text", 1, "default", "'cells'", &
-      "cost per collision O(1), O(N) or O(N**2); same trajectory", choices="cells pairs rescan"), &
+      "cost per collision O(1), O(N) or O(N**2); same trajectory", choices="cells pairs rescan", may_change=on_resume), &
     variable_t("run", "queue", "text", 1, "default", "'calendar'", "event queue; same trajectory", &
-      choices="calendar heap"), &
+      choices="calendar heap", may_change=on_resume), &
     variable_t("run", "threads", "integer", 1, "default", "0", &
-      "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", number_of_threads)]
+      "cores that the run may use; 0: OMP_NUM_THREADS, or one; same trajectory", number_of_threads, may_change=on_resume)]
 
   type(variable_t), parameter :: box_rows(*) = [ &
     variable_t("box", "lower", "real", 2, "default", "0, 0", "lower left corner", unit="length"), &
@@ -87,7 +92,7 @@ module variables
     variable_t("box", "boundary", "text", 2, "default", "'wall', 'wall'", &
       "the two sides along x, the two sides along y", choices="wall periodic"), &
     variable_t("box", "gravity", "real", 2, "default", "0, 0", "uniform acceleration of all disks", &
-      unit="length/time**2"), &
+      unit="length/time**2", may_change=in_motion), &
     variable_t("box", "shear_rate", "real", 1, "default", "0", &
       "gradient along y of the velocity along x; both axes periodic (Lees and Edwards)", unit="1/time")]
 
@@ -95,23 +100,24 @@ module variables
     variable_t("side", "name", "text", 1, "example", "'bottom'", "which side of the box, where it is a wall", &
       choices="left right bottom top"), &
     variable_t("side", "motion", "text", 1, "default", "'still'", &
-      "how it moves; sawtooth: it stays and strikes; piston: pushed by disks and force", choices=motions), &
+      "how it moves; sawtooth: it stays and strikes; piston: pushed by disks and force", choices=motions, may_change=in_motion), &
     variable_t("side", "amplitude", "real", 1, "required", "0.05", "how far it moves from its place", positive, &
-      "length", goes_with="motion sine parabolic"), &
+      "length", goes_with="motion sine parabolic", may_change=in_motion), &
     variable_t("side", "period", "real", 1, "required", "1", "of the motion", positive, "time", &
-      goes_with="motion sine parabolic"), &
+      goes_with="motion sine parabolic", may_change=in_motion), &
     variable_t("side", "phase", "real", 1, "fallback", "0", &
-      "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic"), &
+      "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic", &
+      may_change=in_motion), &
     variable_t("side", "velocity", "real", 1, "required", "1", "inwards: with which it strikes (> 0), or moves (< 0: outwards)", &
-      unit="length/time", goes_with="motion sawtooth constant_velocity"), &
+      unit="length/time", goes_with="motion sawtooth constant_velocity", may_change=in_motion), &
     variable_t("side", "start_time", "real", 1, "fallback", "0", "time at which it starts to move; before, it is at its place", &
-      not_negative, "time", goes_with="motion constant_velocity"), &
+      not_negative, "time", goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "end_time", "real", 1, "required", "1", "time at which it stops; it stays where it is then", positive, &
-      "time", goes_with="motion constant_velocity"), &
+      "time", goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "mass", "real", 1, "required", "10", "mass of the piston", positive, "mass", &
-      goes_with="motion piston"), &
+      goes_with="motion piston", may_change=in_motion), &
     variable_t("side", "force", "real", 1, "required", "1", "constant force that pushes the piston inwards", positive, &
-      "energy/length", goes_with="motion piston")]
+      "energy/length", goes_with="motion piston", may_change=in_motion)]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &
     variable_t("obstacle", "name", "text", 1, "optional", "'scatterer'", "name; default obstacle1, obstacle2, ..."), &
@@ -128,20 +134,22 @@ module variables
   !> The law of a wall, in the group of each.
   type(variable_t), parameter :: law_rows(*) = [ &
     variable_t("", "restitution", "real", 1, "optional", "0.9", &
-      "of a disk and this wall; default contact.wall_restitution", unit_interval), &
-    variable_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules), &
+      "of a disk and this wall; default contact.wall_restitution", unit_interval, may_change=in_motion), &
+    variable_t("", "rule", "text", 1, "optional", "'normal'", "default contact.wall_rule", choices=wall_rules, &
+      may_change=in_motion), &
     variable_t("", "tangential_restitution", "real", 1, "optional", "0.5", &
-      "of a rough wall; default contact.wall_tangential_restitution", tangential, goes_with="rule normal"), &
+      "of a rough wall; default contact.wall_tangential_restitution", tangential, goes_with="rule normal", may_change=in_motion), &
     variable_t("", "friction", "real", 1, "optional", "0.3", "Coulomb's coefficient; default contact.wall_friction", &
-      not_negative, goes_with="rule normal"), &
+      not_negative, goes_with="rule normal", may_change=in_motion), &
     variable_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
-      positive, "energy", excludes="restitution rule tangential_restitution friction motion"), &
+      positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion), &
     variable_t("", "speed", "real", 1, "fallback", "0", &
-      "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time")]
+      "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time", may_change=in_motion)]
   integer, private :: g, r
   type(variable_t), parameter :: wall_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
     law_rows(r)%size, law_rows(r)%status, law_rows(r)%value, law_rows(r)%help, law_rows(r)%range, law_rows(r)%unit, &
-    law_rows(r)%choices, law_rows(r)%goes_with, law_rows(r)%excludes), r=1, size(law_rows)), g=1, size(wall_groups))]
+    law_rows(r)%choices, law_rows(r)%goes_with, law_rows(r)%excludes, law_rows(r)%may_change), &
+    r=1, size(law_rows)), g=1, size(wall_groups))]
 
   type(variable_t), parameter :: species_rows(*) = [ &
     variable_t("species", "name", "text", 1, "optional", "'gas'", "name; default species1, species2, ..."), &
@@ -194,96 +202,100 @@ module variables
 
   type(variable_t), parameter :: contact_rows(*) = [ &
     variable_t("contact", "restitution", "real", 1, "default", "1", &
-      "of two disks: 1 elastic, 0 no rebound", unit_interval), &
+      "of two disks: 1 elastic, 0 no rebound", unit_interval, may_change=in_motion), &
     variable_t("contact", "wall_restitution", "real", 1, "optional", "1", &
-      "of a disk and a wall; default as restitution", unit_interval), &
+      "of a disk and a wall; default as restitution", unit_interval, may_change=in_motion), &
     variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
-      "slower contacts of disks and with walls lose less: 1 - restitution ~ g**(1/5)", choices=restitution_laws), &
+      "slower contacts of disks and with walls lose less: 1 - restitution ~ g**(1/5)", choices=restitution_laws, &
+      may_change=in_motion), &
     variable_t("contact", "restitution_speed", "real", 1, "required", "1", &
       "speed g along the normal from which on restitutions are as given", positive, "length/time", &
-      goes_with="restitution_law power viscoelastic"), &
+      goes_with="restitution_law power viscoelastic", may_change=in_motion), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
-      "walls reduce the whole velocity, or its normal part only", choices=wall_rules), &
+      "walls reduce the whole velocity, or its normal part only", choices=wall_rules, may_change=in_motion), &
     variable_t("contact", "contact_time", "real", 1, "default", "0", &
-      "TC model: elastic if a partner collided less than this ago; 0 off", not_negative, "time"), &
+      "TC model: elastic if a partner collided less than this ago; 0 off", not_negative, "time", may_change=in_motion), &
     variable_t("contact", "tangential_restitution", "real", 1, "default", "-1", &
-      "of rough disks: -1 smooth, 0 the slip ends, 1 it is reversed", tangential), &
+      "of rough disks: -1 smooth, 0 the slip ends, 1 it is reversed", tangential, may_change=in_motion), &
     variable_t("contact", "friction", "real", 1, "optional", "0.3", &
-      "Coulomb's coefficient; default: the tangential force has no limit", not_negative), &
+      "Coulomb's coefficient; default: the tangential force has no limit", not_negative, may_change=in_motion), &
     variable_t("contact", "inertia", "real", 1, "default", "0.5", &
-      "moment of inertia of a disk over mass times radius squared", moment), &
+      "moment of inertia of a disk over mass times radius squared", moment, may_change=in_motion), &
     variable_t("contact", "wall_tangential_restitution", "real", 1, "optional", "0.5", &
-      "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential, goes_with="wall_rule normal"), &
+      "of a disk and a wall with rule 'normal'; default as tangential_restitution", tangential, goes_with="wall_rule normal", &
+      may_change=in_motion), &
     variable_t("contact", "wall_friction", "real", 1, "optional", "0.3", "of the same; default as friction", &
-      not_negative, goes_with="wall_rule normal"), &
+      not_negative, goes_with="wall_rule normal", may_change=in_motion), &
     variable_t("contact", "pair_restitution", "real", 0, "optional", "1, 0.9, 0.9, 0.8", &
-      "for species 1-1, 1-2, ..., 2-1, 2-2, ...; instead of restitution", unit_interval)]
+      "for species 1-1, 1-2, ..., 2-1, 2-2, ...; instead of restitution", unit_interval, may_change=in_motion)]
 
   type(variable_t), parameter :: drive_rows(*) = [ &
     variable_t("drive", "kind", "text", 1, "default", "'none'", &
-      "kicks: random changes of velocity, a heat bath, Brownian or active disks", choices=drive_kinds), &
+      "kicks: random changes of velocity, a heat bath, Brownian or active disks", choices=drive_kinds, may_change=in_motion), &
     variable_t("drive", "interval", "real", 1, "required", "0.01", "time from kick to kick", positive, "time", &
-      goes_with="kind noise andersen brownian active"), &
+      goes_with="kind noise andersen brownian active", may_change=in_motion), &
     variable_t("drive", "strength", "real", 1, "required", "0.1", &
-      "growth of the variance of each component of all velocities", positive, "velocity**2/time", goes_with="kind noise"), &
+      "growth of the variance of each component of all velocities", positive, "velocity**2/time", goes_with="kind noise", &
+      may_change=in_motion), &
     variable_t("drive", "keep_momentum", "logical", 1, "fallback", ".false.", &
-      "subtract the mean velocity that each kick gives", goes_with="kind noise"), &
+      "subtract the mean velocity that each kick gives", goes_with="kind noise", may_change=in_motion), &
     variable_t("drive", "fraction", "real", 1, "required", "0.1", &
-      "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen"), &
+      "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen", may_change=in_motion), &
     variable_t("drive", "temperature", "real", 1, "required", "1", "kT of the new velocities", positive, "energy", &
-      goes_with="kind andersen brownian active"), &
+      goes_with="kind andersen brownian active", may_change=in_motion), &
     variable_t("drive", "speed", "real", 1, "required", "1", "added along the orientation of a disk", &
-      not_negative, "length/time", goes_with="kind active"), &
+      not_negative, "length/time", goes_with="kind active", may_change=in_motion), &
     variable_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
-      "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active"), &
+      "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active", &
+      may_change=in_motion), &
     variable_t("drive", "species", "text", 1, "fallback", "''", "the only species that is kicked; '' all", &
-      goes_with="kind noise andersen brownian active")]
+      goes_with="kind noise andersen brownian active", may_change=in_motion)]
 
   type(variable_t), parameter :: stop_rows(*) = [ &
     variable_t("stop", "time", "real", 1, "example", "1", &
-      "end at this time; the first rule to be met ends the run", not_negative, "time"), &
+      "end at this time; the first rule to be met ends the run", not_negative, "time", may_change=on_resume), &
     variable_t("stop", "collisions", "integer", 1, "optional", "100000", &
-      "end after this many collisions between disks", not_negative), &
+      "end after this many collisions between disks", not_negative, may_change=on_resume), &
     variable_t("stop", "collisions_per_disk", "real", 1, "optional", "20", &
-      "end when 2 collisions/N reaches this", not_negative), &
+      "end when 2 collisions/N reaches this", not_negative, may_change=on_resume), &
     variable_t("stop", "events", "integer", 1, "optional", "100000", &
-      "end after this many collisions of any kind: pair, side, obstacle, wall", not_negative), &
+      "end after this many collisions of any kind: pair, side, obstacle, wall", not_negative, may_change=on_resume), &
     variable_t("stop", "energy_fraction", "real", 1, "optional", "0.1", &
-      "end when collisions have left this fraction of the kinetic energy", energy_left), &
+      "end when collisions have left this fraction of the kinetic energy", energy_left, may_change=on_resume), &
     variable_t("stop", "at_rest", "logical", 1, "optional", ".true.", &
       "End of the run when all disks have come to rest: when the ever shorter bounces of each under box.gravity have ended " &
       //"or, without gravity, when no disk moves. It needs collisions that lose energy, run.dynamics = 'events' and surfaces " &
-      //"that stand still."), &
+      //"that stand still.", may_change=on_resume), &
     variable_t("stop", "wall_clock", "real", 1, "optional", "3600", &
-      "stop with a checkpoint after this much computing time", positive, "s")]
+      "stop with a checkpoint after this much computing time", positive, "s", may_change=on_resume)]
 
   type(variable_t), parameter :: output_rows(*) = [ &
     variable_t("output", "frames_every_time", "real", 1, "optional", "0.1", &
-      "positions and velocities; default the first and the last", positive, "time"), &
+      "positions and velocities; default the first and the last", positive, "time", may_change=on_resume), &
     variable_t("output", "frames_every_collisions", "integer", 1, "optional", "1000", &
-      "a frame after so many collisions between disks", positive), &
+      "a frame after so many collisions between disks", positive, may_change=on_resume), &
     variable_t("output", "frames_every_events", "integer", 1, "optional", "1000", &
-      "a frame after so many collisions of any kind", positive), &
+      "a frame after so many collisions of any kind", positive, may_change=on_resume), &
     variable_t("output", "frames_every_collisions_per_disk", "real", 1, "optional", "1", &
-      "a frame whenever 2 collisions/N has grown by this", positive), &
+      "a frame whenever 2 collisions/N has grown by this", positive, may_change=on_resume), &
     variable_t("output", "frames_at", "real", 0, "optional", "0.1, 1, 10", &
-      "frames at these times, too, in their order", not_negative, "time"), &
+      "frames at these times, too, in their order", not_negative, "time", may_change=on_resume), &
     variable_t("output", "frames_per_decade", "integer", 1, "optional", "10", &
-      "frames at so many times in each power of ten, too, from frames_from on", per_decade), &
+      "frames at so many times in each power of ten, too, from frames_from on", per_decade, may_change=on_resume), &
     variable_t("output", "frames_from", "real", 1, "optional", "0.001", &
-      "first time of frames_per_decade and observables_per_decade", positive, "time"), &
+      "first time of frames_per_decade and observables_per_decade", positive, "time", may_change=on_resume), &
     variable_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
-      "energies, pressure, ...; default the first and the last", positive, "time"), &
+      "energies, pressure, ...; default the first and the last", positive, "time", may_change=on_resume), &
     variable_t("output", "observables_every_collisions", "integer", 1, "optional", "100", &
-      "a sample after so many collisions between disks", positive), &
+      "a sample after so many collisions between disks", positive, may_change=on_resume), &
     variable_t("output", "observables_every_events", "integer", 1, "optional", "100", &
-      "a sample after so many collisions of any kind", positive), &
+      "a sample after so many collisions of any kind", positive, may_change=on_resume), &
     variable_t("output", "observables_every_collisions_per_disk", "real", 1, "optional", "0.1", &
-      "a sample whenever 2 collisions/N has grown by this", positive), &
+      "a sample whenever 2 collisions/N has grown by this", positive, may_change=on_resume), &
     variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
-      "samples at these times, too, in their order", not_negative, "time"), &
+      "samples at these times, too, in their order", not_negative, "time", may_change=on_resume), &
     variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
-      "samples at so many times in each power of ten, too, from frames_from on", per_decade), &
+      "samples at so many times in each power of ten, too, from frames_from on", per_decade, may_change=on_resume), &
     variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
       "what frames have beside the positions; default: all that there is", &
       choices="position velocity collisions image angular_velocity orientation"), &
@@ -295,41 +307,25 @@ module variables
     variable_t("output", "helfand", "logical", 1, "default", ".false.", &
       "sum up over time what disks carry, for viscosities and conductivity"), &
     variable_t("output", "checkpoint_every", "real", 1, "optional", "600", &
-      "computing time between checkpoints", positive, "s")]
+      "computing time between checkpoints", positive, "s", may_change=on_resume)]
 
   type(variable_t), parameter :: table(*) = [run_rows, box_rows, side_rows, obstacle_rows, wall_rows, &
     wall_law_rows, species_rows, contact_rows, drive_rows, stop_rows, output_rows]
 
-  !> Variables, or beginnings of their names, that may be another when a run goes on: how it is done, when it ends, what
-  !> is written. They have no effect on the trajectory.
-  character(len=25), parameter :: free(*) = [character(len=25) :: "run.title", "run.search", "run.queue", "run.threads", &
-    "stop.", "output.frames_", "output.observables_", "output.checkpoint_every"]
-
-  !> Those that may be another while a run is at work, but for what says where something is: what acts on disks.
-  character(len=11), parameter :: acting(*) = [character(len=11) :: "box.gravity", "contact.", "side.", "obstacle.", "wall.", &
-    "drive."]
-  character(len=*), parameter :: standing = ".name.centre.radius.side.from.to."
-
 contains
 
-  !> Whether a variable with its full name may be another from one moment on.
-  pure function may_change_at_work(name) result(yes)
+  !> When a variable may have another value, by its full name, which may hold that of an instance: `side.left.velocity`.
+  pure function change_of(name) result(when)
     character(len=*), intent(in) :: name
-    logical :: yes
+    character(len=len(never)) :: when
     integer :: k
 
-    yes = any([(index(name, trim(acting(k))) == 1, k=1, size(acting))]) &
-      .and. index(standing, name(index(name, ".", back=.true.):)//".") == 0
-  end function may_change_at_work
-
-  !> Whether a variable, or a line `variable = value` about one, may be another when a run goes on.
-  pure function free_to_change(line) result(yes)
-    character(len=*), intent(in) :: line
-    logical :: yes
-    integer :: k
-
-    yes = any([(index(line, trim(free(k))) == 1, k=1, size(free))])
-  end function free_to_change
+    when = never
+    do k = 1, size(table)
+      if (table(k)%group == name(:index(name, ".") - 1) .and. table(k)%name == name(index(name, ".", back=.true.) + 1:)) &
+        when = table(k)%may_change
+    end do
+  end function change_of
 
   !> Whether a group may occur several times in a file, told apart by `name`.
   elemental function is_repeated(group)

@@ -23,7 +23,7 @@ module checkpoint
   use simulation_state, only: simulation_t
   use system, only: last_problem, synchronize
   use texts, only: eol, growing_text_t, legible, line_at, lower_case, text_t, written
-  use variables, only: free_to_change
+  use variables, only: change_of, on_resume, table
   use version, only: program_version
   implicit none
   private
@@ -51,25 +51,24 @@ contains
     if (index(build_flags, "-ffast-math") + index(build_flags, "-Ofast") > 0) text = text//", fast math"
   end function program
 
-  !> The input as it was used, without what is free to change: one variable to a line.
+  !> The input as it was used, without variables that may change on `--resume`: one variable to a line.
   pure function fixed_input(groups) result(text)
     type(group_t), intent(in) :: groups(:)
-    character(len=:), allocatable :: text, line
+    character(len=:), allocatable :: text
     type(growing_text_t) :: growing
     integer :: k, g
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
-        if (.not. groups(g)%values(k)%is_set()) cycle
-        line = groups(g)%value_line(k)
-        if (.not. free_to_change(line)) call growing%add(line//eol)
+        if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
+        call growing%add(groups(g)%value_line(k)//eol)
       end do
     end do
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
         if (.not. allocated(groups(g)%values(k)%reals)) cycle
         if (size(groups(g)%values(k)%reals) <= most_written) cycle      ! in the text with all digits
-        if (free_to_change(groups(g)%value_line(k))) cycle
+        if (table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add("checksum of "//trim(groups(g)%name)//"."//trim(groups(g)%instance)//"." &
           //trim(groups(g)%values(k)%name)//" = "//checksum(transfer(groups(g)%values(k)%reals, [0_int8]))//eol)
       end do
@@ -96,7 +95,8 @@ contains
     do while (text /= "")
       line = line_at(text, 1)
       text = text(min(len(line) + 1, len(text)) + 1:)
-      if (free_to_change(variable_of(line)) .or. any([(variable_of(given(k)%text) == variable_of(line), k=1, size(given))])) cycle
+      if (change_of(variable_of(line)) == on_resume) cycle
+      if (any([(variable_of(given(k)%text) == variable_of(line), k=1, size(given))])) cycle
       override%text = line
       overrides = [overrides, override]           ! see `command_line: take_option`
     end do

@@ -498,7 +498,7 @@ def test_a_side_that_disks_push_is_drawn_beside_its_mean_and_deviation(simulated
     for change in ("contact.restitution=0.9", "box.gravity=0,-1", "species.packing_fraction=0.53"):
         crushed = simulated(short, change, "side.top.force=7000")
         assert driven.width_law(crushed) is None, "lossy, falling, or freezing"
-    with pytest.raises(Refused, match="no side that disks push"):
+    with pytest.raises(Refused, match="no piston"):
         driven.width(simulated("&species count = 2 radius = 0.1 / &stop time = 1 /"))
 
 

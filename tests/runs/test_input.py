@@ -166,6 +166,18 @@ def test_of_a_wrong_input_what_is_understood_is_printed(ricochet, tmp_path):
     assert json.loads(run.stdout)[0]["values"] == {"name": "gas", "count": 20, "speed": 1}
 
 
+def test_the_table_says_what_may_change_on_resuming(ricochet):
+    table = json.loads(ricochet("--print-variables").stdout)
+    found = {f"{g}.{v}" for g, rows in table.items() for v, row in rows.items() if row["resumable"]}
+    timed = [f"output.{v}" for v in table["output"] if re.match("(frames|observables)_", v)]
+    run = [f"run.{v}" for v in ("title", "search", "queue", "threads")]
+    stop = [f"stop.{v}" for v in table["stop"]]
+    assert found == {*run, *stop, *timed, "output.checkpoint_every"}
+    words = "may change on --resume"
+    assert words in ricochet("--explain", "stop.time").stdout
+    assert words not in ricochet("--explain", "box.lower").stdout
+
+
 def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):
     table = json.loads(ricochet("--print-variables").stdout)
     files = {name: {} for name in table}

@@ -7,6 +7,7 @@ That slices of time, a save and a load leave no trace in any random system is on
 import copy
 import ctypes
 import gc
+import json
 import os
 import re
 import signal
@@ -178,6 +179,26 @@ def test_wrong_use_is_said_in_one_line(act, error, words, tmp_path, monkeypatch)
         act(gas)
     assert len(str(caught.value).splitlines()) == 1
     assert Simulation(GAS).advance(events=5).events == 5
+
+
+def test_the_table_says_what_may_change_in_a_running_simulation(program):
+    """Every other variable is refused for that reason, before anything else is looked at."""
+    table = json.loads(ran(program, "--print-variables", check=True).stdout)
+    system = GAS + "&side name = 'top' / &wall name = 'w' from = 0.4, 0.5 to = 0.6, 0.5 /"
+    system += "&obstacle name = 'o' centre = 0.5, 0.5 radius = 0.01 /"
+    names = {"side": "top", "wall": "w", "obstacle": "o", "species": "a"}
+    gas, refused = Simulation(system), "cannot change in a running simulation"
+    for group, rows in table.items():
+        for name, row in rows.items():
+            value = row["default"] if row["example"] is None else row["example"]
+            full = ".".join([group, *([names[group]] if group in names else []), name])
+            try:
+                gas.change({full: value})
+                reason = ""
+            except ProgramError as error:
+                reason = error.message
+            assert row["changeable"] == (refused not in reason), full
+            assert not (row["changeable"] and row["resumable"]), full
 
 
 def test_a_simulation_that_breaks_off_says_so():
