@@ -13,7 +13,6 @@ module library
   use kinds, only: int64, never, real64
   use moments, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
-  use partners, only: n_sides, side_name
   use run_setup, only: choose_evolution, input_from_text, new_simulation, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
@@ -139,7 +138,7 @@ contains
     code = answer(error, message, room)
   end function advance
 
-  !> See ricochet.h. The input of now has a text of its own: the next change, and a file, begin from that.
+  !> See ricochet.h. The changed input has a text of its own, which the next change and a saved file start from.
   function change(handle, overrides, message, room) bind(C, name="ricochet_change") result(code)
     type(c_ptr), value :: handle
     character(kind=c_char), intent(in) :: overrides(*)
@@ -151,20 +150,12 @@ contains
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
     type(text_t), allocatable :: lines(:)
-    character(len=:), allocatable :: problem, side, text, list
-    integer :: i, k
+    character(len=:), allocatable :: problem, list
+    integer :: k
 
     session => session_of(handle)
     call lines_of(text_of(overrides), lines)
     list = changes_of(session)
-    text = session%input%text
-    do k = 1, n_sides                                 ! of a side that the input does not name, as it were in it
-      side = trim(side_name(k))
-      associate (groups => session%input%groups)
-        if (any([(index(lines(i)%text, "side."//side//".") == 1, i=1, size(lines))]) .and. &
-          .not. any(groups%name == "side" .and. groups%instance == side)) text = text//eol//"&side name = '"//side//"' /"
-      end associate
-    end do
     do k = 1, size(lines)
       associate (line => lines(k)%text)
         if (change_of(line(:index(line, "=") - 1)) /= in_motion .and. .not. allocated(error)) &
@@ -172,14 +163,22 @@ contains
         list = list//written_exactly(session%sim%time())//" "//line//eol
       end associate
     end do
-    if (.not. allocated(error)) call input_from_text(text, session%input%path, [session%input%overrides, lines], input, error, &
+    if (.not. allocated(error)) call input_from_text(input_of(session%input%groups), session%input%path, lines, input, error, &
       stepped=.true.)
     if (.not. allocated(error)) then
       changed = session%sim
       call change_system(changed, input%settings%system_t, problem)
       if (problem /= "") call fail(error, exit_usage, problem)
     end if
-    if (.not. allocated(error)) call renew(session, changed, input_of(input%groups), list, error)
+    if (.not. allocated(error)) call check_motion(changed, input%path, error)
+    if (.not. allocated(error)) then
+      input%text = input_of(input%groups)
+      input%overrides = lines(:0)
+      input%changes = list
+      input%settings%run%threads = session%input%settings%run%threads
+      session%input = input
+      call renew(session, changed)
+    end if
     code = answer(error, message, room)
   end function change
 
@@ -202,8 +201,11 @@ contains
       return
     end if
     call change_velocities(changed, reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())]))
-    call renew(session, changed, input_of(session%input%groups), &
-      changes_of(session)//written_exactly(changed%time())//" velocity"//eol, error)
+    call check_motion(changed, session%input%path, error)
+    if (.not. allocated(error)) then
+      session%input%changes = changes_of(session)//written_exactly(changed%time())//" velocity"//eol
+      call renew(session, changed)
+    end if
     code = answer(error, message, room)
   end function give_velocities
 
@@ -216,24 +218,24 @@ contains
     if (allocated(session%input%changes)) list = session%input%changes
   end function changes_of
 
-  !> Goes on with what has changed, and a text as the input, that of now; unless its numbers are out of range.
-  subroutine renew(session, sim, text, changes, error)
-    type(session_t), intent(inout) :: session
+  !> Reports speeds and energies that are out of range after a change.
+  subroutine check_motion(sim, path, error)
     type(simulation_t), intent(in) :: sim
-    character(len=*), intent(in) :: text, changes
+    character(len=*), intent(in) :: path              !! of the input
     type(error_t), allocatable, intent(out) :: error
     type(problem_list_t) :: problems
     type(text_t) :: none(0)
-    type(run_input_t) :: input
 
     call check_speeds(sim, problems)
-    call problems%report(session%input%path, none, error)
-    if (allocated(error)) return
+    call problems%report(path, none, error)
+  end subroutine check_motion
+
+  !> Continues with a changed state.
+  subroutine renew(session, sim)
+    type(session_t), intent(inout) :: session
+    type(simulation_t), intent(in) :: sim
+
     session%sim = sim
-    call input_from_text(text, session%input%path, none, input, error, stepped=.true.)
-    input%settings%run%threads = session%input%settings%run%threads
-    input%changes = changes
-    session%input = input
     call choose_evolution(session%input%settings, session%evolution)
     call session%evolution%start(session%sim)
   end subroutine renew

@@ -5,7 +5,7 @@ module run_setup
   use event_driven, only: event_driven_t
   use evolution, only: evolution_t
   use initial_state, only: create_simulation
-  use input_fit, only: fit_together
+  use input_fit, only: check_fit, complete_settings
   use variable_help, only: groups_text
   use input_problems, only: problem_list_t
   use input_settings, only: resolve_settings
@@ -63,7 +63,8 @@ contains
     if (allocated(error)) return
     if (complete) then                                    ! else what would be missing is there, in parts that were skipped
       call resolve_settings(input%groups, input%settings, problems, stepped)
-      call fit_together(input%settings, input%groups, problems)
+      call complete_settings(input%settings, input%groups, problems, complete)
+      if (complete) call check_fit(input%settings, input%groups, problems)
     end if
     call problems%report(path, overrides, error)
   end subroutine input_from_text

@@ -4,7 +4,7 @@ module input_settings
   use box_geometry, only: box_t
   use collisions, only: grip_t, restitution_laws, series_terms, wall_law_t, wall_rules
   use disks, only: names_of
-  use drive, only: active, drive_kinds
+  use drive, only: drive_kinds
   use input_groups, only: group_t, range_of
   use input_problems, only: problem_list_t
   use input_species, only: take_species
@@ -49,16 +49,6 @@ contains
     call take_drive(groups(place_of("drive", groups%name)))
     call take_stop(groups(place_of("stop", groups%name)))
     call take_output(groups(place_of("output", groups%name)))
-    associate (law => settings%law, box => settings%box, with => settings%with)
-      with%own_sizes = any(settings%species%mass_in_file .or. settings%species%radius_in_file &
-        .or. settings%species%radius_spread > 0)
-      with%rotation = law%grip%is_rough() .or. box%has_rough_walls() .or. any(abs(settings%species%angular_velocity) > 0) &
-        .or. any(settings%species%rotational_temperature >= 0)
-      with%orientation = with%rotation .or. settings%drive%kind == active
-      with%helfand = settings%output%helfand
-      with%stress = with%rotation .or. box%gives_energy() .or. settings%drive%is_on() .or. settings%output%virial_tensor &
-        .or. with%helfand
-    end associate
     call check_conflicts(settings, groups, must_end, problems)
 
   contains

@@ -4,6 +4,7 @@ module namelist_input
   use input_problems, only: most_problems, problem_list_t
   use input_words, only: store_values
   use input_text, only: assignment_t, content, cut, ending, plain, token_t, unclosed, unix_lines, word
+  use partners, only: n_sides, side_name
   use old_names, only: new_name
   use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
   use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
@@ -40,7 +41,7 @@ contains
       if (table(k)%status == "default" .or. table(k)%status == "fallback") call assign_text(defaults(k), trim(table(k)%value), 0)
       defaults(k)%given = .false.
     end do
-    allocate (found(size(group_names) + min(count([(text(k:k) == "&", k=1, len(text))]), &
+    allocate (found(size(group_names) + n_sides + min(count([(text(k:k) == "&", k=1, len(text))]), &
       count(is_repeated(group_names))*most_instances)))
     do k = 1, size(group_names)                                     ! groups that cannot be repeated exist from the start
       if (.not. is_repeated(group_names(k))) call add_group(group_names(k), 0, 1)
@@ -428,7 +429,7 @@ contains
       end do
     end subroutine replace_cadence
 
-    !> Finds the group that an override means; 0, and a problem, if there is none.
+    !> Finds the group that an override means; 0, and a problem, if there is none. Of a side one is made: each box has them.
     subroutine find_group(group, instance, line, g)
       character(len=*), intent(in) :: group, instance
       integer, intent(in) :: line
@@ -439,6 +440,12 @@ contains
       matches = of_group .and. (instance == "" .or. found(:n)%instance == instance)
       g = findloc(matches, .true., dim=1)
       if (count(matches) == 1) return
+      if (group == "side" .and. any(side_name == instance) .and. .not. any(matches)) then
+        call add_group(group, 0, count(of_group) + 1)
+        g = n
+        call assign_text(found(g)%values(row_of(group, "name")), instance, line)
+        return
+      end if
       g = 0
       associate (names => pack(found(:n)%instance, of_group))
         if (size(names) == 0) then

@@ -3,6 +3,7 @@
 module settings
   use kinds, only: int64, never, real64
   use disks, only: species_t
+  use drive, only: active
   use errors, only: error_t
   use input_groups, only: group_t, text_length
   use side_motion, only: piston
@@ -94,6 +95,7 @@ module settings
     type(output_settings_t) :: output
   contains
     procedure :: n_disks
+    procedure :: choose_features
     procedure :: wants_domains
   end type settings_t
 
@@ -117,6 +119,21 @@ contains
 
     n = sum(int(self%species%count, int64))
   end function n_disks
+
+  !> Decides what the disks have and what is summed, when starting files have been looked at.
+  pure subroutine choose_features(self)
+    class(settings_t), intent(inout) :: self
+
+    associate (with => self%with, species => self%species)
+      with%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%radius_spread > 0)
+      with%rotation = self%law%grip%is_rough() .or. self%box%has_rough_walls() .or. any(abs(species%angular_velocity) > 0 &
+        .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
+      with%orientation = with%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)
+      with%helfand = self%output%helfand
+      with%stress = with%rotation .or. self%box%gives_energy() .or. self%drive%is_on() .or. self%output%virial_tensor &
+        .or. with%helfand
+    end associate
+  end subroutine choose_features
 
   !> Whether the box is to be cut into domains: for several threads, or one after the other.
   pure function wants_domains(self) result(yes)

@@ -4,7 +4,7 @@ module variable_help
   use errors, only: error_t, exit_usage, fail
   use input_groups, only: group_t, json_text
   use old_names, only: present_names
-  use variables, only: allowed, group_names, in_motion, is_repeated, largest, name_length, never, on_resume, smallest, table, &
+  use variables, only: allowed, group_names, in_motion, is_repeated, largest, name_length, on_resume, smallest, table, &
     variable_t, wall_groups, words_of
   use texts, only: eol, growing_text_t, joined, lower_case, shown, suggestion, wrapped, written, written_exactly
   implicit none

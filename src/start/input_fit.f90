@@ -19,7 +19,7 @@ module input_fit
   use variables, only: most_disks, obstacle_groups
   implicit none
   private
-  public :: complain_of_file, fit_together
+  public :: check_fit, complain_of_file, complete_settings
 
   real(real64), parameter, public :: rounding = 1.0e-12_real64        !! relative, of disks that touch
   real(real64), parameter :: random_limit = 0.547_real64      !! random sequential addition jams
@@ -27,20 +27,45 @@ module input_fit
 
 contains
 
-  !> Takes what the settings leave to starting files from these, and checks every species that is known well enough; the
-  !> others have been reported already.
-  subroutine fit_together(settings, groups, problems)
+  !> Completes the settings with what the input leaves to starting files and to drawn radii, and chooses the features of
+  !> the run.
+  subroutine complete_settings(settings, groups, problems, complete)
     type(settings_t), intent(inout) :: settings
     type(group_t), intent(inout) :: groups(:)
+    type(problem_list_t), intent(inout) :: problems           !! files that cannot be read, too little memory
+    logical, intent(out) :: complete                          !! .false.: the disks are too many, or the box is none
+    integer :: s(2), k, before
+
+    complete = .false.
+    if (any(settings%box%lower >= settings%box%upper)) return
+    s = range_of(groups, ["species"])
+    do k = 1, size(settings%species)
+      call survey_file(settings%species, k, settings%box, groups(s(1) + k - 1), problems)
+    end do
+    call settings%choose_features()
+    if (settings%n_disks() > most_disks) return               ! told already
+    before = problems%count
+    call check_memory(settings, problems)
+    if (problems%count > before) return
+    do k = 1, size(settings%species)
+      call survey_spread(settings%species(k), k, settings%run%seed, groups(s(1) + k - 1))
+    end do
+    complete = .true.
+  end subroutine complete_settings
+
+  !> Checks complete settings: obstacles in the box, and every species that is known well enough; the others have been
+  !> reported already.
+  subroutine check_fit(settings, groups, problems)
+    type(settings_t), intent(in) :: settings
+    type(group_t), intent(in) :: groups(:)
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: misfit                   ! variable: what
     real(real64) :: beyond(2, 2)
     integer :: o(2), s(2), k, colon
 
-    if (any(settings%box%lower >= settings%box%upper)) return
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
-    associate (box => settings%box, with => settings%with, species => settings%species)
+    associate (box => settings%box, species => settings%species)
       beyond = box%reach()                                    ! of sides that move
       do k = n_sides + 1, size(box%surface)                   ! obstacles say themselves what is wrong with their places
         misfit = box%surface(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
@@ -48,22 +73,11 @@ contains
         if (colon > 0) call groups(o(1) + k - n_sides - 1)%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
       end do
       do k = 1, size(species)
-        call survey_file(species, k, box, groups(s(1) + k - 1), problems)
-      end do
-      with%rotation = with%rotation .or. any(species%spin_in_file)
-      with%orientation = with%rotation .or. with%orientation .or. any(species%angle_in_file)
-      with%stress = with%stress .or. with%rotation
-      if (settings%n_disks() > most_disks) return             ! told already
-      k = problems%count
-      call check_memory(settings, problems)
-      if (problems%count > k) return
-      do k = 1, size(species)
-        call survey_spread(species(k), k, settings%run%seed, groups(s(1) + k - 1))
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
       end do
       if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
     end associate
-  end subroutine fit_together
+  end subroutine check_fit
 
   !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end. Where
   !> disks push one side, they may make room.

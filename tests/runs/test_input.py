@@ -11,7 +11,7 @@ from pathlib import Path
 import fuzz_input
 import pytest
 from ricochet.running.program import namelist
-from whole_runs import FILES, USAGE
+from whole_runs import FILES, FINISHED, USAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = sorted((ROOT / "input").glob("*.nml"))
@@ -176,6 +176,16 @@ def test_the_table_says_what_may_change_on_resuming(ricochet):
     words = "may change on --resume"
     assert words in ricochet("--explain", "stop.time").stdout
     assert words not in ricochet("--explain", "box.lower").stdout
+
+
+def test_an_override_may_name_a_side_that_the_file_does_not(ricochet, tmp_path):
+    (tmp_path / "gas.nml").write_text(GOOD)
+    moving = ["--set", "side.top.motion=sawtooth", "--set", "side.top.velocity=1"]
+    groups = groups_of(ricochet, "gas.nml", *moving)
+    assert {"name": "top", "motion": "sawtooth", "velocity": 1} in [g["values"] for g in groups]
+    assert ricochet("gas.nml", "--check", *moving).returncode == FINISHED
+    run = ricochet("gas.nml", "--check", "--set", "side.roof.velocity=1")
+    assert run.returncode == USAGE and "roof" in run.stderr
 
 
 def test_every_default_that_is_printed_may_be_written_into_a_file(ricochet, tmp_path):
