@@ -51,7 +51,7 @@ def picture(path: Path, at: float) -> bytes:
         lower, upper = (np.asarray(box[end], float) for end in ("lower", "upper"))
         room = np.array([lower, upper])
         for k, side in enumerate(SIDES):
-            if (place := f"sides/{side}/place") in run.observables:
+            if (place := f"sides/{side}/position") in run.observables:
                 room[k % 2, k // 2] = run.observable(place)
         axes.add_patch(Rectangle(lower, *(upper - lower), fill=False, color="0.8", lw=0.8))
         axes.add_patch(Rectangle(room[0], *(room[1] - room[0]), fill=False, color="0.3", lw=0.8))

@@ -115,7 +115,7 @@ class Room(NamedTuple):
 def width_law(run: Run) -> Room | None:
     """At constant enthalpy, of a fluid; the side is at rest at first."""
     side = only_moving(run, "piston")
-    if side is None:
+    if side is None or not run.sides[side]["force"] > 0:
         return None
     along = bool(run.periodic[1 - side // 2])  # keeps its momentum
     flow = along * run.observable("momentum").value[0, 1 - side // 2] ** 2 / 2 / run.mass.sum()

@@ -84,7 +84,8 @@ def sides(run: Run) -> list[dict]:
     """Of each side its place, how it moves about it or was pushed, heats and slides."""
     places = [end[axis] for axis in (0, 1) for end in (run.lower, run.upper)]
     found = [
-        {"place": float(at)} | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
+        {"place": float(side.get("position", at))}
+        | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
         for at, side in zip(places, run.sides, strict=True)
     ]
     for k, (time, place) in run.pushed.items():

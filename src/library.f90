@@ -4,26 +4,30 @@ module library
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
     c_null_char, c_null_ptr, c_ptr
+  use box_sides, only: bounds
   use changes, only: change_system, change_velocities
   use errors, only: error_t, exit_usage, fail
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: check_speeds
+  use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use kinds, only: int64, never, real64
   use moments, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
-  use run_setup, only: choose_evolution, input_from_text, new_simulation, start_threads
+  use namelist_input, only: read_groups
+  use partners, only: side_name
+  use run_setup, only: choose_evolution, input_from_text, new_simulation, resolve_input, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
   use stop_rules, only: stop_rule_t
   use system, only: seconds
   use team, only: make_team
-  use texts, only: eol, growing_text_t, lines_of, text_t, written, written_exactly
+  use texts, only: eol, growing_text_t, lines_of, place_of, text_t, written, written_exactly
   use timeline, only: adapted, advance_once, passed_collapse
   use variable_help, only: input_of
-  use variables, only: change_of, in_motion
+  use variables, only: change_of, in_motion, row_of
   implicit none
   private
   public :: answer, begin, session_of, session_t, text_of
@@ -150,7 +154,9 @@ contains
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
     type(text_t), allocatable :: lines(:)
+    type(problem_list_t) :: problems
     character(len=:), allocatable :: problem, list
+    logical :: complete
     integer :: k
 
     session => session_of(handle)
@@ -163,8 +169,13 @@ contains
         list = list//written_exactly(session%sim%time())//" "//line//eol
       end associate
     end do
-    if (.not. allocated(error)) call input_from_text(input_of(session%input%groups), session%input%path, lines, input, error, &
-      stepped=.true.)
+    if (.not. allocated(error)) then
+      input%path = session%input%path
+      input%overrides = lines
+      call read_groups(input_of(session%input%groups), lines, input%groups, problems, complete)
+      call keep_sides(session, input%groups)
+      call resolve_input(input, complete, problems, error, stepped=.true.)
+    end if
     if (.not. allocated(error)) then
       changed = session%sim
       call change_system(changed, input%settings%system_t, problem)
@@ -181,6 +192,46 @@ contains
     end if
     code = answer(error, message, room)
   end function change
+
+  !> Gives sides whose motion changes the position from which the new motion continues where the old one is now.
+  subroutine keep_sides(session, groups)
+    type(session_t), intent(in) :: session
+    type(group_t), intent(inout) :: groups(:)         !! of the changed input
+    character(len=10), parameter :: of_motion(4) = [character(len=10) :: "motion", "velocity", "start_time", "end_time"]
+    real(real64) :: at(2, 2), x, start, passed        ! (axis, lower or upper), of the side [length]; [time]
+    integer :: g, k, old, side, inwards
+    logical :: same
+
+    call bounds(session%sim%box, session%sim%now, at(:, 1), at(:, 2))
+    do g = 1, size(groups)
+      side = place_of(trim(groups(g)%instance), side_name)
+      if (groups(g)%name /= "side" .or. side == 0) cycle
+      associate (group => groups(g), before => session%input%groups, box => session%sim%box, &
+        position => groups(g)%values(row_of("side", "position")))
+        old = findloc(before%name == "side" .and. before%instance == group%instance, .true., dim=1)
+        same = old > 0
+        do k = 1, size(of_motion)
+          if (same) same = group%value_line(row_of("side", trim(of_motion(k)))) &
+            == before(old)%value_line(row_of("side", trim(of_motion(k))))
+        end do
+        if (same) cycle
+        inwards = 2*modulo(side, 2) - 1               ! along the axis
+        x = at((side + 1)/2, merge(1, 2, inwards > 0))
+        position%given = any(group%text_of("motion") == [character(len=17) :: "still", "constant_velocity", "piston"])
+        call position%clear()
+        if (.not. position%given) cycle
+        if (group%text_of("motion") == "constant_velocity") then
+          start = group%real_of("start_time", 0.0_real64)
+          passed = min(max(session%sim%time(), start), group%real_of("end_time", start)) - start
+          x = x - inwards*group%real_of("velocity", 0.0_real64)*passed
+        end if
+        position%reals = [x]
+        if (inwards > 0) position%given = abs(x - box%lower((side + 1)/2)) > 0
+        if (inwards < 0) position%given = abs(x - box%upper((side + 1)/2)) > 0
+        if (.not. position%given) call position%clear()
+      end associate
+    end do
+  end subroutine keep_sides
 
   !> See ricochet.h.
   function give_velocities(handle, values, message, room) bind(C, name="ricochet_set_velocities") result(code)

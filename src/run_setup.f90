@@ -25,7 +25,7 @@ module run_setup
   use variables, only: most_threads
   implicit none
   private
-  public :: read_input, input_from_text, new_simulation, choose_evolution, start_threads
+  public :: read_input, input_from_text, resolve_input, new_simulation, choose_evolution, start_threads
 
 contains
 
@@ -60,14 +60,24 @@ contains
     input%overrides = overrides
     call read_groups(text, overrides, input%groups, problems, complete)
     if (present(printed)) call print_text(groups_text(input%groups), error)
-    if (allocated(error)) return
+    if (.not. allocated(error)) call resolve_input(input, complete, problems, error, stepped)
+  end subroutine input_from_text
+
+  !> From the groups of an input to its settings; all problems become one error.
+  subroutine resolve_input(input, complete, problems, error, stepped)
+    type(run_input_t), intent(inout) :: input
+    logical, intent(inout) :: complete                              !! .false.: parts of the text were skipped
+    type(problem_list_t), intent(inout) :: problems                 !! so far
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: stepped                        !! see `resolve_settings`
+
     if (complete) then                                    ! else what would be missing is there, in parts that were skipped
       call resolve_settings(input%groups, input%settings, problems, stepped)
       call complete_settings(input%settings, input%groups, problems, complete)
       if (complete) call check_fit(input%settings, input%groups, problems)
     end if
-    call problems%report(path, overrides, error)
-  end subroutine input_from_text
+    call problems%report(input%path, input%overrides, error)
+  end subroutine resolve_input
 
   !> The state at the start of a run, the disks in an order that suits the memory.
   subroutine new_simulation(input, line, sim, error)

@@ -150,9 +150,11 @@ def shift_of(found: Found, side: str, time: float) -> float:
         found.get(f"/parameters/side/{side}@{name}", 0)
         for name in ("motion", "amplitude", "period", "phase")
     )
+    k, (lower, edges, _) = SIDES.index(side), of_box(found)
+    end = (lower, lower + edges)[k % 2][k // 2]
+    offset = (found.get(f"/parameters/side/{side}@position", end) - end) * (-1) ** k
     if kind == b"piston":
-        k, (lower, edges, _) = SIDES.index(side), of_box(found)
-        path, ends = f"/observables/sides/{side}/place", (lower, lower + edges)
+        path, ends = f"/observables/sides/{side}/position", (lower, lower + edges)
         at = [place - ends[k % 2][k // 2] for place in found[f"{path}/value"]]
         known = found[f"{path}/time"] == time
         return float(np.ravel(at)[known][-1] * (-1) ** k) if np.any(known) else -np.inf
@@ -161,13 +163,13 @@ def shift_of(found: Found, side: str, time: float) -> float:
             found[f"/parameters/side/{side}@{name}"]
             for name in ("velocity", "start_time", "end_time")
         )
-        return speed * (min(max(time, begin), end) - begin)
+        return offset + speed * (min(max(time, begin), end) - begin)
     if kind == b"sine":
         return amplitude * np.sin(2 * np.pi * (time / period + phase))
     if kind == b"parabolic":
         s = (time / period + phase) % 1
         return amplitude * (16 * s * (0.5 - s) if s < 0.5 else 16 * (s - 0.5) * (s - 1))
-    return 0.0
+    return offset
 
 
 # --- what is written twice ---

@@ -29,12 +29,12 @@ contains
     other%system_t = system
     other%with%own_sizes = sim%with%own_sizes
     other%box%epoch = sim%epoch
-    do k = 1, n_sides                                        ! the mass and force of a piston may change
+    do k = 1, n_sides                                        ! a piston starts where the side is, and as fast
       associate (old => sim%box%surface(k)%motion, new => other%box%surface(k)%motion)
-        if (.not. (old%kind == piston .and. new%kind == piston)) cycle
+        if (new%kind /= piston) cycle
         tau = old%moment(sim%epoch, sim%now)
         new%at = old%place(tau)
-        new%v = old%velocity(tau)
+        new%v = merge(old%velocity(tau), 0.0_real64, old%travels())
         new%clock = sim%now
       end associate
     end do

@@ -20,7 +20,8 @@ module side_motion
 
   type :: side_motion_t
     integer :: kind = still                          !! in `motions`
-    real(real64) :: amplitude = 0.0_real64           !! of constant velocity: its path; of a piston: the width of the box [length]
+    real(real64) :: offset = 0.0_real64              !! how far inwards of the box's side it starts to move [length]
+    real(real64) :: amplitude = 0.0_real64           !! of constant velocity: offset and path; of a piston: the width of the box [length]
     real(real64) :: period = 1.0_real64              !! [time]
     real(real64) :: phase = 0.0_real64               !! at the time 0, in periods
     real(real64) :: strike = 0.0_real64              !! velocity inwards, of a sawtooth or a constant one [length/time]
@@ -62,13 +63,14 @@ contains
     yes = self%kind == constant_velocity .or. self%kind == piston
   end function drifts
 
-  !> How far inwards of its own place it ever is; a piston yields.
+  !> How far inwards of its own place it ever is; a piston yields from where it starts.
   elemental function inmost(self) result(x)
     class(side_motion_t), intent(in) :: self
     real(real64) :: x                                !! [length]
 
     x = self%amplitude
-    if (self%kind == piston .or. (self%kind == constant_velocity .and. self%strike < 0)) x = 0
+    if (self%drifts()) x = self%offset
+    if (self%kind == constant_velocity) x = x + max(0.0_real64, self%strike*(self%end_time - self%start_time))
   end function inmost
 
   !> The highest speed of the side; of a piston, that of a fall through the box.
@@ -112,7 +114,7 @@ contains
     else if (self%kind == parabolic) then
       x = 16*self%amplitude*merge(s*(0.5_real64 - s), (s - 0.5_real64)*(s - 1), s < 0.5_real64)
     else if (self%kind == constant_velocity) then
-      x = self%strike*min(max(tau, 0.0_real64), self%end_time - self%start_time)
+      x = self%offset + self%strike*min(max(tau, 0.0_real64), self%end_time - self%start_time)
     else if (self%kind == piston) then
       x = flight(self%at, self%v, self%pull, tau)
     end if

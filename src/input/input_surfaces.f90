@@ -10,7 +10,7 @@ module input_surfaces
   use variables, only: largest, table, words_of
   use partners, only: n_sides, side_name
   use segments, only: new_segment
-  use side_motion, only: piston, motions, sawtooth, side_motion_t, constant_velocity
+  use side_motion, only: piston, motions, sawtooth, side_motion_t, still, constant_velocity
   use texts, only: place_of, written
   implicit none
   private
@@ -86,8 +86,8 @@ contains
         if (.not. box%surface(side)%motion%travels()) cycle
         ! Sides must not meet, whenever each is how far inwards.
         if (width > 0 .and. sum(box%surface(2*axis - 1:2*axis)%motion%inmost()) >= width) call sides(k)%complain( &
-          trim(merge("end_time ", "amplitude", box%surface(side)%motion%kind == constant_velocity)), &
-          "leaves no room between the sides, which are "//written(width)//" apart (box.upper)", problems)
+          culprit(box%surface(side)%motion), "leaves no room between the sides, which are "// &
+          written(width)//" apart (box.upper)", problems)
       end if
     end do
     do k = n_sides + 1, size(box%surface)
@@ -121,6 +121,16 @@ contains
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 
+    !> The variable that decides how far inwards a side comes.
+    pure function culprit(motion) result(name)
+      type(side_motion_t), intent(in) :: motion
+      character(len=:), allocatable :: name
+
+      name = "amplitude"
+      if (motion%drifts()) name = "position"
+      if (motion%kind == constant_velocity .and. motion%strike > 0) name = "end_time"
+    end function culprit
+
     !> How a side moves.
     subroutine take_motion(group, motion)
       type(group_t), intent(in) :: group
@@ -132,12 +142,16 @@ contains
       motion%period = group%real_of("period", 1.0_real64)
       motion%phase = group%real_of("phase", 0.0_real64)
       motion%strike = group%real_of("velocity", 0.0_real64)
+      if (group%given("position") .and. .not. group%faulty("position")) motion%offset = merge( &
+        group%real_of("position", 0.0_real64) - box%lower(axis), box%upper(axis) - group%real_of("position", 0.0_real64), &
+        modulo(side, 2) == 1)
+      if (motion%kind == still .and. abs(motion%offset) > 0) motion%kind = constant_velocity    ! which is 0
       if (motion%kind == sawtooth .and. group%given("velocity") .and. .not. motion%strike > 0) call group%complain( &
         "velocity", "must be > 0 with motion = 'sawtooth': it strikes inwards", problems)
       if (motion%kind == constant_velocity) then
         motion%start_time = group%real_of("start_time", 0.0_real64)
         motion%end_time = group%real_of("end_time", 0.0_real64)
-        motion%amplitude = abs(motion%strike)*(motion%end_time - motion%start_time)
+        motion%amplitude = abs(motion%offset) + abs(motion%strike)*(motion%end_time - motion%start_time)
         if (group%given("end_time") .and. motion%end_time <= motion%start_time) call group%complain( &
           "end_time", "is not after start_time, "//written(motion%start_time), problems)
         if (motion%amplitude > largest) call group%complain("end_time", "the side moves as far as "//written(motion%amplitude) &
@@ -146,6 +160,7 @@ contains
         motion%mass = group%real_of("mass", 1.0_real64)
         motion%pull = group%real_of("force", 0.0_real64)/motion%mass
         motion%amplitude = width
+        motion%at = motion%offset
       else if (motion%top_speed() > largest) then
         call group%complain("period", "the side moves at up to "// &
           written(motion%top_speed())//"; allowed: up to "//written(largest), problems)

@@ -9,7 +9,7 @@ module variables
   implicit none
   private
   public :: variable_t, table, group_names, obstacle_groups, wall_groups, is_repeated, variables_of, row_of
-  public :: change_of, full_names, in_motion, never, on_resume
+  public :: change_of, full_names, in_motion, on_resume
   public :: track_of, words_of, excludes, allowed, either, smallest, largest, most_disks, most_threads, name_length
 
   integer, parameter :: name_length = 37, help_length = 1000
@@ -108,6 +108,9 @@ module variables
     variable_t("side", "phase", "real", 1, "fallback", "0", &
       "in periods, at the time 0: at 0 it moves inwards through its place", unit_interval, goes_with="motion sine parabolic", &
       may_change=in_motion), &
+    variable_t("side", "position", "real", 1, "optional", "1", &
+      "where the side is at the start of its motion; default: the box's side", unit="length", &
+      goes_with="motion still constant_velocity piston"), &
     variable_t("side", "velocity", "real", 1, "required", "1", "inwards: with which it strikes (> 0), or moves (< 0: outwards)", &
       unit="length/time", goes_with="motion sawtooth constant_velocity", may_change=in_motion), &
     variable_t("side", "start_time", "real", 1, "fallback", "0", "time at which it starts to move; before, it is at its place", &
@@ -116,7 +119,7 @@ module variables
       "time", goes_with="motion constant_velocity", may_change=in_motion), &
     variable_t("side", "mass", "real", 1, "required", "10", "mass of the piston", positive, "mass", &
       goes_with="motion piston", may_change=in_motion), &
-    variable_t("side", "force", "real", 1, "required", "1", "constant force that pushes the piston inwards", positive, &
+    variable_t("side", "force", "real", 1, "required", "1", "constant force that pushes the piston inwards", not_negative, &
       "energy/length", goes_with="motion piston", may_change=in_motion)]
 
   type(variable_t), parameter :: obstacle_rows(*) = [ &

@@ -8,7 +8,7 @@ module box_geometry
   use kinds, only: int32, never, real64
   use partners, only: axis_of, is_side, n_sides, sense_of, side_name
   use shapes, only: shape_t, spare
-  use side_motion, only: side_motion_t, still
+  use side_motion, only: piston, side_motion_t, still
   implicit none
   private
   public :: box_t, surface_t
@@ -227,7 +227,7 @@ contains
     class(box_t), intent(in) :: self
     logical :: yes
 
-    yes = self%highest_temperature() > 0 .or. self%highest_speed() > 0
+    yes = self%highest_temperature() > 0 .or. self%highest_speed() > 0 .or. any(self%surface%motion%kind == piston)
   end function gives_energy
 
   !> How far sides may be from their places, and disks beyond: left and bottom, right and top.

@@ -86,9 +86,9 @@ contains
       call list%add(path//"/impulse", sim%tally%at_surface(impulse:impulse + 1, k)%value())
       call list%add(path//"/energy", [sim%tally%at_surface(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
-      if (.not. sim%box%surface(k)%motion%drifts()) cycle
+      if (.not. sim%box%surface(k)%motion%travels()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
-      call list%add(path//"/place", [at((k + 1)/2, 2 - modulo(k, 2))])
+      call list%add(path//"/position", [at((k + 1)/2, 2 - modulo(k, 2))])
       associate (motion => sim%box%surface(k)%motion)
         call list%add(path//"/velocity", [motion%velocity(motion%moment(sim%box%epoch, sim%now))])
       end associate

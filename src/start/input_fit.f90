@@ -98,6 +98,10 @@ contains
         if (motion%kind /= constant_velocity .or. motion%strike < 0) cycle
         call bounds(box, motion%end_time, low, high)
         if (product(high - low) > disks) cycle
+        if (.not. motion%strike > 0) then
+          call groups(k)%complain("position", "leaves the disks less than their own area, "//written(disks), problems)
+          cycle
+        end if
         last = motion%end_time - (disks/(high(3 - axis) - low(3 - axis)) - (high(axis) - low(axis)))/motion%strike
         call groups(k)%complain("end_time", "the side would crush the disks, which need at least their own area, "// &
           written(disks)//"; possible: before "//written(last), problems)

@@ -280,10 +280,41 @@ def test_a_stroke_goes_from_begin_to_end_and_stays(observed):
         &species radius = 0.1 position = 0.5, 0.5 velocity = 1, 0 / &stop time = 12 /
         &output frames_every_events = 1 observables_every_time = 2 /"""
     )
-    assert found["/observables/sides/right/place/value"].tolist()[:3] == [1, 1.5, 2.5]
+    assert found["/observables/sides/right/position/value"].tolist()[:3] == [1, 1.5, 2.5]
     assert found["/observables/sides/right/velocity/value"].tolist()[:3] == [0, -0.5, 0]
     v = found["/particles/disks/velocity/value"][:, 0, 0]
     assert v[:4].tolist() == [1, -1, 1, 0]
+
+
+@pytest.mark.parametrize("placement", ["random", "dense", "grid"])
+def test_sides_start_where_their_position_is(observed, placement):
+    """A still one stays there, others begin there; disks start between them, and stay there."""
+    grid = " grid = 15, 6 region = 0.2, 1.5, -0.3, 0.8" * (placement == "grid")
+    found = observed(
+        f"""&box upper = 2, 1 / &side name = 'right' position = 1.5 /
+        &side name = 'left' motion = 'constant_velocity' position = 0.2
+        velocity = 0.1 start_time = 1 end_time = 3 /
+        &side name = 'top' motion = 'piston' position = 0.8 mass = 10 force = 0 /
+        &side name = 'bottom' position = -0.3 temperature = 1 /
+        &species count = 90 radius = 0.02 temperature = 1 placement = '{placement}'{grid} /
+        &stop time = 5 / &output frames_every_time = 0.5 observables_every_time = 0.5 /"""
+    )
+    places = {
+        name: np.ravel(found[f"/observables/sides/{name}/position/value"])
+        for name in ("left", "right", "bottom", "top")
+    }
+    assert places["right"].tolist() == [1.5] * 11 and places["bottom"].tolist() == [-0.3] * 11
+    expected = 0.2 + 0.1 * np.clip(np.arange(11) / 2 - 1, 0, 2)
+    assert places["left"] == pytest.approx(expected, abs=1e-15)
+    assert places["top"][0] == 0.8 and np.all(np.diff(places["top"]) > 0), "only the gas pushes"
+    v = np.ravel(found["/observables/sides/top/velocity/value"])
+    impulse = found["/observables/sides/top/impulse/value"][:, 1]
+    assert 10 * -v == pytest.approx(impulse, rel=1e-12)
+    x = found["/particles/disks/position/value"]
+    for axis, (low, high) in enumerate([("left", "right"), ("bottom", "top")]):
+        assert np.all(x[..., axis] > places[low][:, None] + 0.02 - 1e-12)
+        assert np.all(x[..., axis] < places[high][:, None] - 0.02 + 1e-12)
+    assert not list(laws_broken(found))
 
 
 def test_disks_meet_wherever_a_side_that_they_push_goes(observed):
@@ -309,7 +340,7 @@ def test_a_side_that_disks_push_keeps_momentum_and_energy(observed):
         &contact restitution = 0.99 wall_restitution = 1 /
         &output observables_every_time = 0.02 /"""
     )
-    names = ("place", "velocity", "impulse")
+    names = ("position", "velocity", "impulse")
     place, v, impulse = (found[f"/observables/sides/right/{name}/value"] for name in names)
     time = found["/observables/total_energy/time"]
     energy, lost, work = (

@@ -229,6 +229,41 @@ def test_a_saved_simulation_goes_on_in_the_program_and_back(program, tmp_path, w
     assert np.array_equal(gas.velocity, whole.velocity[-1])
 
 
+def test_a_side_is_held_moved_and_released_where_it_is():
+    """The energy balance stays closed, and the input of then starts with the side in its place."""
+    side = "side.right"
+    system = {
+        "box": {"upper": [2, 1]},
+        "side": {"name": "right", "motion": "piston", "mass": 10, "force": 100},
+        "species": {"count": 60, "radius": 0.02, "temperature": 1},
+        "stop": {"time": 9},
+    }
+    held = {f"{side}.motion": "still", f"{side}.mass": None, f"{side}.force": None}
+    moved = {f"{side}.motion": "constant_velocity", f"{side}.velocity": 0.1}
+    moved |= {f"{side}.start_time": 3, f"{side}.end_time": 5}
+    free = {f"{side}.motion": "piston", f"{side}.mass": 5, f"{side}.force": 0}
+    free |= {name: None for name in moved if "time" in name or "velocity" in name}
+    gas = Simulation(system)
+
+    def balance():
+        now = {name: gas.observable(name) for name in ("total_energy", "dissipated_energy", "work")}
+        return now["total_energy"] + now["dissipated_energy"] - now["work"]
+
+    start, fewest = balance(), []
+    for k, change in enumerate([held, moved, free, held]):
+        place = gas.advance(time=1.0 + 1.5 * k).observable("sides/right/position")
+        gas.change(change)
+        assert gas.observable("sides/right/position") == pytest.approx(place, rel=1e-15)
+        again = Simulation(gas.input)
+        if change is not moved:
+            assert again.observable("sides/right/position") == pytest.approx(place, rel=1e-15)
+        fewest.append(gas.observable("sides/right/collisions"))
+    assert np.all(np.diff(fewest) > 0), "it is hit between any two changes"
+    place = gas.observable("sides/right/position")
+    assert gas.advance(time=8).observable("sides/right/position") == place
+    assert balance() == pytest.approx(start, rel=1e-12)
+
+
 def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypatch):
     """With the input that was saved; that of the start is refused by name."""
     monkeypatch.chdir(tmp_path)

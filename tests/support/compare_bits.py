@@ -35,6 +35,7 @@ OLD_WORDS = {
 }
 # The present names of what it writes: a pattern and its replacement.
 OLD_PATHS = {
+    r"(/observables/sides/\w+)/place(?=[/@]|$)": r"\1/position",
     r"(/parameters/side/\w+@)begin$": r"\1start_time",
     r"(/parameters/side/\w+@)end$": r"\1end_time",
 }

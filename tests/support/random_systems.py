@@ -170,12 +170,17 @@ class Draw:
                 elif kind == "piston":
                     mass = 10.0 ** rng.uniform(-1, 3)
                     force = mass * self.speed**2 / min(self.edges)
-                    words += f" mass = {mass!r} force = {force * 10.0 ** rng.uniform(-2, 1)!r}"
+                    force *= rng.choice([0, 1, 1, 1]) * 10.0 ** rng.uniform(-2, 1)
+                    words += f" mass = {mass!r} force = {force!r}"
                 else:
                     period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
                     words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"
                     words += f" period = {period!r}"
                     words += self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
+            if not re.search("'(sine|parabolic|sawtooth)'", words) and self.chance(0.25):
+                edge, way = self.edges[k // 2], rng.choice([1e-6, 0.1, 0.7]) * rng.random()
+                end = self.lower[k // 2] + (k % 2) * edge
+                words += f" position = {end + (2 * (k % 2) - 1) * way * edge!r}"
             groups.append(f"&side name = '{name}'{words} /")
         return groups
 

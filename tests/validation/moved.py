@@ -139,7 +139,7 @@ RODS = Member(
 
 def room(*runs: Run) -> Estimate:
     """Mean width and its variance, when the start is over."""
-    tracks = [run.observable("sides/right/place") for run in runs]
+    tracks = [run.observable("sides/right/position") for run in runs]
     widths = [np.ravel(place)[time > time[-1] / 20] for time, place in tracks]
     squares = [(x - x.mean()) ** 2 for x in widths]
     return several([combined([series_mean(one) for one in own]) for own in (widths, squares)])

@@ -235,22 +235,31 @@ class Run:
         One that disks push is between its places at the observables.
         """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
+        inwards = inwards + self.offsets
         for k, place in self.pushed.items():
             end = (self.lower, self.upper)[k % 2][k // 2]
             at = np.interp(time, place.time, np.ravel(place.value))
             inwards[..., k] = (-1) ** k * (at - end)
         return self.lower + inwards[..., ::2], self.upper - inwards[..., 1::2]
 
+    @property
+    def offsets(self) -> np.ndarray:
+        """(4,) how far inwards of the box's sides the sides are at the start of their motion."""
+        ends = [end[axis] for axis in (0, 1) for end in (self.lower, self.upper)]
+        starts = [side.get("position", end) for side, end in zip(self.sides, ends, strict=True)]
+        return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
+
     @cached_property
     def pushed(self) -> dict:
         """Places of the sides that disks push, by their numbers in `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
-        return {k: self.observable(f"sides/{SIDES[k]}/place") for k in free}
+        return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
     def room(self) -> tuple[np.ndarray, np.ndarray]:
         """(2,) corners of what sides that move never leave: the box, and how far they go beyond."""
         swings = np.array([outmost(side) for side in self.sides])
+        swings = np.maximum(0.0, swings - self.offsets)
         for k, place in self.pushed.items():
             beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
             swings[k] = max(0.0, np.max(beyond))
