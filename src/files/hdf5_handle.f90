@@ -62,6 +62,7 @@ contains
     character(len=*), intent(in), optional :: reason    !! if it is known
     integer(int64), intent(in), optional :: needed      !! for it, if not what is unsaved [bytes]
     integer(hsize_t) :: bytes                     ! of the file, with all room that it has been promised
+    integer(int64) :: most
     integer :: known
 
     if (status >= 0 .or. allocated(self%failure)) return
@@ -71,9 +72,10 @@ contains
       self%failure = action//": "//reason
       self%has_reason = .true.
     else if (self%id >= 0 .and. self%unsaved > 0) then
+      most = largest_file()
       call h5fget_filesize_f(self%id, bytes, known)
-      if (known < 0 .or. max(bytes, self%unsaved) <= largest_file()) return
-      self%failure = action//": files may have at most "//written(largest_file())//" bytes (ulimit -f)"
+      if (known < 0 .or. max(bytes, self%unsaved) <= most) return
+      self%failure = action//": files may have at most "//written(most)//" bytes (ulimit -f)"
       self%has_reason = .true.
     end if
   end subroutine check

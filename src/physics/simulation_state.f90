@@ -14,11 +14,9 @@ module simulation_state
   private
   public :: given_t, simulation_t, system_t
 
-  !> How far terms of sums are commonly above the typical ones of the heaviest disks, and at most above those of the lightest.
-  real(real64), parameter :: common = 2.0_real64**7, rare = 2.0_real64**22
   !> Walls and kicks may give more than they commonly do, and nobody knows how much less until they act: units fine enough
-  !> for the energies before that.
-  real(real64), parameter :: finer = 2.0_real64**(-30)
+  !> for the energies before that leave room for the sums of 2**35 terms.
+  real(real64), parameter :: uncommon = 64, finer = 2.0_real64**(-30)
 
   !> What acts on disks.
   type :: system_t
@@ -54,7 +52,7 @@ module simulation_state
     integer(int64) :: changes = 0                 !! of what acts on disks, or of their velocities, since the start of the run
     type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
-    real(real64) :: typical_speed2 = 0.0_real64   !! mean square, the largest at the start and after changes [(length/time)**2]
+    real(real64) :: most_energy = 0.0_real64      !! the largest that it was then and after changes, for the units of sums
   contains
     procedure :: time
     procedure :: has_reached
@@ -80,7 +78,6 @@ module simulation_state
     procedure :: is_driven
     procedure :: start_sums
     procedure :: choose_units
-    procedure :: mean_square_speed
     procedure :: fastest_drive
   end type simulation_t
 
@@ -335,7 +332,7 @@ contains
 
     if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
-    self%typical_speed2 = self%mean_square_speed()
+    self%most_energy = self%start_energy
     call self%choose_units()
   end subroutine start_sums
 
@@ -348,43 +345,24 @@ contains
     speed = sqrt(maxval([0.0_real64, self%drive%speed2([(s, s=1, size(self%species))], self%species%mass)]))
   end function fastest_drive
 
-  !> Mean square of the speeds now, and of those of the rims of disks that turn.
-  pure function mean_square_speed(self) result(speed2)
-    class(simulation_t), intent(in) :: self
-    real(real64) :: speed2                        !! [(length/time)**2]
-    integer(int32) :: i
-
-    speed2 = 0
-    do i = 1, self%n_disks()
-      speed2 = speed2 + (sum(self%velocity(i)**2) + (self%spin(i)*self%disk(i)%radius)**2)/self%n_disks()
-    end do
-  end function mean_square_speed
-
-  !> The units of the sums, from the commonest terms: those of disks with the mean square speed, or that which walls and kicks
-  !> commonly give. Where masses differ widely, collisions of the lightest disks are still summed to 40 binary digits, and
-  !> rare terms of the heaviest exceed the bound of the type, which then takes a little longer.
+  !> The units of the sums, from what a collision can contribute at most given the energy of the start, or what walls and
+  !> kicks commonly give to a disk. Nothing is lost if it is more: disks that fall through periodic sides gain energy for
+  !> ever.
   pure subroutine choose_units(self)
     class(simulation_t), intent(inout) :: self
-    real(real64) :: mass(size(self%disk)), kicked(size(self%species))    ! [mass, (length/time)**2]
-    real(real64) :: speed2, light, heavy, small, large, length
+    real(real64), dimension(size(self%species)) :: mass, kicked    ! [mass, (length/time)**2]
+    real(real64) :: energy, impulse, length
     integer :: s
 
-    mass = self%masses()
-    light = minval(mass)
-    heavy = maxval(mass)
-    small = 2*minval(self%disk%radius)
-    large = 2*maxval(self%disk%radius)
+    mass = self%species%mass
+    kicked = self%drive%speed2([(s, s=1, size(mass))], mass)
+    energy = self%most_energy + sum(self%species%count*mass)*sum(abs(self%box%gravity)*self%box%edges()) &
+      + uncommon*(self%box%highest_temperature() + maxval(mass)*self%box%highest_speed()**2 + maxval(mass*kicked))
+    impulse = sqrt(8*maxval(mass))*sqrt(energy)
     length = maxval(self%box%edges())
-    kicked = self%drive%speed2([(s, s=1, size(kicked))], self%species%mass)
-    speed2 = self%typical_speed2 + sum(abs(self%box%gravity)*self%box%edges()) + self%box%highest_temperature()/light &
-      + self%box%highest_speed()**2 + maxval(kicked)
     call self%tally%make_room(size(self%box%surface))
-    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven())*[ &
-      min(common*heavy, rare*light)*speed2, &
-      min(common*heavy, rare*light)*sqrt(speed2), &
-      min(common*heavy*large, rare*light*small)*sqrt(speed2), &
-      min(common*heavy*length, rare*light*small)*speed2, &
-      min(common*heavy*length, rare*light*small)*sqrt(speed2)])
+    call self%tally%choose_units(merge(finer, 1.0_real64, self%is_driven()) &
+      *[energy, impulse, impulse*2*maxval(self%disk%radius), energy*length, sqrt(energy*maxval(mass))*length])
   end subroutine choose_units
 
 end module simulation_state

@@ -99,9 +99,9 @@ contains
     self%collisions = self%collisions + other%collisions
     self%stuck = self%stuck + other%stuck
     self%collapse = min(self%collapse, other%collapse)
-    call self%sum%include(other%sum)
+    self%sum%units = self%sum%units + other%sum%units
     self%hits = self%hits + other%hits
-    call self%at_surface%include(other%at_surface)
+    self%at_surface%units = self%at_surface%units + other%at_surface%units
   end subroutine include
 
   !> Begins anew in the same units.
@@ -112,9 +112,9 @@ contains
     self%collisions = 0
     self%stuck = 0
     self%collapse = never
-    call self%sum%clear()
+    self%sum%units = 0
     self%hits = 0
-    call self%at_surface%clear()
+    self%at_surface%units = 0
   end subroutine clear
 
 end module tally

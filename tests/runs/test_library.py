@@ -9,6 +9,7 @@ import ctypes
 import gc
 import json
 import os
+import random
 import re
 import signal
 import subprocess
@@ -141,13 +142,14 @@ def kept(system) -> Simulation:
         (lambda gas: gas.next_events("x"), ValueError, "x"),
         (lambda _: kept({"species": {"count": 9, "radius": 0.1}}).advance(), ValueError, "&stop"),
         (lambda gas: gas.change({"species.a.count": 3}), ProgramError, "cannot change"),
+        (lambda gas: gas.change({"gravity": 3}), ProgramError, "gravity: cannot change"),
         (lambda gas: gas.change({"contact.contact_time": 0}), ProgramError, "columns"),
         (lambda gas: gas.change({"contact.restitution": 2}), ProgramError, "from 0 to 1"),
         (lambda gas: setattr(gas, "velocity", np.zeros(3)), ValueError, "(3,)"),
         (lambda gas: setattr(gas, "velocity", gas.velocity * np.nan), ValueError, "below"),
         (lambda gas: setattr(gas, "velocity", 1e90 * gas.velocity), ProgramError, "out of range"),
         (lambda gas: setattr(gas, "mass", gas.mass), AttributeError, "mass"),
-        (lambda gas: setattr(gas, "velocities", gas.velocity), AttributeError, "velocities"),
+        (lambda gas: setattr(gas, "velocities", gas.velocity), AttributeError, "velocity can"),
         (lambda gas: gas.change([("box.gravity", 1)]), TypeError, "a dictionary"),
         (lambda _: Simulation(GAS, threads=0), ValueError, "from 1 to 1024"),
         (lambda _: Simulation.load("no.h5", threads=1.5), ValueError, "not 1.5"),
@@ -317,6 +319,52 @@ def test_numbers_that_c_may_give_are_refused_or_count_as_none():
     assert gas.advance(events=9).events == 9 and np.isfinite(gas.velocity).all()
 
 
+#: What a caller in C may give, sensible or not.
+NUMBERS = np.nan, np.inf, -np.inf, -1.0, 0.0, 0.1, 0.3, 1e-300, 1e100, 1e308
+COUNTS = -(2**31), -5, -1, 0, 1, 5, 60, 500
+SETTINGS = (
+    *("", "=", "gravity", "box.gravity", "box.gravity=", "box.gravity=nan,1", "\n\n", "&box /"),
+    *("box.gravity=0,-1", "contact.restitution=2", "contact.restitution=0.5", "x" * 300),
+    *("species.a.count=3", "stop.time=1", "side.top.temperature=1", "drive.kind=noise"),
+)
+NAMES = "position", "image", "mass", "", "x", "input", "parameters", "changes", "note"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_calls_in_c_have_an_answer(seed):
+    """Whatever the numbers and texts: nothing faults, hangs, or lets a number in that is none."""
+    engine, chance = library(), random.Random(seed)
+    text, values = ctypes.create_string_buffer(20_000), np.empty((600, 6))
+    message = ctypes.create_string_buffer(500)
+    for _ in range(15):
+        gas = Simulation(GAS, {"run.seed": chance.randrange(99)}, threads=chance.choice([1, 2]))
+        for _ in range(10):
+            say = message, min(chance.choice(COUNTS), 500)
+            time, count = chance.choice(NUMBERS), chance.choice(COUNTS)
+            if chance.random() < 0.5:
+                velocity = gas.velocity
+                velocity[chance.randrange(80), chance.randrange(2)] = chance.choice(NUMBERS)
+            else:
+                velocity = 2 * gas.velocity
+            with gas._open() as handle:
+                codes = [
+                    engine.ricochet_advance(handle, time, count, count, 0.01, *say),
+                    engine.ricochet_set_velocities(handle, velocity.ctypes.data, *say),
+                    engine.ricochet_change(handle, chance.choice(SETTINGS).encode(), *say),
+                ]
+                assert set(codes) <= {0, 1, 2, 4}
+                most = engine.ricochet_next_events(handle, count, values.ctypes.data)
+                assert 0 <= most <= max(count, 0)
+                name = chance.choice(NAMES).encode()
+                assert 0 <= engine.ricochet_column(handle, name, values.ctypes.data) <= 2
+                for ask, *rest in (
+                    (engine.ricochet_text, name, text, count),
+                    (engine.ricochet_observables, text, count, values.ctypes.data),
+                ):
+                    assert ask(handle, *rest) >= 0
+            assert np.isfinite([gas.time, *gas.position.flat, *gas.velocity.flat]).all()
+
+
 def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
     """Nothing at the place, no HDF5, HDF5 of others, a run of another program, a damaged one."""
     places = [tmp_path / name for name in ("none.h5", "text.h5", "other.h5", "old.h5", "cut.h5")]
@@ -344,10 +392,11 @@ def test_files_that_are_refused_leave_no_memory_behind(tmp_path):
 
 def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
     """Whatever the bits that are wrong say, in one line."""
-    path = Simulation(GAS).save(tmp_path / "gas.h5")
+    text = GAS.replace("event_log = .true.", "")  # which is allocated as a whole
+    path = Simulation(text).save(tmp_path / "gas.h5")
     whole = path.read_bytes()
-    place = whole.find(GAS.encode())
-    for k in range(0, len(GAS), 7):
+    place = whole.find(text.encode())
+    for k in range(0, len(text), 7):
         damaged = bytearray(whole)
         damaged[place + k] ^= 1 << k % 8
         path.write_bytes(damaged)

@@ -26,15 +26,13 @@ eighth of it, and none (NaN) for longer ones.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ..reading.files import RunError
 from ..reading.nature import KICKED, TRAITS, allow
-from ..reading.reader import Run
+from ..reading.reader import Run, RunError
 from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
 from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
@@ -90,7 +88,7 @@ class Correlator:
     def __init__(
         self,
         source: Run | Simulation,
-        times: ArrayLike,
+        times: Sequence[float],
         waves: Iterable[float] = (),
         reach: float | None = None,
         lags: np.ndarray | None = None,
@@ -114,10 +112,8 @@ class Correlator:
         self.pairs = np.zeros(size)
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
         self.done = 0  # samples
-        self.held: dict[
-            int, tuple[np.ndarray, np.ndarray, int]
-        ] = {}  # by number: place, velocity, the last partner
-        self.due: dict[int, list[tuple[int, int]]] = {}  # by number: its (origin, lag)
+        self.held: dict[int, tuple] = {}  # by number: place, velocity, the last partner
+        self.due: dict[int, list] = {}  # by number: its (origin, lag)
         self.last = np.full(len(self.lags), -1.0)  # where in the time of a lag its last origin was
 
     def follow(self, source: Run | Simulation) -> Self:
@@ -140,19 +136,16 @@ class Correlator:
         part = np.where(self.lags > 0, np.floor(since + 1e-6), now)
         fresh = np.flatnonzero(there & (part > self.last))
         self.last[fresh] = part[fresh]
-        for lag in fresh.tolist():
+        for lag in fresh:
             self.due.setdefault(int(partner[lag]), []).append((now, lag))
         if len(fresh):
             self.held[now] = place, velocity, partner[fresh].max()
         if now in self.due:
-            origins, lags = np.transpose(self.due.pop(now))
-            self.count(origins, lags, place, velocity)
+            self.count(*np.transpose(self.due.pop(now)), place, velocity)
         self.held = {k: one for k, one in self.held.items() if one[2] > now}
         self.done += 1
 
-    def count(
-        self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
-    ) -> None:
+    def count(self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray):
         """Pairs of this sample with the origins (P,), at these lags."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
@@ -183,7 +176,7 @@ class Correlator:
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
-def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:
     """Places, continuous in time, and velocities at these times, as far as there are any."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
@@ -255,6 +248,6 @@ def correlators(
     return found
 
 
-def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]:
+def measured(runs: Sequence[Run], **options) -> dict[str, dict[str, Curve]]:
     """The curves of runs that differ by their seed; options as of `correlators`."""
     return curves(correlators(runs, **options))

@@ -10,7 +10,6 @@ both: a file, a file that is still being written and a simulation in memory have
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -57,7 +56,7 @@ class Refused(RunError):
     """A run that a law does not hold for; the message names the cause."""
 
 
-class Nature(frozenset[str]):
+class Nature(frozenset):
     """The traits of a run."""
 
     @property
@@ -92,7 +91,7 @@ class Nature(frozenset[str]):
 
 
 def nature_of(
-    parameters: Mapping[str, Any],
+    parameters: Mapping,
     mass: np.ndarray,
     radius: np.ndarray,
     lost: float,
@@ -150,7 +149,7 @@ def nature_of(
     return Nature(name for name, there in found.items() if there)
 
 
-def held_round(parameters: Mapping[str, Any]) -> bool:
+def held_round(parameters: Mapping) -> bool:
     """Whether nothing but one round container, which does not reach the sides, holds the disks."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
@@ -160,18 +159,18 @@ def held_round(parameters: Mapping[str, Any]) -> bool:
     return bool(gap.min() >= rows[0]["radius"] * (1 - ROUNDING))
 
 
-def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows_of(group: Mapping) -> list[dict]:
     """The obstacles, or the straight walls, one by one: the file has a column for each variable."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def known(value: Any) -> bool:
+def known(value: object) -> bool:
     """Whether a variable was given: a wall among others that has none is NaN, or 0, there."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
-def allow(run: Any, law: str, *traits: str) -> None:
+def allow(run, law: str, *traits: str) -> None:
     """Refuse a run that has any trait but these; `law` says in words what is not for it."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:

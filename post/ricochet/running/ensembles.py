@@ -22,7 +22,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TextIO
 
 import numpy as np
 
@@ -31,20 +31,17 @@ from ..reading.reader import committed, series_in
 from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
 from .simulation import Simulation, read_input
 
-if TYPE_CHECKING:
-    import pandas
-
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # s, between two looks whether members are still wanted
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
 
 
 def sweep(
-    system: str | Path | Mapping[str, Any],
-    values: Mapping[str, Any],
+    system: str | Path | Mapping,
+    values: Mapping[str, object],
     folder: str | Path,
     executor: Executor | None = None,
-) -> "pandas.DataFrame":
+):
     """Run every combination of values, the first varying slowest; a DataFrame as of `ensemble`.
 
     `system` is that of `ricochet.run`; a variable has a list of values (None is its default), or
@@ -55,14 +52,14 @@ def sweep(
     import pandas  # noqa: F401 (who has none hears of it before members run)
 
     text = read_input(system)
-    choices = {
+    values = {
         name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
         for name, own in values.items()
     }
-    if not choices:
+    if not values:
         raise ValueError("sweep: there are no values; ricochet.run makes a single run")
-    members = combinations(choices)
-    check(text, choices)
+    members = combinations(values)
+    check(text, values)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     overrides = {name: words_of(settings) for name, settings in members.items()}
@@ -86,7 +83,7 @@ def sweep(
     return ensemble(folder)
 
 
-def check(text: str, values: Mapping[str, list[Any]]) -> None:
+def check(text: str, values: Mapping[str, list]) -> None:
     """Refuse now what a member would refuse: each value, with the first of the other variables."""
     first = {name: own[0] for name, own in values.items() if own}
     for name, own in values.items():
@@ -96,7 +93,7 @@ def check(text: str, values: Mapping[str, list[Any]]) -> None:
                     raise ProgramError("stop: no rule ends a member", 2)
 
 
-def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]]:
+def combinations(values: Mapping[str, list]) -> dict[str, dict[str, object]]:
     """The settings of each member by its name, which is that of runs/ensemble.sh."""
     choices = [[(name, value) for value in own] for name, own in values.items()]
     members = {}
@@ -152,7 +149,7 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
                 f"{folder}: holds a member '{name}' with other settings ({before[name]})"
             )
     put(path, text)
-    lines = sorted(f"{name}\t{rest}\n" for name, rest in {**before, **overrides}.items())
+    lines = sorted(f"{name}\t{rest}\n" for name, rest in (before | overrides).items())
     put(folder / "manifest.txt", "".join(lines))
 
 
@@ -165,8 +162,8 @@ def put(path: Path, text: str) -> None:
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """The finished and the unfinished file of a member, where there are."""
-    whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
-    return whole if whole.is_file() else None, part if part.is_file() else None
+    paths = folder / f"{name}.h5", folder / f"{name}.h5.part"
+    return tuple(path if path.is_file() else None for path in paths)
 
 
 def log_of(path: Path) -> TextIO:
@@ -230,9 +227,9 @@ def wanted(mark: Path) -> bool:
     return mark.exists()
 
 
-def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
+def finished_with(command: list, mark: Path, **pipes: object) -> int:
     """The exit code of a command, which ends, with a checkpoint, when nobody wants it any more."""
-    process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
+    process = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -242,7 +239,7 @@ def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
     finally:
         process.terminate()  # nothing, if it has ended
         parent = multiprocessing.parent_process()
-        if parent and parent.pid and not is_there(parent.pid):
+        if parent and not is_there(parent.pid):
             os._exit(STOPPED)  # this process of a pool would wait for work for ever
 
 
@@ -269,7 +266,7 @@ def failed(folder: Path, name: str) -> bool:
 # --- the table ---
 
 
-def ensemble(folder: str | Path) -> "pandas.DataFrame":
+def ensemble(folder: str | Path):
     """A pandas DataFrame (needs that package) of the members of a folder, a row for each.
 
     Columns: member; one for each override, named in full; seed; state: 'finished', 'unfinished' or
@@ -281,7 +278,7 @@ def ensemble(folder: str | Path) -> "pandas.DataFrame":
     return pandas.DataFrame(gathered(Path(folder)))
 
 
-def gathered(folder: Path) -> list[dict[str, Any]]:
+def gathered(folder: Path) -> list[dict]:
     """The rows of `ensemble`."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
@@ -295,15 +292,15 @@ def gathered(folder: Path) -> list[dict[str, Any]]:
     return [row_of(folder, name, overrides[name]) for name in sorted(overrides, key=in_order)]
 
 
-def in_order(name: str) -> list[tuple[int, float, str]]:
+def in_order(name: str) -> list:
     """Members by their names, numbers in them by size."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
-def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
+def row_of(folder: Path, name: str, overrides: str) -> dict:
     """What there is of a member."""
-    row: dict[str, Any] = {"member": name}
+    row: dict = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
     said = last_words(folder, name)
@@ -326,7 +323,7 @@ def typed(value: str) -> object:
         return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):
         return value.strip(".").lower()[0] == "t"
-    numbers: list[float] = []
+    numbers = []
     for word in value.split(","):
         for kind in (int, float):
             try:
@@ -339,7 +336,7 @@ def typed(value: str) -> object:
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 
-def last_values(path: Path) -> dict[str, Any]:
+def last_values(path: Path) -> dict:
     """Seed, wall time, and the last value of each scalar observable; the file is opened once."""
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}
