@@ -239,13 +239,16 @@ checked:
 
 # Other systems each day; SEED=20270131 has those of that day again.
 SYSTEMS ?= 200
+CHANGED ?= 300
 SEED ?= $(shell date +%Y%m%d)
-check:  ## validates physics, provokes faults, SYSTEMS=200 random runs
+check:  ## validates physics, provokes faults, SYSTEMS=200 random runs, CHANGED=300
 	@.ci/set-up demo test check
 	@$(MAKE) $(jobs) all
 	@LIMIT=1200 $(MAKE) $(jobs) suites=tests/long unit-tests
 	@SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -m check tests
 	@SYSTEMS=$(SYSTEMS) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_random_systems.py -k all_ways
+	@$(MAKE) library
+	@SYSTEMS=$(CHANGED) SEED=$(SEED) RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) -m pytest -q -n auto tests/runs/test_changes.py -k continues_exactly
 	@RICOCHET="$$(realpath '$(BUILD)')/ricochet" $(venv) tests/validate.py --report '$(BUILD)/validation'
 
 bench: all  ## measures collisions per second; FULL=1, and more; bench-lab

@@ -10,9 +10,9 @@ module library
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: check_speeds
-  use input_groups, only: group_t
+  use input_groups, only: group_t, same_value, same_values
   use input_problems, only: problem_list_t
-  use kinds, only: int64, never, real64
+  use kinds, only: int32, int64, never, real64
   use moments, only: frame_column_t, frame_columns, frame_sample
   use observables, only: observable_list_t, observed
   use namelist_input, only: read_groups
@@ -21,7 +21,7 @@ module library
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
   use status_line, only: status_line_t
-  use stop_rules, only: stop_rule_t
+  use stop_rules, only: coldness, stop_rule_t
   use system, only: seconds
   use team, only: make_team
   use texts, only: eol, growing_text_t, lines_of, place_of, text_t, written, written_exactly
@@ -121,11 +121,7 @@ contains
       return
     end if
     if (time < never .or. min(collisions, events) < huge(events)) then
-      rule = stop_rule_t()
-      rule%limits%time = min(time, never)
-      rule%limits%collisions = collisions
-      rule%limits%events = events
-      rule%limits%at_rest = session%rule%limits%at_rest
+      rule%limits = limits_t(time=min(time, never), collisions=collisions, events=events, at_rest=rule%limits%at_rest)
     end if
     call make_team(session%input%settings%run%threads)
     began = seconds()
@@ -177,6 +173,8 @@ contains
       call resolve_input(input, complete, problems, error, stepped=.true.)
     end if
     if (.not. allocated(error)) then
+      code = 0
+      if (changes_nothing(session, lines, input)) return
       changed = session%sim
       call change_system(changed, input%settings%system_t, problem)
       if (problem /= "") call fail(error, exit_usage, problem)
@@ -192,6 +190,38 @@ contains
     end if
     code = answer(error, message, room)
   end function change
+
+  !> Whether no value differs between the present input and a changed one. A side that the present one does not name has
+  !> the defaults.
+  function changes_nothing(session, lines, input) result(yes)
+    type(session_t), intent(in) :: session
+    type(text_t), intent(in) :: lines(:)              !! GROUP.VARIABLE=VALUE
+    type(run_input_t), intent(in) :: input            !! the changed one
+    logical :: yes, complete, new(size(lines))
+    type(run_input_t) :: present
+    type(problem_list_t) :: problems
+    type(error_t), allocatable :: error
+    integer :: g, k
+
+    associate (groups => session%input%groups)
+      new = [(index(lines(k)%text, "side.") == 1, k=1, size(lines))]
+      do k = 1, size(lines)
+        if (any([(groups(g)%name == "side" .and. index(lines(k)%text, "side."//trim(groups(g)%instance)//".") == 1, &
+          g=1, size(groups))])) new(k) = .false.
+      end do
+    end associate
+    present%path = input%path
+    present%overrides = pack(lines, new)
+    do k = 1, size(present%overrides)
+      associate (override => present%overrides(k))
+        override%text = override%text(:index(override%text, "="))      ! without a value
+      end associate
+    end do
+    call read_groups(input_of(session%input%groups), present%overrides, present%groups, problems, complete)
+    call resolve_input(present, complete, problems, error, stepped=.true.)
+    yes = .not. allocated(error)
+    if (yes) yes = same_values(present%groups, input%groups)
+  end function changes_nothing
 
   !> Gives sides whose motion changes the position from which the new motion continues where the old one is now.
   subroutine keep_sides(session, groups)
@@ -211,8 +241,11 @@ contains
         old = findloc(before%name == "side" .and. before%instance == group%instance, .true., dim=1)
         same = old > 0
         do k = 1, size(of_motion)
-          if (same) same = group%value_line(row_of("side", trim(of_motion(k)))) &
-            == before(old)%value_line(row_of("side", trim(of_motion(k))))
+          if (.not. same) exit
+          associate (new => group%values(row_of("side", trim(of_motion(k)))), &
+            then => before(old)%values(row_of("side", trim(of_motion(k)))))
+            same = .not. (new%given .or. then%given) .or. same_value(new, then)
+          end associate
         end do
         if (same) cycle
         inwards = 2*modulo(side, 2) - 1               ! along the axis
@@ -243,6 +276,8 @@ contains
     type(session_t), pointer :: session
     type(simulation_t) :: changed
     type(error_t), allocatable :: error
+    real(real64), allocatable :: v(:, :)              ! (2,n) [length/time]
+    integer(int32) :: i
 
     session => session_of(handle)
     changed = session%sim
@@ -251,7 +286,10 @@ contains
       code = answer(error, message, room)
       return
     end if
-    call change_velocities(changed, reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())]))
+    v = reshape(values(:2*changed%n_disks()), [2, int(changed%n_disks())])
+    code = 0
+    if (all([(abs(v(:, changed%tag(i)%id) - changed%velocity(i)) <= 0, i=1, changed%n_disks())])) return
+    call change_velocities(changed, v)
     call check_motion(changed, session%input%path, error)
     if (.not. allocated(error)) then
       session%input%changes = changes_of(session)//written_exactly(changed%time())//" velocity"//eol
@@ -287,6 +325,7 @@ contains
     type(simulation_t), intent(in) :: sim
 
     session%sim = sim
+    session%rule = stop_rule_t(session%input%settings%stop, session%sim)
     call choose_evolution(session%input%settings, session%evolution)
     call session%evolution%start(session%sim)
   end subroutine renew
@@ -400,6 +439,7 @@ contains
         call growing%add(changes_of(session))
       case default
         call growing%add(passed_collapse(session%sim))
+        if (session%rule%too_cold(session%sim)) call growing%add(trim(merge("; ", "  ", growing%text() /= ""))//coldness)
       end select
     end associate
     words = growing%text()

@@ -46,7 +46,7 @@ int ricochet_change(ricochet *, const char *overrides, char *message, int room);
 int ricochet_set_velocities(ricochet *, const double *velocities, char *message, int room);
 
 /* Copies a text about this moment: `input`, a file with overrides and changes; `parameters`, GROUP.VARIABLE = JSON for each
-   that has a value; `changes`, TIME GROUP.VARIABLE=VALUE for each; `note`, of a collapse that was passed. Returns its bytes
+   that has a value; `changes`, TIME GROUP.VARIABLE=VALUE for each; `note`, of a collapse that was passed, or of a gas too cold to go on. Returns its bytes
    without the zero at its end; without room for all nothing is copied. */
 int ricochet_text(ricochet *, const char *what, char *text, int room);
 

@@ -17,7 +17,7 @@ module run
   use run_setup, only: choose_evolution, new_simulation, read_input, start_threads
   use settings, only: run_input_t
   use simulation_state, only: simulation_t
-  use stop_rules, only: stop_rule_t
+  use stop_rules, only: coldness, stop_rule_t
   use signals, only: checkpoint_requests, end_at_signals, stop_requested, watch_signals
   use system, only: folder_of, is_folder, print_text, seconds
   use tally, only: dissipated, drive_energy
@@ -29,7 +29,6 @@ module run
 
   integer, parameter :: most_unwritten = 4096              !! collisions in the event log
   integer(int64), parameter :: much = 250000000             !! of output, to say so before it is written [bytes]
-  character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
 
   type :: run_t
     type(command_t) :: command

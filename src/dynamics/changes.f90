@@ -3,6 +3,7 @@
 module changes
   use box_sides, only: bounds
   use disks, only: land
+  use epochs, only: begin_anew
   use kinds, only: int32, int64, real64
   use partners, only: n_sides
   use observables, only: total_energy
@@ -51,6 +52,7 @@ contains
     call land_all(sim)
     sim%system_t = other%system_t
     call count_kicks()
+    call begin_anew(sim)
     call book(sim, before)
   contains
 
@@ -80,12 +82,14 @@ contains
       old = sim%disk(i)%v
       sim%disk(i)%v = v(:, sim%tag(i)%id)
       call sim%note_change(i, old, sim%now)
-      sim%tag(i)%met = 0                                     ! what it met last, it may meet again at once, as after a kick
     end do
+    sim%given_energy = sim%kinetic_energy()
+    call begin_anew(sim)
     call book(sim, before)
   end subroutine change_velocities
 
-  !> Takes all disks to where they are now, as flights under one law.
+  !> Takes all disks to where they are now, as flights under one law. Their clocks are equal then, so that no collision may
+  !> pass for one that rounding left of an earlier one: what a disk met last, it may meet again at once, as after a kick.
   subroutine land_all(sim)
     type(simulation_t), intent(inout) :: sim
     integer(int32) :: i
@@ -93,11 +97,11 @@ contains
     do i = 1, sim%n_disks()
       call sim%turn(i, sim%now)
       call land(sim%disk(i), sim%box%gravity, sim%now)
+      sim%tag(i)%met = 0
     end do
   end subroutine land_all
 
-  !> Notes the energy that a change has given, in sums as fine as a run with this system has them. Disks may be faster or
-  !> slower now: how long the epoch is, and what a blink, is found anew.
+  !> Notes the energy that a change has given, in sums as fine as a run with this system has them.
   subroutine book(sim, before)
     type(simulation_t), intent(inout) :: sim
     real(real64), intent(in) :: before                       !! the total energy then [energy]
@@ -106,7 +110,6 @@ contains
     sim%most_energy = max(sim%most_energy, sim%kinetic_energy(), abs(total_energy(sim) - before))
     call sim%choose_units()
     call sim%tally%sum(work)%add(total_energy(sim) - before)
-    sim%epoch_end = 0
   end subroutine book
 
 end module changes

@@ -10,7 +10,7 @@ module epochs
   use simulation_state, only: simulation_t
   implicit none
   private
-  public :: are_crushed, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
+  public :: are_crushed, begin_anew, begin_first_epoch, is_at_rest, last_time, most_events, move_epoch, stands_still
 
   !> Pair collisions per disk after which the origin of time should move, so that times keep their digits.
   integer(int64), parameter :: epoch_length = 24
@@ -91,32 +91,45 @@ contains
       events_per_epoch(sim)/real(max(sim%tally%events - sim%epoch_events, 1_int64), real64))
     shift = scale(aint(scale(fraction(sim%now), significant_bits)), exponent(sim%now) - significant_bits)
     call renumber(sim)
-    call move_origin()
+    call move_origin(sim, shift)
     call begin_epoch(sim, length)
-  contains
-
-    !> Moves the origin from which moments of this epoch count, and lets all events be stale.
-    subroutine move_origin()
-      integer(int32) :: i
-
-      do i = 1, sim%n_disks()
-        sim%disk(i)%clock = sim%disk(i)%clock - shift
-        sim%disk(i)%stamp = 0
-      end do
-      if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
-      sim%now = sim%now - shift
-      sim%epoch = sim%epoch + shift
-      sim%last_advance = sim%last_advance - shift
-      sim%box%epoch = sim%epoch
-      associate (motion => sim%box%surface(:n_sides)%motion)    ! only sides move
-        motion%clock = motion%clock - shift
-        if (.not. any(motion%travels())) return
-      end associate
-      do i = 1, sim%n_disks()
-        call keep_off_sides(sim%box, sim%disk(i), sim%now)
-      end do
-    end subroutine move_origin
   end subroutine move_epoch
+
+  !> Ends the epoch now because the disks, or what acts on them, have been changed: what happens next may be faster by any
+  !> factor, so the origin of time moves to this very moment, and the length of the epoch is found anew when the evolution
+  !> starts. Time steps count from the start of the run and have no epochs.
+  subroutine begin_anew(sim)
+    type(simulation_t), intent(inout) :: sim
+
+    if (.not. sim%epoch_end > 0) return
+    call renumber(sim)
+    call move_origin(sim, sim%now)
+    sim%epoch_end = 0
+  end subroutine begin_anew
+
+  !> Moves the origin from which moments of this epoch count, and lets all events be stale.
+  subroutine move_origin(sim, shift)
+    type(simulation_t), intent(inout) :: sim
+    real(real64), value :: shift                    !! [time]
+    integer(int32) :: i
+
+    do i = 1, sim%n_disks()
+      sim%disk(i)%clock = sim%disk(i)%clock - shift
+      sim%disk(i)%stamp = 0
+    end do
+    if (sim%law%contact_time > 0) sim%extra%last_contact = sim%extra%last_contact - shift
+    sim%now = sim%now - shift
+    sim%epoch = sim%epoch + shift
+    sim%last_advance = sim%last_advance - shift
+    sim%box%epoch = sim%epoch
+    associate (motion => sim%box%surface(:n_sides)%motion)    ! only sides move
+      motion%clock = motion%clock - shift
+      if (.not. any(motion%travels())) return
+    end associate
+    do i = 1, sim%n_disks()
+      call keep_off_sides(sim%box, sim%disk(i), sim%now)
+    end do
+  end subroutine move_origin
 
   !> The number of events at which an epoch ends early, as it has had far more than it should: at the end of bouncing.
   pure function most_events(sim) result(n)

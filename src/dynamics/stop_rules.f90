@@ -2,7 +2,8 @@
 !>
 !> In a periodic box inelastic disks cool until they all drift together, with only the common momentum that rounding
 !> left. The temperature has lost all its digits long before that, so the run ends when the gas is that cold. This
-!> is checked whenever the epoch has moved, so that the end depends on the trajectory alone.
+!> is checked whenever the epoch has moved, so that the end depends on the trajectory alone. The energy is compared with that
+!> of the velocities as they were given: digits are lost from then on only.
 module stop_rules
   use kinds, only: int32, int64, never, real64
   use epochs, only: is_at_rest, stands_still
@@ -12,9 +13,10 @@ module stop_rules
   use timeline, only: next_kick
   implicit none
   private
-  public :: stop_rule_t, stop_settings_t, whole_collisions
+  public :: coldness, stop_rule_t, stop_settings_t, whole_collisions
 
   real(real64), parameter :: coldest = 1.0e-25_real64        !! temperature over the first one
+  character(len=*), parameter :: coldness = "cooled to 1e-25 of the first temperature"
 
   !> A rule that is not given is never met.
   type :: stop_settings_t
@@ -100,7 +102,7 @@ contains
 
     yes = .false.
     if (self%cools .and. sim%tally%events > 0 .and. sim%tally%events == sim%epoch_events) &
-      yes = relative_energy(sim) <= coldest*sim%start_energy
+      yes = relative_energy(sim) < coldest*sim%given_energy
   end function too_cold
 
   !> Whether a run has come to its end: a rule is met, only rounding is left to follow, or nothing will ever happen any more

@@ -7,7 +7,7 @@ module input_groups
   use texts, only: growing_text_t, written, written_exactly
   implicit none
   private
-  public :: value_t, group_t, text_length, range_of, json_text
+  public :: value_t, group_t, text_length, range_of, json_text, same_value, same_values
 
   integer, parameter :: text_length = 512      !! longest text value, in bytes
   integer, parameter, public :: most_written = 100      !! values of a variable in an assignment: longer lists are cut
@@ -71,6 +71,35 @@ contains
       read (self%texts, *) numbers
     end if
   end function integers
+
+  !> Whether no variable differs between the groups of two inputs, given or by default.
+  pure function same_values(one, other) result(yes)
+    type(group_t), intent(in) :: one(:), other(:)  !! in the same order
+    logical :: yes
+    integer :: g, k
+
+    yes = size(one) == size(other)
+    do g = 1, merge(size(one), 0, yes)
+      do k = 1, size(one(g)%values)
+        yes = yes .and. same_value(one(g)%values(k), other(g)%values(k))
+      end do
+    end do
+  end function same_values
+
+  !> Whether two values of a variable are the same.
+  pure function same_value(one, other) result(yes)
+    type(value_t), intent(in) :: one, other
+    logical :: yes
+
+    yes = (allocated(one%reals) .eqv. allocated(other%reals)) .and. (allocated(one%texts) .eqv. allocated(other%texts))
+    if (yes .and. allocated(one%reals)) then
+      yes = size(one%reals) == size(other%reals)
+      if (yes) yes = all(.not. abs(one%reals - other%reals) > 0)
+    else if (yes .and. allocated(one%texts)) then
+      yes = size(one%texts) == size(other%texts)
+      if (yes) yes = all(one%texts == other%texts)
+    end if
+  end function same_value
 
   !> Takes the value away.
   pure subroutine clear(self)

@@ -60,6 +60,7 @@ contains
 
     do g = 1, size(groups)
       do k = 1, size(groups(g)%values)
+        if (groups(g)%values(k)%name == "relative_to") cycle           ! is in the values of others
         if (.not. groups(g)%values(k)%is_set() .or. table(groups(g)%values(k)%row)%may_change == on_resume) cycle
         call growing%add(groups(g)%value_line(k)//eol)
       end do
@@ -402,6 +403,7 @@ contains
     call record%exchange(file, sim%last_advance)
     call record%exchange(file, sim%events_then)
     call record%exchange(file, sim%start_energy)
+    call record%exchange(file, sim%given_energy)
     call record%exchange(file, sim%most_energy)
     call record%exchange(file, sim%kicks)
     call record%exchange(file, sim%changes)

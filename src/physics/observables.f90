@@ -61,14 +61,14 @@ contains
     call list%add("pressure", [pressure(sim, sums(own_kinetic, 0))])
     call list%add("virial", [sim%tally%total(virial)])
     call list%add("dissipated_energy", [sim%tally%total(dissipated)])
-    if (sim%drive%is_on()) call list%add("drive_energy", [sim%tally%total(drive_energy)])
+    if (sim%drive%is_on() .or. sim%changes > 0) call list%add("drive_energy", [sim%tally%total(drive_energy)])
     call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
     associate (hits => sim%tally%hits, at_surface => sim%tally%at_surface)
       call list%add("wall_collisions", real(hits(:n_sides), real64), is_count=.true.)
       call list%add("wall_impulse", abs([at_surface(impulse, 1:2)%value(), at_surface(impulse + 1, 3:4)%value()]))
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
-    if (sim%box%highest_temperature() > 0) call list%add("heat", [sim%tally%total(heat)])
+    if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%highest_speed() > 0 .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
     if (sim%with%stress) then
       call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))

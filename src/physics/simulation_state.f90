@@ -52,6 +52,7 @@ module simulation_state
     integer(int64) :: changes = 0                 !! of what acts on disks, or of their velocities, since the start of the run
     type(tally_t) :: tally                        !! counts and sums since the start of the run
     real(real64) :: start_energy = 0.0_real64     !! kinetic energy at the start
+    real(real64) :: given_energy = 0.0_real64     !! kinetic energy when the velocities were last given, at the start or by a change
     real(real64) :: most_energy = 0.0_real64      !! the largest that it was then and after changes, for the units of sums
   contains
     procedure :: time
@@ -332,6 +333,7 @@ contains
 
     if (self%tally%sum(1)%per_one > 0 .or. self%n_disks() == 0) return
     self%start_energy = self%kinetic_energy()
+    self%given_energy = self%start_energy
     self%most_energy = self%start_energy
     call self%choose_units()
   end subroutine start_sums

@@ -27,6 +27,7 @@ class System(NamedTuple):
     table: np.ndarray
     disks: int
     events: int
+    draw: "Draw"  #: draws more that fits, for changes
 
     def features(self) -> set[str]:
         """What it draws: variables, kinds, and how the box is closed."""
@@ -53,10 +54,11 @@ def numbers(*values: float) -> str:
 class Draw:
     """One system in the making: what earlier choices mean for later ones."""
 
-    def __init__(self, rng: random.Random):
+    def __init__(self, rng: random.Random, most: int):
         """The scales, and what others depend on."""
         self.rng = rng
         self.disks = rng.choice([rng.randint(1, 12), rng.randint(20, 400), rng.randint(2600, 6000)])
+        self.disks = 1 + (self.disks - 1) % most
         self.length = 10.0 ** rng.choice([0, 0, 0, rng.randint(-6, 6)])
         self.speed = 10.0 ** rng.choice([0, 0, 0, rng.randint(-6, 6)])
         aspect = rng.choice([1, 1, 2, 10, 100, 1000]) ** rng.choice([-0.5, 0.5])
@@ -144,45 +146,44 @@ class Draw:
 
     def sides(self) -> list[str]:
         """Laws and motions of the sides of the box."""
-        rng, groups = self.rng, []
+        groups = []
         for k, name in enumerate(SIDES):
             if self.periodic[k // 2] or self.chance(0.65):
                 continue
             words = self.law()
             if "temperature" not in words and "speed" not in words and self.chance(0.6):
-                self.worked = True
-                kinds = [
-                    "constant_velocity",
-                    "parabolic",
-                    "sawtooth",
-                    "sine",
-                    *["piston"] * (not self.steps),
-                ]
-                kind = rng.choice(kinds)
-                words += f" motion = '{kind}'"
-                if kind == "sawtooth":
-                    words += f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
-                elif kind == "constant_velocity":
-                    speed = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-2, 0.5)
-                    begin = rng.choice([0, rng.random()]) * min(self.edges) / self.speed
-                    end = begin + rng.uniform(0, 0.1) * min(self.edges) / abs(speed)
-                    words += f" velocity = {speed!r} start_time = {begin!r} end_time = {end!r}"
-                elif kind == "piston":
-                    mass = 10.0 ** rng.uniform(-1, 3)
-                    force = mass * self.speed**2 / min(self.edges)
-                    force *= rng.choice([0, 1, 1, 1]) * 10.0 ** rng.uniform(-2, 1)
-                    words += f" mass = {mass!r} force = {force!r}"
-                else:
-                    period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
-                    words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"
-                    words += f" period = {period!r}"
-                    words += self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
+                words += self.side_motion()
             if not re.search("'(sine|parabolic|sawtooth)'", words) and self.chance(0.25):
-                edge, way = self.edges[k // 2], rng.choice([1e-6, 0.1, 0.7]) * rng.random()
+                edge, way = self.edges[k // 2], self.rng.choice([1e-6, 0.1, 0.7])
+                way *= self.rng.random()
                 end = self.lower[k // 2] + (k % 2) * edge
                 words += f" position = {end + (2 * (k % 2) - 1) * way * edge!r}"
             groups.append(f"&side name = '{name}'{words} /")
         return groups
+
+    def side_motion(self) -> str:
+        """How a side moves."""
+        rng = self.rng
+        self.worked = True
+        kinds = ["constant_velocity", "parabolic", "sawtooth", "sine"]
+        kind = rng.choice(kinds if self.steps else [*kinds, "piston"])
+        words = f" motion = '{kind}'"
+        if kind == "sawtooth":
+            return words + f" velocity = {self.speed * 10.0 ** rng.uniform(-2, 0.5)!r}"
+        if kind == "constant_velocity":
+            speed = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-2, 0.5)
+            begin = rng.choice([0, rng.random()]) * min(self.edges) / self.speed
+            end = begin + rng.uniform(0, 0.1) * min(self.edges) / abs(speed)
+            return words + f" velocity = {speed!r} start_time = {begin!r} end_time = {end!r}"
+        if kind == "piston":
+            mass = 10.0 ** rng.uniform(-1, 3)
+            force = mass * self.speed**2 / min(self.edges)
+            force *= rng.choice([0, 1, 1, 1]) * 10.0 ** rng.uniform(-2, 1)
+            return words + f" mass = {mass!r} force = {force!r}"
+        period = min(self.edges) / self.speed * 10.0 ** rng.uniform(-2, 1)
+        words += f" amplitude = {min(self.edges) * 10.0 ** rng.uniform(-5, -1)!r}"
+        words += f" period = {period!r}"
+        return words + self.maybe(0.7, f"phase = {rng.choice([0, 0.5, rng.random()])}")
 
     def obstacles(self) -> list[str]:
         """Circles and straight walls; disks find room among them if they are placed at random."""
@@ -423,13 +424,14 @@ class Draw:
         return every
 
 
-def random_system(rng: random.Random) -> System:
-    """A system that may be refused, break off, or run."""
-    draw = Draw(rng)
+def random_system(rng: random.Random, most: int = 10**6) -> System:
+    """A system of about `most` disks at most, that may be refused, break off, or run."""
+    draw = Draw(rng, most)
     walls = draw.sides()
     obstacles = draw.obstacles()
     disks = draw.species(bool(obstacles))
     parts = [draw.run(), draw.box(), *walls, *obstacles, *disks, draw.contact(), draw.drive()]
     parts += [draw.stop(), draw.output()]
     table = draw.table[:, : len(draw.columns)]
-    return System("\n".join(parts) + "\n", draw.columns, table, draw.disks, draw.events)
+    text = "\n".join(parts) + "\n"
+    return System(text, draw.columns, table, draw.disks, draw.events, draw)

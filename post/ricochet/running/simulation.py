@@ -158,8 +158,10 @@ class Simulation:
     ) -> Self:
         """Go on until the first of these values is reached, counted from the start of the run.
 
-        Without any it is the stop rule of the input that counts, if it has one.  An interrupt
-        (Ctrl-C) leaves the simulation where it is then.
+        Without any it is the stop rule of the input that counts, if it has one.  As a run of the
+        program, it ends before that when nothing will ever happen, or when a gas that only loses
+        energy has cooled to 1e-25 of its first temperature.  An interrupt (Ctrl-C) leaves the
+        simulation where it is then.
         """
         limits = (
             math.inf if time is None else float(time),
@@ -271,7 +273,7 @@ class Simulation:
             self.radius,
             lost=lost / max(energy, self._start_energy) if lost else 0.0,
             turning="all/rotational_energy" in self.observables,
-            collapsed=bool(self._text("note")),
+            collapsed="collapse" in self._text("note"),
         )
 
     @property

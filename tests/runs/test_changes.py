@@ -1,0 +1,408 @@
+"""Changes of a running simulation: it continues as one that is read from a file at that moment.
+
+Each random system is advanced, and changed at random moments: gravity, the laws and motions of all
+boundaries, the driving, the contacts and the velocities.  The first course also tries changes that
+are refused and changes in which no value differs, which do nothing.  Two others advance to the same
+moments in other slices, on several threads, with another search and queue, and are saved and loaded
+on the way.  The program continues the last file.  All end with the same bits.
+
+`SYSTEMS=300 SEED=20270131` takes other systems and more of them, as `make check` does each day.
+"""
+
+import os
+import random
+import re
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from random_systems import SIDES, Draw, numbers, starting_file
+from ricochet import ProgramError, Simulation, read_run
+from run_laws import BALANCE, imbalance, pair_gaps, wall_gaps
+from test_random_systems import accepted
+from whole_runs import contents, ran, within
+
+COUNT = int(os.environ.get("SYSTEMS", "20"))
+SEEDS = [f"{os.environ.get('SEED', '1')} change {k}" for k in range(COUNT)]
+MOST_DISKS = 300
+MOST_EVENTS, MOST_STEPS, MOST_KICKS = 600, 300, 30  #: between two changes
+DEEPEST = 1e-12  #: overlap, of the larger of diameter and box
+LAW = ("restitution", "rule", "tangential_restitution", "friction", "temperature", "speed")
+MOTION = ("motion", "velocity", "amplitude", "period", "phase", "start_time", "end_time")
+MOTION += ("mass", "force", "position")
+SAMPLED = ("total_energy", "dissipated_energy", "heat", "work", "drive_energy")
+SAMPLED += ("all/kinetic_energy",)
+#: Features whose course depends on more than the state of the disks at one moment.
+MEMORY = r"&drive|contact_time|temperature =|motion =|shear_rate|'steps'|pair_restitution"
+
+
+class Change(NamedTuple):
+    """Settings GROUP.VARIABLE=VALUE, or the velocities of all disks."""
+
+    settings: list[str]
+    velocity: np.ndarray | None = None
+
+    def apply(self, simulation: Simulation) -> None:
+        """Make the change, now."""
+        if self.velocity is None:
+            simulation._change(self.settings)
+        else:
+            simulation.velocity = self.velocity
+
+
+def settings(group: str, words: str, reset: tuple[str, ...] = ()) -> list[str]:
+    """GROUP.VARIABLE=VALUE of the words of a group; variables to reset get their defaults."""
+    values = dict(re.findall(r"(\w+) = ('\w+'|[^ ]+(?:, [^ ]+)*)", words))
+    return [f"{group}.{name}={values.get(name, '')}" for name in {**dict.fromkeys(reset), **values}]
+
+
+def drawn_change(simulation: Simulation, draw: Draw) -> Change:
+    """A change that fits the system as it was at the start; it may be refused."""
+    rng = draw.rng
+    walls = {name.rpartition(".")[0] for name in simulation._values()}
+    walls = sorted(wall for wall in walls if wall.startswith(("obstacle.", "wall.")))
+    sides = [f"side.{name}" for k, name in enumerate(SIDES) if not draw.periodic[k // 2]]
+    kinds = ["velocity", "velocity", "contact", "box", "drive", *["law"] * bool(walls + sides)]
+    match rng.choice([*kinds, *["motion"] * bool(sides)]):
+        case "velocity":
+            return Change([], drawn_velocity(simulation, draw))
+        case "law":
+            return Change(settings(rng.choice(walls + sides), draw.law(), LAW))
+        case "motion":
+            words = draw.side_motion() if draw.chance(0.8) else ""
+            return Change(settings(rng.choice(sides), words, MOTION))
+        case "box":
+            unit = rng.choice([0, 1, 10, 1e6]) * draw.speed**2 / max(draw.edges)
+            pull = [0 if ends else unit * rng.uniform(-1, 1) for ends in draw.periodic]
+            return Change([f"box.gravity={numbers(*pull)}"])
+        case "drive":
+            driven, draw.driven = draw.driven, True
+            words, draw.driven = draw.drive(), driven
+            names = tuple(re.findall(r"(\w+) =", words))
+            return Change(settings("drive", words if draw.chance(0.7) else "", names))
+    return Change(settings("contact", draw.contact()))
+
+
+def drawn_velocity(simulation: Simulation, draw: Draw) -> np.ndarray:
+    """Velocities that have to do with those of now, or not."""
+    rng, velocity = draw.rng, simulation.velocity
+    if draw.chance(0.25):
+        return velocity[::-1].copy()
+    if draw.chance(0.3):
+        speed = rng.choice([0, draw.speed, draw.speed * 10.0 ** rng.randint(-9, 9)])
+        own = np.random.default_rng(rng.randint(0, 10**6))
+        return own.normal(0, speed, velocity.shape)
+    return velocity * rng.choice([0, 0.9, -1, 1e-6, 1e6, 10.0 ** rng.uniform(-9, 9)])
+
+
+class Course:
+    """A random system in memory, and what happened when, for those that repeat it."""
+
+    def __init__(self, program: Path, seed: str):
+        """Writes its input into this folder."""
+        self.program, self.rng = program, random.Random(seed)
+        system = accepted(program, Path(), self.rng, most=MOST_DISKS)
+        self.draw, self.steps = system.draw, "'steps'" in system.text
+        text = re.sub(r"^&stop.*$", "&stop events = 1000000000 /", system.text, flags=re.MULTILINE)
+        text = re.sub(r"^&output.*$", "&output /", text, flags=re.MULTILINE)
+        Path("case.nml").write_text(text)
+        self.moments: list[tuple[dict, float]] = []  #: arguments of `advance`, and the time then
+        self.changes: list[tuple[int, Change]] = []  #: after how many of them, and what
+        self.message = ""  #: with which it broke off
+        self.faults: list[str] = []
+        self.samples: dict[str, list] = {name: [] for name in SAMPLED}
+        self.found: dict = {}  #: all that files of it have said
+
+    def next_moment(self, simulation: Simulation) -> dict:
+        """After some events, or some time, as fast as the disks are now."""
+        rng, draw = self.rng, self.draw
+        speed = simulation.observable("all/mean_speed") or draw.speed
+        if draw.sheared:
+            speed = max(speed, draw.speed)  # images move
+        time = rng.choice([0.01, 0.3, 10]) * rng.random() * min(draw.edges) / speed
+        if self.steps:
+            time = min(time, MOST_STEPS * draw.step)
+        if (drive := simulation.parameters["drive"])["kind"] != "none":
+            time = min(time, MOST_KICKS * drive["interval"])
+        events = simulation.events + rng.randint(1, MOST_EVENTS)
+        return {"time": simulation.time + time, "events": events}
+
+    def advance(self, simulation: Simulation) -> None:
+        """To the next moment."""
+        moment = self.next_moment(simulation)
+        self.moments.append((moment, simulation.time))
+        simulation.advance(**moment)
+        self.moments[-1] = moment, simulation.time
+
+    def run(self) -> Simulation:
+        """The first course of events, which the others repeat."""
+        simulation = Simulation("case.nml")
+        self.look(simulation)
+        try:
+            for _ in range(self.rng.randint(1, 5)):
+                if self.rng.random() < 0.9:
+                    self.advance(simulation)
+                change = drawn_change(simulation, self.draw)
+                self.look(simulation)
+                self.attempt(simulation, change)
+                self.look(simulation)
+            self.advance(simulation)
+            self.look(simulation)
+        except ProgramError as error:
+            self.message = str(error)
+        self.judge_energy()
+        return simulation
+
+    def attempt(self, simulation: Simulation, change: Change) -> None:
+        """A change that may be refused; before or after it one in which no value differs."""
+        if self.rng.random() < 0.3:
+            self.change_nothing(simulation)
+        before = facts(simulation)
+        try:
+            change.apply(simulation)
+        except ProgramError as error:
+            if unlike(before, facts(simulation)):
+                self.faults.append(f"changed although it was refused: {change} {error}")
+        else:
+            self.changes.append((len(self.moments), change))
+        if self.rng.random() < 0.3:
+            self.change_nothing(simulation)
+
+    def change_nothing(self, simulation: Simulation) -> None:
+        """A change in which no value differs."""
+        before, known = facts(simulation), (simulation.changes, simulation.input)
+        if self.rng.random() < 0.3:
+            simulation.velocity = simulation.velocity
+        else:
+            lines = (line.split(" = ", 1) for line in simulation._text("parameters").splitlines())
+            same = [f"{name}={text}" for name, text in lines if text[0] not in '["']
+            pattern = r"contact|drive\.i|(side|wall|obstacle)\.\w+\.(restitution|temperature)"
+            same = [line for line in same if re.match(pattern, line)]
+            simulation._change(self.rng.sample(same, min(3, len(same))))
+        if unlike(before, facts(simulation)) or (simulation.changes, simulation.input) != known:
+            self.faults.append(f"a change of nothing: {unlike(before, facts(simulation))}")
+
+    def look(self, simulation: Simulation) -> None:
+        """Take samples of the energies, and find the deepest overlap."""
+        observed = simulation._observed()
+        for name, values in self.samples.items():
+            values.append(float(observed[name][0]) if name in observed else 0.0)
+        simulation.save("look.h5", force=True)
+        self.found |= (found := contents("look.h5.part"))
+        if self.steps:
+            return
+        time, place = simulation.time, simulation.position
+        for name, values in observed.items():
+            path = f"/observables/{name}"
+            found |= {f"{path}/value": np.array([values]), f"{path}/time": np.array([time])}
+        edges = found["/particles/disks/box/edges"]
+        for gap, width in (*pair_gaps(found, time, place), *wall_gaps(found, time, place)):
+            allowed = DEEPEST * np.maximum(2 * width, edges.max())
+            if np.any(-gap > allowed):
+                deepest = np.max(-gap / allowed)
+                self.faults.append(f"overlap {deepest:g} times what is allowed at {time}")
+
+    def judge_energy(self) -> None:
+        """The balance of energy over the whole course."""
+        found = {name: value for name, value in self.found.items() if "/observables" not in name}
+        for name, values in self.samples.items():
+            found[f"/observables/{name}/value"] = np.array(values)
+        if (part := imbalance(found) / BALANCE) > 1:
+            self.faults.append(f"energy: {part:g} times what is allowed")
+
+    def repeat(self, name: str) -> Simulation:
+        """In other slices and in another way, saved and loaded."""
+        rng, simulation = self.rng, Simulation("case.nml", *self.way())
+        for k in range(len(self.moments) + 1):
+            if k > 0:
+                moment, last = self.moments[k - 1]
+                now = simulation.time
+                for part in sorted(rng.random() for _ in range(rng.choice([0, 1, 5]))):
+                    if now + (last - now) * part < last:
+                        simulation.advance(time=now + (last - now) * part)
+                    simulation = kept(simulation, name) if rng.random() < 0.2 else simulation
+                simulation.advance(**moment)
+                simulation = kept(simulation, name) if rng.random() < 0.3 else simulation
+            for change in (change for after, change in self.changes if after == k):
+                change.apply(simulation)
+                simulation = kept(simulation, name) if rng.random() < 0.5 else simulation
+        return simulation
+
+    def way(self) -> tuple[dict[str, str], int]:
+        """Variables and a number of threads that change no bit."""
+        searches = ["cells", "pairs", *["rescan"] * (self.draw.disks <= 60)]
+        ways = {"run.search": self.rng.choice(searches)}
+        if not self.steps:
+            ways["run.queue"] = self.rng.choice(["calendar", "heap"])
+        return ways, self.rng.choice([1, 1, 2, 3])
+
+    def continue_by_program(self, simulation: Simulation) -> None:
+        """The program continues a file as the simulation itself does, and ends where it ends."""
+        simulation.save("last.h5", force=True, input="last.nml")
+        moment = self.next_moment(simulation)
+        stop = [f"--set=stop.{name}={value!r}" for name, value in moment.items()]
+        done = ran(self.program, "last.nml", "-o", "last.h5", "--resume", "--quiet", *stop)
+        try:
+            simulation.advance(**moment)
+        except ProgramError as error:
+            if str(error) not in done.stderr:
+                self.faults.append(f"the program ends otherwise: {done.stderr}, not {error}")
+            return
+        if done.returncode:
+            self.faults.append(f"the program fails: {done.stderr}")
+            return
+        run, here = read_run("last.h5"), facts(simulation)
+        there = {name: run.observable(name).value[-1] for name in simulation.observables}
+        there |= {"position": run.position[-1], "velocity": run.velocity[-1], "time": run.time[-1]}
+        if different := [
+            n for n in there if not np.array_equal(here[n].ravel(), np.ravel(there[n]))
+        ]:
+            where = run.time[-1], simulation.time
+            self.faults.append(f"the program differs: {different}, times {where}")
+
+    def start_from_last_frame(self, simulation: Simulation) -> None:
+        """A new run of the last frame has the same first collisions, where nothing has memory."""
+        text, slowest = simulation.input, np.abs(simulation.velocity)
+        if re.search(MEMORY, text) or np.any((slowest > 0) & (slowest < 1e-100)):
+            return
+        names = ["x", "y", "vx", "vy", "radius", "mass"]
+        columns = [simulation.position, simulation.velocity, simulation.radius, simulation.mass]
+        if hasattr(simulation, "angular_velocity"):
+            names, columns = [*names, "omega"], [*columns, simulation.angular_velocity]
+        Path("frame.txt").write_text(starting_file(names, np.column_stack(columns)))
+        text = re.sub(r"&species.*?\n/\n", "", text, flags=re.DOTALL)
+        new = Simulation(text + "&species name = 's0' file = 'frame.txt' /\n")
+        begin, met = simulation.time, set()
+        events = zip(simulation.next_events(20), new.next_events(20), strict=False)
+        for (time, i, j), (new_time, new_i, new_j) in events:
+            if met & {i, j, new_i, new_j} - {0}:
+                break  # what follows depends on rounding
+            met |= {i, j} if j > 0 else {i}
+            if abs(time - begin - new_time) > 1e-6 * new_time + 8 * np.spacing(begin):
+                self.faults.append(f"a new run collides otherwise: {i} {j} at {time} from {begin}")
+                break
+
+
+def kept(simulation: Simulation, name: str) -> Simulation:
+    """Saved and loaded."""
+    simulation.save(f"{name}.h5", force=True)
+    simulation.close()
+    return Simulation.load(f"{name}.h5")
+
+
+def facts(simulation: Simulation) -> dict[str, np.ndarray]:
+    """All that can be asked of a state."""
+    names = ("time", "events", "collisions", "position", "velocity", "image", "orientation")
+    there = {name: getattr(simulation, name, None) for name in names}
+    return simulation._observed() | {n: np.array(v) for n, v in there.items() if v is not None}
+
+
+def unlike(one: dict, other: dict) -> list[str]:
+    """Names of what differs by a bit."""
+    same = {name for name in one if name in other and one[name].tobytes() == other[name].tobytes()}
+    return sorted((one.keys() | other.keys()) - same)
+
+
+def without_ways(text: str) -> str:
+    """An input without what changes no bit."""
+    return re.sub(r"  (search|queue) = .*\n", "", text)
+
+
+def faults(program: Path, seed: str) -> list[str]:
+    """What is wrong with the changes of a random system."""
+    course = Course(program, seed)
+    first = course.run()
+    for name in ("again", "other"):
+        try:
+            other = course.repeat(name)
+        except ProgramError as error:
+            if str(error) != course.message:
+                course.faults.append(f"{name} ends otherwise: {error}, not {course.message}")
+            continue
+        if course.message:
+            course.faults.append(f"{name} does not end with {course.message}")
+        elif different := unlike(facts(first), facts(other)):
+            course.faults.append(f"{name} differs: {different}")
+        elif (first.changes, first.input) != (other.changes, without_ways(other.input)):
+            course.faults.append(f"{name} has another input")
+    if not course.message:
+        course.start_from_last_frame(first)
+        course.continue_by_program(first)
+    return course.faults
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_changed_simulation_continues_exactly(program, tmp_path, monkeypatch, seed):
+    monkeypatch.chdir(tmp_path)
+    said = faults(program, seed)
+    assert not said, "\n".join([*said, Path("case.nml").read_text()])
+
+
+def test_a_change_suppresses_no_collision():
+    """Two disks that met last meet again through the sides, the clocks of both at the change."""
+    gas = Simulation(
+        """&box boundary = 'periodic', 'periodic' /
+        &species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5 velocity = 1, 0, 0, 0 /"""
+    )
+    gas.advance(time=0.7).change({"contact.wall_restitution": 0.5})
+    gas.advance(time=1)
+    assert gas.collisions == 2 and gas.changes
+    assert gas.observable("total_energy") == pytest.approx(0.5, rel=1e-15)
+
+
+@pytest.mark.parametrize("pull", [-1e35, -1e50, -1e90])
+def test_extreme_accelerations_leave_the_caller_in_control(pull):
+    """`advance` returns when its patience is over."""
+    script = f"""
+from ricochet import Simulation
+disks = {{"count": 50, "packing_fraction": 0.1, "speed": 1}}
+gas = Simulation({{"species": disks}}).advance(events=77)
+gas.change({{"box.gravity": (0, {pull})}})
+events = gas.events
+assert gas._go_on((1.0, 2**62, 2**62), 0.05) and gas.events > events"""
+    assert ran(*within(60), sys.executable, "-c", script).returncode == 0
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e-9, 1e-11])
+def test_a_gas_that_was_slow_for_long_is_exact_when_it_is_fast_again(factor):
+    """Times count from the change: overlaps are rounding of the fast gas."""
+    disks = {"count": 50, "packing_fraction": 0.2, "speed": 1}
+    gas = Simulation({"species": disks}).advance(time=0.5)
+    gas.velocity = factor * gas.velocity
+    gas.advance(events=gas.events + 100).velocity = gas.velocity / factor
+    deepest = 0.0
+    for _ in range(60):
+        gas.advance(events=gas.events + 1)
+        one, other = np.triu_indices(50, 1)
+        apart = np.hypot(*(gas.position[one] - gas.position[other]).T)
+        deepest = max(deepest, np.max(2 * gas.radius[0] - apart))
+    assert deepest < 1e-12 * 2 * gas.radius[0]
+
+
+@pytest.mark.parametrize(
+    ("act", "reached"),
+    [
+        (lambda gas: setattr(gas, "velocity", 0 * gas.velocity), True),  # waits for its end
+        (lambda gas: setattr(gas, "velocity", 1e-14 * gas.velocity), True),  # is not cold yet
+        (lambda gas: gas.change({"contact.restitution": 1}), True),
+        (lambda _: None, False),
+    ],
+)
+def test_a_cold_gas_ends_at_the_same_time_in_memory_and_by_the_program(
+    program, tmp_path, monkeypatch, act, reached
+):
+    """It cools by 1e-25 soon; after a change this counts from the velocities of the change."""
+    monkeypatch.chdir(tmp_path)
+    text = "&box upper = 1, 1 boundary = 'periodic', 'periodic' /\n&contact restitution = 0.1 /\n"
+    text += "&species name = 'a' radius = 0.1 position = 0.3, 0.5, 0.7, 0.5"
+    text += " velocity = 1, 0, -1, 0 /\n&stop time = 1e20 /\n"
+    gas = Simulation(text).advance(time=2)
+    act(gas)
+    gas.save("gas.h5", input="gas.nml")
+    end = 20.0 if reached else 1e18
+    ran(program, "gas.nml", "-o", "gas.h5", "--resume", f"--set=stop.time={end}", check=True)
+    assert (gas.advance(time=end).time == end) is reached
+    assert read_run("gas.h5").time[-1] == gas.time
