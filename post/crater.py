@@ -109,12 +109,12 @@ def main() -> None:
     for run in args.runs:
         size, name = crater.crater(run), run.path.name
         by_time = crater.ended_by_time(run, size)
-        box = crater.box_takes_part(run, size.wall_collisions)
+        box = crater.box_takes_part(run, size.side_collisions)
         marks = {"ended_by_time": int(by_time), "box_takes_part": int(box)}
         rows.append({"run": name, **size._asdict(), **marks})
         left = f"{name}: {100 * size.energy_left:.3g} % of the energy is left, not the "
         left += f"{100 * crater.energy_fraction(run):g} % of stop.energy_fraction"
-        walls = f"{size.wall_collisions} wall hits"
+        walls = f"{size.side_collisions} wall hits"
         walls = f"{name}: the crater reaches the floor or the sides, {walls}"
         notes += [left] * by_time + [walls] * box
     figure = draw(args.runs[0], size) if len(args.runs) == 1 else None

@@ -60,7 +60,7 @@ class Point(NamedTuple):
     runs: int
     sizes: dict[str, Estimate]
     energy_left: Estimate
-    wall_collisions: Estimate  # per run
+    side_collisions: Estimate  # per run
     by_time: bool  # some runs ended before the energy fraction was reached
     free: bool  # neither time nor walls cut it short
 
@@ -83,7 +83,7 @@ def point(key: tuple[float, ...], runs: list[Run]) -> Point:
     craters = [crater(run) for run in runs]
     sizes = {name: estimate([getattr(c, name) for c in craters]) for name in ALL}
     left, hits = (
-        estimate([getattr(c, name) for c in craters]) for name in ("energy_left", "wall_collisions")
+        estimate([getattr(c, name) for c in craters]) for name in ("energy_left", "side_collisions")
     )
     by_time = any(ended_by_time(*one) for one in zip(runs, craters, strict=True))
     free = not by_time and not box_takes_part(runs[0], hits.mean)
@@ -228,7 +228,7 @@ def tables(scans: Scans) -> tuple[list[dict], list[dict], list[str]]:
             for name, size in p.sizes.items():
                 row |= measured(name, size)
             row |= measured("energy_left", p.energy_left)
-            row |= measured("wall_collisions", p.wall_collisions)
+            row |= measured("side_collisions", p.side_collisions)
             rows.append(row | {"ended_by_time": int(p.by_time), "in_fit": int(p.free)})
         for size in ALL:
             if fit := fit_of(axis, curve, size):

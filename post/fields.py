@@ -96,7 +96,12 @@ def walls(run: Run, axis: int) -> list[dict]:
     """The two sides across an axis that are kept at a temperature: where, kT and flow."""
     each = zip(SIDES, run.sides, np.stack([run.lower, run.upper], axis=1).ravel(), strict=True)
     return [
-        {"wall": name, "x": x, "kT": float(own["temperature"]), "flow": own.get("speed", 0.0)}
+        {
+            "wall": name,
+            "x": x,
+            "kT": float(own["temperature"]),
+            "flow": own.get("surface_velocity", 0.0),
+        }
         for name, own, x in each
         if name in ACROSS[axis] and "temperature" in own
     ]

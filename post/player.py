@@ -43,7 +43,7 @@ INPUTS = Path(__file__).resolve().parents[1] / "input"
 SCRIPTS = ("film", "camera", "stage", "panels", "controls", "stream", "live")
 SWING = ("amplitude", "period", "phase")  # of a side
 STROKE = ("velocity", "start_time", "end_time")
-LAWS = ("motion", *SWING, *STROKE, "temperature", "speed")
+LAWS = ("motion", *SWING, *STROKE, "temperature", "surface_velocity")
 ROOM = 29e6  # bytes of base64 for the disks
 LIVE_ROOM = 6e6  # the same of a film that is renewed while its run goes on
 TURN = (16 + 8) * 4 / 3  # bytes of a turn of a disk between two frames, and of half an event
@@ -202,7 +202,7 @@ def curves(run: Run) -> dict:
     series, found = {}, {}
     for name in (
         "collisions",
-        "pressure",
+        "virial_pressure",
         *(f"{s}/{e}_energy" for s in run.names for e in ENERGIES),
     ):
         with suppress(RunError):
@@ -214,11 +214,11 @@ def curves(run: Run) -> dict:
         values = series.get(name, np.full(len(time), np.nan))
         return [float(f"{x:.7g}") if np.isfinite(x) else None for x in values[some]]
 
-    if "pressure" in series:
-        series["pressure"] = np.where(series["collisions"] > 0, series["pressure"], np.nan)
+    if (pressure := series.get("virial_pressure")) is not None:
+        series["virial_pressure"] = np.where(series["collisions"] > 0, pressure, np.nan)
     found = {"time": list(map(float, time[some])), "pressure": None}
-    if len(some) > 2 and np.isfinite(series.get("pressure", np.nan)).any():
-        found["pressure"] = rounded("pressure")
+    if len(some) > 2 and np.isfinite(series.get("virial_pressure", np.nan)).any():
+        found["pressure"] = rounded("virial_pressure")
     for kind in ENERGIES:
         names = [f"{name}/{kind}_energy" for name in run.names]
         there = kind == "kinetic" or any(series.get(name, time[:0]).any() for name in names)

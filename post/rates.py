@@ -86,7 +86,7 @@ def pressures_in_time(runs: list[Run]) -> dict[str, Curve]:
     area, length = np.prod(runs[0].edges), runs[0].edges[[1, 1, 0, 0]]
     ways = {"virial": [growth(ideal(run), total(run, "virial", 1 / (2 * area))) for run in runs]}
     if not runs[0].periodic.any():
-        ways["sides"] = [growth(total(run, "wall_impulse", 1 / (4 * length))) for run in runs]
+        ways["sides"] = [growth(total(run, "side_impulse", 1 / (4 * length))) for run in runs]
     unit = scales(runs)[:, None]
     middle = (cuts[1:] + cuts[:-1]) / 2
     return {way: Curve(middle, *estimate(values * unit)) for way, values in ways.items()}

@@ -77,7 +77,7 @@ def main() -> None:
     notes = [
         f"{run.path.name}: hits of sides are in the angle; stop the run before"
         for run in args.runs
-        if run.observable("wall_collisions").value[-1].any()
+        if run.observable("side_collisions").value[-1].any()
     ]
     report(args, figure, rows, notes=notes)
 

@@ -242,7 +242,7 @@ contains
       text = "output = "//legible(run%command%output)// &
         eol//"disks = "//written(int(sim%n_disks()))// &
         eol//"collisions = "//written(sim%tally%collisions)// &
-        eol//"wall_collisions = "//written(sum(sim%tally%hits(:n_sides)))// &
+        eol//"side_collisions = "//written(sum(sim%tally%hits(:n_sides)))// &
         eol//"obstacle_collisions = "//written(sum(sim%tally%hits(n_sides + 1:)))// &
         eol//"time = "//written(sim%time())// &
         eol//"kinetic_energy = "//written(energy(1))

@@ -182,12 +182,12 @@ def log_error(found: Found) -> float:
     i, j = found["/events/i"], found["/events/j"]
     walls = [(-k, f"sides/{name}") for k, name in enumerate(SIDES)]
     names = [*found.get("/parameters/obstacle/name", ()), *found.get("/parameters/wall/name", ())]
-    walls += [(-4 - k, f"walls/{name.decode()}") for k, name in enumerate(names)]
+    walls += [(-4 - k, f"obstacles/{name.decode()}") for k, name in enumerate(names)]
     change = found["/events/momentum_change"]
     wrong = [np.sum(np.diff(found["/events/time"]) < 0)]
     wrong.append(np.sum(j > 0) - series(found, "collisions")[-1])
-    if "/particles/disks/collisions/value" in found:
-        of_disks = found["/particles/disks/collisions/value"][-1]
+    if "/particles/disks/event_count/value" in found:
+        of_disks = found["/particles/disks/event_count/value"][-1]
         mine = np.bincount(np.concatenate([i, j[j > 0]]), minlength=len(of_disks) + 1)
         wrong += list(mine[1:] - of_disks)
     for code, name in walls:

@@ -65,7 +65,7 @@ def write_run(
         shared = disks["position"]
         if image is None and any(periodic):
             image = np.zeros(position.shape, np.int32)
-        for name, values in (("velocity", velocity), ("image", image), ("collisions", collisions)):
+        for name, values in (("velocity", velocity), ("image", image), ("event_count", collisions)):
             if values is not None:
                 group = disks.create_group(name)
                 group["step"], group["time"] = shared["step"], shared["time"]

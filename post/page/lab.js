@@ -14,8 +14,8 @@ const state = {
   paused: false,
 };
 // What acts on the disks that move; all else starts anew.
-const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|speed|velocity|mass|force))/.test(key);
-const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
+const acts = key => /^(box\.gravity|contact\.|drive\.|(side|wall|obstacle)\.\w+\.(restitution|rule|tangential_restitution|friction|temperature|surface_velocity|velocity|mass|force))/.test(key);
+const MEASURED = { 'all/kinetic_energy': 'mean kinetic energy', 'all/mean_speed': 'mean speed', virial_pressure: 'pressure', dissipated_energy: 'energy lost per time', collisions: 'collisions per time' };
 const MOST_KEPT = 3, FULL = 0.5;  // runs on the shelf; share of the area that random placing fills with ease
 
 function make(tag, more = {}, ...children) {

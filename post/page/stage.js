@@ -94,14 +94,14 @@ function drawStage() {
 }
 
 // A surface that heats is drawn in a colour: hot, or cold beside a hotter one; dashes slide with it. Returns whether it does either.
-const actsOn = law => !!(law && (law.temperature || law.speed));
+const actsOn = law => !!(law && (law.temperature || law.surface_velocity));
 const laws = () => [...film.sides, ...film.laws.obstacle, ...film.laws.wall];
-const slides = () => laws().some(law => law?.speed);
+const slides = () => laws().some(law => law?.surface_velocity);
 function drawLike(law, along = 1) {
   const warmest = Math.max(...laws().map(one => one?.temperature ?? 0)), dash = 7 * page.dots;
   ground.strokeStyle = !law?.temperature ? ink.wall : law.temperature < warmest ? ink.cold : ink.hot;
-  ground.setLineDash(law?.speed ? [dash, dash] : []);
-  ground.lineDashOffset = law?.speed ? -along * law.speed * moment.shown * view.unit % (2 * dash) : 0;
+  ground.setLineDash(law?.surface_velocity ? [dash, dash] : []);
+  ground.lineDashOffset = law?.surface_velocity ? -along * law.surface_velocity * moment.shown * view.unit % (2 * dash) : 0;
   return actsOn(law);
 }
 

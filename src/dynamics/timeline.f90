@@ -93,7 +93,7 @@ contains
     subroutine end_epoch()
       if (are_crushed(sim)) then
         call fail(error, exit_broken, "a side crushes the disks, whose energy has grown a million times: let it end " &
-          //"before the time "//about(sim%time())//" (side.end)")
+          //"before the time "//about(sim%time())//" (side.end_time)")
       else if (stands_still(sim)) then
         if (limits%at_rest .and. is_at_rest(sim)) return
         associate (i => evolution%last_event(1), code => evolution%last_event(2))

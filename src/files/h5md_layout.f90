@@ -37,7 +37,7 @@ module h5md_layout
     velocity = disks_group//"velocity", &
     angular_velocity = disks_group//"angular_velocity", &
     orientation = disks_group//"orientation", &
-    disk_collisions = disks_group//"collisions", &
+    disk_event_count = disks_group//"event_count", &
     image = disks_group//"image", &
     step_of = "/step", time_of = "/time", value_of = "/value"
 

@@ -100,7 +100,7 @@ contains
         restitution = group%real_of("restitution", 1.0_real64)
         wall_law%restitution = group%real_of("wall_restitution", restitution)
         wall_law%rule = place_of(group%text_of("wall_rule"), words_of(wall_rules))
-        law%by_speed%speed = group%real_of("restitution_speed", 0.0_real64)
+        law%by_speed%speed = group%real_of("reference_speed", 0.0_real64)
         law%by_speed%c = series_terms(max(1, place_of(group%text_of("restitution_law"), words_of(restitution_laws))))
         wall_law%by_speed = law%by_speed
         call check_least(group, "restitution", law%by_speed, problems)
@@ -137,7 +137,7 @@ contains
         drive%keep_momentum = group%text_of("keep_momentum") == ".true."
         drive%fraction = group%real_of("fraction", 1.0_real64)
         drive%temperature = group%real_of("temperature", 0.0_real64)
-        drive%speed = group%real_of("speed", 0.0_real64)
+        drive%speed = group%real_of("self_propulsion_speed", 0.0_real64)
         drive%rotational_diffusion = group%real_of("rotational_diffusion", 0.0_real64)
         wanted = group%text_of("species")
         if (wanted == "") return
@@ -172,7 +172,7 @@ contains
       do k = 1, size(sampled)
         call take_sampling(group, trim(sampled(k)), settings%output%sampling(k))
       end do
-      if (group%given("frames_from") .and. all(settings%output%sampling%per_decade == 0)) call group%complain("frames_from", &
+      if (group%given("decades_from") .and. all(settings%output%sampling%per_decade == 0)) call group%complain("decades_from", &
         "has no effect without frames_per_decade or observables_per_decade", problems)
       associate (output => settings%output)
         k = row_of("output", "frame_columns")
@@ -194,9 +194,9 @@ contains
 
       sampling%every = [(group%real_of(what//"_every_"//trim(sampled_by(k)), never), k=1, size(sampled_by))]
       sampling%per_decade = int(group%integer_of(what//"_per_decade", 0_int64))
-      sampling%from = group%real_of("frames_from", never)
-      if (sampling%per_decade > 0 .and. .not. group%given("frames_from")) call group%complain(what//"_per_decade", &
-        "needs frames_from, the time of the first", problems)
+      sampling%from = group%real_of("decades_from", never)
+      if (sampling%per_decade > 0 .and. .not. group%given("decades_from")) call group%complain(what//"_per_decade", &
+        "needs decades_from, the time of the first", problems)
       if (.not. group%given(what//"_at")) return
       sampling%at = group%reals_of(what//"_at")
       if (any(sampling%at(2:) <= sampling%at(:size(sampling%at) - 1))) call group%complain(what//"_at", &
@@ -235,8 +235,8 @@ contains
       call refuse(settings%output%helfand .and. shear, "output.helfand", "box.shear_rate: velocities change through its images")
       call refuse(by_energy .and. shear, energy, "box.shear_rate: the shear does work"//other_rule)
       call refuse(by_energy .and. kicks, energy, "drive.kind: kicks change the energy"//other_rule)
-      call refuse(by_energy .and. box%gives_energy() .and. .not. shear, energy, "walls that give energy, by temperature, speed " &
-        //"or motion of &side, &obstacle or &wall"//other_rule)
+      call refuse(by_energy .and. box%gives_energy() .and. .not. shear, energy, "walls that give energy, by temperature, " &
+        //"surface_velocity or motion of &side, &obstacle or &wall"//other_rule)
       call refuse(by_energy .and. .not. (timed .or. counted .or. rule%events < unlimited .or. law%loses_energy() .or. kicks &
         .or. box%has_lossy_walls() .or. box%gives_energy()), energy, "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(rule%at_rest .and. settings%run%dynamics == "steps", rest, &
@@ -244,8 +244,8 @@ contains
       call refuse(rule%at_rest .and. law%contact_time > 0, rest, "contact.contact_time: it keeps the bounces going"//other_rule)
       call refuse(rule%at_rest .and. shear, rest, "box.shear_rate: disks are driven for ever"//other_rule)
       call refuse(rule%at_rest .and. kicks, rest, "drive.kind: disks are driven for ever"//other_rule)
-      call refuse(rule%at_rest .and. box%gives_energy() .and. .not. shear, rest, "walls that give energy, by temperature, speed " &
-        //"or motion of &side, &obstacle or &wall"//other_rule)
+      call refuse(rule%at_rest .and. box%gives_energy() .and. .not. shear, rest, "walls that give energy, by temperature, " &
+        //"surface_velocity or motion of &side, &obstacle or &wall"//other_rule)
       call refuse(rule%at_rest .and. .not. (law%loses_energy() .or. box%has_lossy_walls()), rest, &
         "elastic collisions"//other_rule//", or a restitution below 1")
       call refuse(single .and. counted .and. .not. (timed .or. by_energy .or. rule%events < unlimited), "stop.collisions", &

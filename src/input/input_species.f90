@@ -51,7 +51,7 @@ contains
         if (.not. s%mass_in_file) call group%put_reals("mass", [s%mass])
         if (s%mass_in_file) call group%values(row_of("species", "mass"))%clear()
         if (.not. s%radius_in_file) call group%put_reals("radius", [s%radius])
-        if (s%radius > 0 .and. s%radius < sqrt(area(s%region)) .and. .not. s%radius_spread > 0) &
+        if (s%radius > 0 .and. s%radius < sqrt(area(s%region)) .and. .not. s%polydispersity > 0) &
           call group%put_reals("packing_fraction", [s%count*pi*s%radius**2/area(s%region)])
         call group%put_reals("region", s%region)
       end associate
@@ -85,14 +85,14 @@ contains
       type(group_t), intent(in) :: group
       type(species_settings_t), intent(inout) :: s
 
-      s%radius_spread = group%real_of("radius_spread", 0.0_real64)
+      s%polydispersity = group%real_of("polydispersity", 0.0_real64)
       s%distribution = group%text_of("radius_distribution")
-      s%mass_by_area = s%radius_spread > 0 .and. group%text_of("mass_by") == "area"
+      s%mass_by_area = s%polydispersity > 0 .and. group%text_of("mass_scaling") == "area"
       s%mass_in_file = s%mass_in_file .and. .not. s%mass_by_area
-      if (s%radius_spread > widest_spread(s%distribution)) call group%complain("radius_spread", "radii would differ by more " &
+      if (s%polydispersity > widest_spread(s%distribution)) call group%complain("polydispersity", "radii would differ by more " &
         //"than a factor of 10; allowed with '"//s%distribution//"': up to "//written(widest_spread(s%distribution)) &
         //"; or give several species", problems)
-      if (s%radius_in_file .and. group%given("radius_spread")) call group%complain("radius_spread", &
+      if (s%radius_in_file .and. group%given("polydispersity")) call group%complain("polydispersity", &
         "has no effect on the radii of a file; give their mean as radius", problems)
     end subroutine take_spread
 
@@ -214,7 +214,7 @@ contains
       else if (group%given("packing_fraction")) then
         if (s%count > 0 .and. area(s%region) > 0) &
           radius = sqrt(group%real_of("packing_fraction", 0.0_real64)*area(s%region)/(pi*s%count))
-        if (s%radius_spread > 0 .and. radius > 0) radius = radius*sqrt(s%count/sum(drawn_radii(s, number, seed)**2))
+        if (s%polydispersity > 0 .and. radius > 0) radius = radius*sqrt(s%count/sum(drawn_radii(s, number, seed)**2))
       else if (relative .and. .not. given) then
         radius = 1
       else if (.not. (given .or. s%radius_in_file)) then

@@ -104,7 +104,7 @@ contains
       associate (rules => words_of(wall_rules), thermal => group%given("temperature"))
         if (.not. (thermal .or. group%given("rule"))) call group%put_text("rule", trim(rules(otherwise%rule)))
         call group%check_choices(problems)
-        law%speed = group%real_of("speed", 0.0_real64)
+        law%speed = group%real_of("surface_velocity", 0.0_real64)
         law%temperature = group%real_of("temperature", 0.0_real64)
         if (thermal) return
         law%rule = max(1, place_of(group%text_of("rule"), rules))
@@ -117,7 +117,7 @@ contains
       if (law%grip%is_rough()) call group%put_reals("tangential_restitution", [law%grip%restitution])
       if (law%grip%is_rough() .and. law%grip%friction < huge(law%grip%friction)) &
         call group%put_reals("friction", [law%grip%friction])
-      if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("speed", &
+      if (abs(law%speed) > 0 .and. .not. law%grip%is_rough()) call group%complain("surface_velocity", &
         "has no effect on disks without temperature or tangential_restitution of the same wall", problems)
     end subroutine take_law
 

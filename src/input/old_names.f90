@@ -16,7 +16,18 @@ module old_names
     old_name_t("side", "begin", "", "start_time"), &
     old_name_t("side", "end", "", "end_time"), &
     old_name_t("side", "motion", "steady", "constant_velocity"), &
-    old_name_t("side", "motion", "free", "piston")]
+    old_name_t("side", "motion", "free", "piston"), &
+    old_name_t("side", "speed", "", "surface_velocity"), &
+    old_name_t("obstacle", "speed", "", "surface_velocity"), &
+    old_name_t("wall", "speed", "", "surface_velocity"), &
+    old_name_t("drive", "speed", "", "self_propulsion_speed"), &
+    old_name_t("species", "radius_spread", "", "polydispersity"), &
+    old_name_t("species", "radius_distribution", "normal", "gaussian"), &
+    old_name_t("species", "mass_by", "", "mass_scaling"), &
+    old_name_t("species", "mass_scaling", "number", "equal"), &
+    old_name_t("contact", "restitution_speed", "", "reference_speed"), &
+    old_name_t("output", "frames_from", "", "decades_from"), &
+    old_name_t("output", "frame_columns", "collisions", "event_count")]
 
 contains
 

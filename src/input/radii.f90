@@ -27,9 +27,9 @@ contains
     integer :: k
 
     radius = species%mean_radius
-    if (.not. species%radius_spread > 0) return
+    if (.not. species%polydispersity > 0) return
     call stream%seed(seed, [s, purpose])
-    deviation = species%radius_spread
+    deviation = species%polydispersity
     if (species%distribution == "lognormal") deviation = sqrt(log(1 + deviation**2))
     k = 1
     do while (k <= size(radius))
@@ -48,7 +48,7 @@ contains
 
   !> The largest spread of a distribution.
   pure function widest_spread(distribution) result(spread)
-    character(len=*), intent(in) :: distribution            !! 'uniform', 'normal' or 'lognormal'
+    character(len=*), intent(in) :: distribution            !! 'uniform', 'gaussian' or 'lognormal'
     real(real64) :: spread
 
     spread = part/merge(sqrt(3.0_real64), deviations, distribution == "uniform")

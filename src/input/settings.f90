@@ -39,8 +39,8 @@ module settings
   type, extends(species_t) :: species_settings_t
     real(real64) :: radius = 0.0_real64               !! of each disk, or the largest in the file, or of those drawn [length]
     real(real64) :: mean_radius = 1.0_real64          !! of all that may be drawn [length]
-    real(real64) :: radius_spread = 0.0_real64        !! its standard deviation over the mean; 0: all are equal
-    character(len=:), allocatable :: distribution     !! 'uniform', 'normal', 'lognormal'
+    real(real64) :: polydispersity = 0.0_real64        !! its standard deviation over the mean; 0: all are equal
+    character(len=:), allocatable :: distribution     !! 'uniform', 'gaussian', 'lognormal'
     logical :: mass_by_area = .false.                 !! of the disks of a spread; the mass is that of the mean radius
     logical :: mass_in_file = .false.                 !! the input leaves the masses to the file, which may have none
     logical :: radius_in_file = .false.               !! the input leaves the radii to the file
@@ -125,7 +125,7 @@ contains
     class(settings_t), intent(inout) :: self
 
     associate (with => self%with, species => self%species)
-      with%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%radius_spread > 0)
+      with%own_sizes = any(species%mass_in_file .or. species%radius_in_file .or. species%polydispersity > 0)
       with%rotation = self%law%grip%is_rough() .or. self%box%has_rough_walls() .or. any(abs(species%angular_velocity) > 0 &
         .or. species%rotational_temperature >= 0 .or. species%spin_in_file)
       with%orientation = with%rotation .or. self%drive%kind == active .or. any(species%angle_in_file)

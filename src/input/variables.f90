@@ -146,7 +146,7 @@ module variables
       not_negative, goes_with="rule normal", may_change=in_motion), &
     variable_t("", "temperature", "real", 1, "optional", "1", "kT of a thermal wall, instead of restitution and rule", &
       positive, "energy", excludes="restitution rule tangential_restitution friction motion", may_change=in_motion), &
-    variable_t("", "speed", "real", 1, "fallback", "0", &
+    variable_t("", "surface_velocity", "real", 1, "fallback", "0", &
       "of the surface: to +x, +y, from -> to, counter-clockwise; if thermal or rough", unit="length/time", may_change=in_motion)]
   integer, private :: g, r
   type(variable_t), parameter :: wall_law_rows(*) = [((variable_t(wall_groups(g), law_rows(r)%name, law_rows(r)%kind, &
@@ -163,14 +163,14 @@ module variables
       "radius of a disk; give it or packing_fraction, or leave it to file", positive, "length"), &
     variable_t("species", "packing_fraction", "real", 1, "optional", "0.3", &
       "area of the disks divided by the area of their region; fixes the radius", fraction, excludes="radius relative_to"), &
-    variable_t("species", "radius_distribution", "text", 1, "optional", "'normal'", &
-      "of radii that differ; follows from radius_spread: uniform", choices="uniform normal lognormal"), &
-    variable_t("species", "radius_spread", "real", 1, "required", "0.2", &
+    variable_t("species", "radius_distribution", "text", 1, "optional", "'gaussian'", &
+      "of radii that differ; follows from polydispersity: uniform", choices="uniform gaussian lognormal"), &
+    variable_t("species", "polydispersity", "real", 1, "required", "0.2", &
       "standard deviation of the radii over their mean, which is then radius", spread_of_radii, &
-      goes_with="radius_distribution uniform normal lognormal"), &
-    variable_t("species", "mass_by", "text", 1, "fallback", "'number'", &
-      "all disks have one mass, or by area, and mass is that of the mean radius", choices="number area", &
-      goes_with="radius_distribution uniform normal lognormal"), &
+      goes_with="radius_distribution uniform gaussian lognormal"), &
+    variable_t("species", "mass_scaling", "text", 1, "fallback", "'equal'", &
+      "all disks have one mass, or by area, and mass is that of the mean radius", choices="equal area", &
+      goes_with="radius_distribution uniform gaussian lognormal"), &
     variable_t("species", "relative_to", "text", 1, "optional", "'bed'", &
       "another species; mass and radius are then multiples of its own (radius: 1)"), &
     variable_t("species", "region", "real", 4, "optional", "0, 1, 0, 0.5", &
@@ -211,7 +211,7 @@ module variables
     variable_t("contact", "restitution_law", "text", 1, "default", "'constant'", &
       "slower contacts of disks and with walls lose less: 1 - restitution ~ g**(1/5)", choices=restitution_laws, &
       may_change=in_motion), &
-    variable_t("contact", "restitution_speed", "real", 1, "required", "1", &
+    variable_t("contact", "reference_speed", "real", 1, "required", "1", &
       "speed g along the normal from which on restitutions are as given", positive, "length/time", &
       goes_with="restitution_law power viscoelastic", may_change=in_motion), &
     variable_t("contact", "wall_rule", "text", 1, "default", "'velocity'", &
@@ -246,7 +246,7 @@ module variables
       "of the disks that a kick reaches, on average", part_of_all, goes_with="kind andersen", may_change=in_motion), &
     variable_t("drive", "temperature", "real", 1, "required", "1", "kT of the new velocities", positive, "energy", &
       goes_with="kind andersen brownian active", may_change=in_motion), &
-    variable_t("drive", "speed", "real", 1, "required", "1", "added along the orientation of a disk", &
+    variable_t("drive", "self_propulsion_speed", "real", 1, "required", "1", "added along the orientation of a disk", &
       not_negative, "length/time", goes_with="kind active", may_change=in_motion), &
     variable_t("drive", "rotational_diffusion", "real", 1, "fallback", "0", &
       "of the orientation: its variance grows by twice this per time", not_negative, "1/time", goes_with="kind active", &
@@ -284,8 +284,8 @@ module variables
     variable_t("output", "frames_at", "real", 0, "optional", "0.1, 1, 10", &
       "frames at these times, too, in their order", not_negative, "time", may_change=on_resume), &
     variable_t("output", "frames_per_decade", "integer", 1, "optional", "10", &
-      "frames at so many times in each power of ten, too, from frames_from on", per_decade, may_change=on_resume), &
-    variable_t("output", "frames_from", "real", 1, "optional", "0.001", &
+      "frames at so many times in each power of ten, too, from decades_from on", per_decade, may_change=on_resume), &
+    variable_t("output", "decades_from", "real", 1, "optional", "0.001", &
       "first time of frames_per_decade and observables_per_decade", positive, "time", may_change=on_resume), &
     variable_t("output", "observables_every_time", "real", 1, "optional", "0.01", &
       "energies, pressure, ...; default the first and the last", positive, "time", may_change=on_resume), &
@@ -298,10 +298,10 @@ module variables
     variable_t("output", "observables_at", "real", 0, "optional", "0.1, 1, 10", &
       "samples at these times, too, in their order", not_negative, "time", may_change=on_resume), &
     variable_t("output", "observables_per_decade", "integer", 1, "optional", "10", &
-      "samples at so many times in each power of ten, too, from frames_from on", per_decade, may_change=on_resume), &
+      "samples at so many times in each power of ten, too, from decades_from on", per_decade, may_change=on_resume), &
     variable_t("output", "frame_columns", "text", 0, "optional", "'position', 'velocity'", &
       "what frames have beside the positions; default: all that there is", &
-      choices="position velocity collisions image angular_velocity orientation"), &
+      choices="position velocity event_count image angular_velocity orientation"), &
     variable_t("output", "precision", "text", 1, "default", "'double'", &
       "of the frames; checkpoints are always double", choices="double single"), &
     variable_t("output", "event_log", "logical", 1, "default", ".false.", "write every collision to /events"), &

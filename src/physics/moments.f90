@@ -17,7 +17,7 @@ module moments
 
   !> What every disk has, and may have.
   type(frame_column_t), parameter :: columns(*) = [frame_column_t("position", 2), frame_column_t("velocity", 2), &
-    frame_column_t("collisions", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
+    frame_column_t("event_count", is_count=.true.), frame_column_t("image", 2, is_count=.true.), &
     frame_column_t("angular_velocity"), frame_column_t("orientation")]
 
 contains

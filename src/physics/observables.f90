@@ -58,21 +58,21 @@ contains
     end do
     call list%add("total_energy", [total(sim, sums(:, 0))])
     call list%add("momentum", sums(momentum:momentum + 1, 0))
-    call list%add("pressure", [pressure(sim, sums(own_kinetic, 0))])
+    call list%add("virial_pressure", [pressure(sim, sums(own_kinetic, 0))])
     call list%add("virial", [sim%tally%total(virial)])
     call list%add("dissipated_energy", [sim%tally%total(dissipated)])
     if (sim%drive%is_on() .or. sim%changes > 0) call list%add("drive_energy", [sim%tally%total(drive_energy)])
     call list%add("collisions", real([sim%tally%collisions], real64), is_count=.true.)
     associate (hits => sim%tally%hits, at_surface => sim%tally%at_surface)
-      call list%add("wall_collisions", real(hits(:n_sides), real64), is_count=.true.)
-      call list%add("wall_impulse", abs([at_surface(impulse, 1:2)%value(), at_surface(impulse + 1, 3:4)%value()]))
+      call list%add("side_collisions", real(hits(:n_sides), real64), is_count=.true.)
+      call list%add("side_impulse", abs([at_surface(impulse, 1:2)%value(), at_surface(impulse + 1, 3:4)%value()]))
       call list%add("obstacle_collisions", real([sum(hits(n_sides + 1:))], real64), is_count=.true.)
     end associate
     if (sim%box%highest_temperature() > 0 .or. sim%changes > 0) call list%add("heat", [sim%tally%total(heat)])
     if (sim%box%highest_speed() > 0 .or. sim%changes > 0) call list%add("work", [sim%tally%total(work)])
     if (sim%with%stress) then
       call list%add("virial_tensor", sim%tally%total([stress, stress + 1, stress + 2, stress + 3]))
-      call list%add("stress_tensor", sums(tensor, 0))
+      call list%add("kinetic_tensor", sums(tensor, 0))
     end if
     if (sim%with%helfand) then
       flown = sums(flow:flow + 4, 0)*sim%time() - sim%tally%total([(flights + k, k=0, 4)])
@@ -82,9 +82,9 @@ contains
     end if
     do k = 1, size(sim%box%surface)
       if (.not. sim%box%is_wall(k)) cycle
-      path = merge("sides/", "walls/", k <= n_sides)//sim%box%surface(k)%name
+      path = trim(merge("sides/    ", "obstacles/", k <= n_sides))//sim%box%surface(k)%name
       call list%add(path//"/impulse", sim%tally%at_surface(impulse:impulse + 1, k)%value())
-      call list%add(path//"/energy", [sim%tally%at_surface(gain, k)%value()])
+      call list%add(path//"/energy_to_disks", [sim%tally%at_surface(gain, k)%value()])
       call list%add(path//"/collisions", real([sim%tally%hits(k)], real64), is_count=.true.)
       if (.not. sim%box%surface(k)%motion%travels()) cycle
       call bounds(sim%box, sim%now, at(:, 1), at(:, 2))
@@ -184,7 +184,7 @@ contains
     empty%with%helfand = .true.
     list = observed(empty)
     allocate (names(list%n + 1))
-    names(list%n + 1) = "walls"                   ! it has none
+    names(list%n + 1) = "obstacles"                 ! it has none
     do k = 1, list%n
       associate (name => list%row(k)%name)
         names(k) = name(:index(name//"/", "/") - 1)

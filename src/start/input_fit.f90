@@ -153,7 +153,7 @@ contains
     type(group_t), intent(inout) :: group
     real(real64), allocatable :: radius(:)                    ! [length]
 
-    if (.not. (s%radius_spread > 0 .and. s%count > 0)) return
+    if (.not. (s%polydispersity > 0 .and. s%count > 0)) return
     radius = drawn_radii(s, k, seed)
     s%radius = maxval(radius)
     if (all(s%region([1, 3]) < s%region([2, 4])) .and. .not. group%given("packing_fraction")) &
@@ -185,7 +185,7 @@ contains
       call check_axis()
       if (.not. sound) return
     end do
-    if (.not. (s%radius_in_file .or. s%radius_spread > 0)) call check_fraction()
+    if (.not. (s%radius_in_file .or. s%polydispersity > 0)) call check_fraction()
     do k = n_sides + 1, size(box%surface)
       associate (shape => box%surface(k)%shape)
         if (shape%encloses .and. any(shape%extent <= s%radius)) call group%complain("radius", "a disk of radius "// &

@@ -116,7 +116,7 @@ contains
             return
           end if
           x = file%table(1:2, :)
-          if (.not. species(s)%radius_spread > 0) radius = file%table(radius_row, :)
+          if (.not. species(s)%polydispersity > 0) radius = file%table(radius_row, :)
           if (species(s)%velocities == "file") then
             do k = first, last
               sim%disk(k)%v = file%table(3:4, k - first + 1)
@@ -203,7 +203,7 @@ contains
         call stream%seed(seed, [s, purpose])
         call centre_range(me%region, packing%box, me%radius, lower, upper)
         ! The fewer the disks, the more the number that fits varies from trial to trial.
-        do trial = 1, merge(1, max(1, many_trials/me%count), me%radius_spread > 0)
+        do trial = 1, merge(1, max(1, many_trials/me%count), me%polydispersity > 0)
           call packing%open_species(int(s, int32), me%radius, me%count, lower, upper)
           call insert_at_random(packing, int(s, int32), 1 + disks_before(species, s), radius, stream, line, placed)
           if (placed == me%count) return

@@ -74,8 +74,8 @@ def test_pandas_gets_all_observables(run):
     np.testing.assert_array_equal(table.index, run.observable("momentum").time)
     np.testing.assert_array_equal(table["total_energy"], run.observable("total_energy").value)
     np.testing.assert_array_equal(table["momentum_y"], run.observable("momentum").value[:, 1])
-    hits = table[[f"wall_collisions_{side}" for side in ("left", "right", "bottom", "top")]]
-    np.testing.assert_array_equal(hits, run.observable("wall_collisions").value)
+    hits = table[[f"side_collisions_{side}" for side in ("left", "right", "bottom", "top")]]
+    np.testing.assert_array_equal(hits, run.observable("side_collisions").value)
     names = {f"{kind}/{what}" for kind in ("all", *run.names) for what in ("mean_speed",)}
     widths = [np.size(run.observable(name).value[0]) for name in run.observables]
     assert names < set(table) and len(table.columns) == sum(widths)

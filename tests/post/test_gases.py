@@ -53,8 +53,8 @@ def steady(path, periodic, speed=1.0, radius=0.01, **parameters):
     observables = {
         "collisions": (500 * time).astype(int),
         "virial": 300 * speed**2 * time,
-        "wall_collisions": np.outer(time, (3, 3, 4, 4)).astype(int),
-        "wall_impulse": speed**2 * np.outer(time, (400.0, 400.0, 500.0, 500.0)),
+        "side_collisions": np.outer(time, (3, 3, 4, 4)).astype(int),
+        "side_impulse": speed**2 * np.outer(time, (400.0, 400.0, 500.0, 500.0)),
     }
     more = {"observables": observables, "observable_time": time, "parameters": parameters}
     more |= {"time": [0, 200], "radius": radius, "periodic": periodic}
@@ -117,7 +117,7 @@ def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
         v, time = np.full((2, 100, 2), 1.0 + k / 1e6), np.arange(401.0)
         virial = np.append(0, np.cumsum(300 + 30 * rng.normal(size=400)))
         observables = {"virial": virial, "collisions": (500 * time).astype(int)}
-        observables |= {name: np.zeros((401, 4)) for name in ("wall_collisions", "wall_impulse")}
+        observables |= {name: np.zeros((401, 4)) for name in ("side_collisions", "side_impulse")}
         more = {"observables": observables, "observable_time": time, "time": [0, 400]}
         runs.append(write_run(tmp_path / f"{k}.h5", v, v, **more))
     (row,) = drawn(tmp_path, "coverage", *runs)
@@ -143,7 +143,7 @@ KICKS = {
     "brownian": "temperature = {}",
     "andersen": "temperature = {} fraction = 0.3",
     "noise": "strength = 0.1",
-    "active": "speed = 0.1 rotational_diffusion = 0.1 temperature = {}",
+    "active": "self_propulsion_speed = 0.1 rotational_diffusion = 0.1 temperature = {}",
 }
 
 
@@ -395,10 +395,10 @@ def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
     assert cool.exponent(soft[0], soft[2]) == pytest.approx(5 / 3, abs=0.01)
     run = simulated(
         f"""&box boundary = 'periodic', 'periodic' /
-        &contact restitution = 0.8 restitution_law = '{law}' restitution_speed = 10 /
+        &contact restitution = 0.8 restitution_law = '{law}' reference_speed = 10 /
         &species count = 400 packing_fraction = 0.05 temperature = 1 /
         &stop collisions_per_disk = 40 /
-        &output observables_per_decade = 20 frames_from = 0.01 /""",
+        &output observables_per_decade = 20 decades_from = 0.01 /""",
         name=law,
     )
     curves, *_ = cool.haff([cool.energy_left(run)], 0.8, cool.soft_law([run]))
@@ -589,7 +589,7 @@ def test_moments_are_those_of_the_definition(gas):
         found = np.concatenate([found[0][:, [0, 1, 3]], found[1]], axis=1)
         np.testing.assert_allclose(found, expected, atol=1e-9 * np.ptp(expected))
     now = [carried(one, m)[[0, 1, 1, 2]] for one in v]
-    np.testing.assert_allclose(run.observable("stress_tensor").value, now, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(run.observable("kinetic_tensor").value, now, rtol=1e-12, atol=1e-12)
 
 
 def test_all_that_changes_velocities_counts_in_what_is_carried(gas):
@@ -602,7 +602,7 @@ def test_all_that_changes_velocities_counts_in_what_is_carried(gas):
         "cadence": "observables_every_time = 0.001",
     }
     run = gas(length=60, **driven)
-    now, sums = (run.observable(name).value for name in ("stress_tensor", "helfand_stress"))
+    now, sums = (run.observable(name).value for name in ("kinetic_tensor", "helfand_stress"))
     steps = 0.001 * (now[1:-1] + now[:-2]) / 2
     np.testing.assert_allclose(sums[-2], steps.sum(axis=0), atol=0.01 * sums[-2].max())
 
@@ -698,7 +698,7 @@ def test_the_viscosity_of_grains_is_what_their_heat_takes(simulated):
 
 
 LOSSY = {"restitution": 0.9}
-SOFT = {"restitution": "0.9 restitution_law = 'power' restitution_speed = 9"}
+SOFT = {"restitution": "0.9 restitution_law = 'power' reference_speed = 9"}
 WALLS = {"sides": "'wall', 'periodic'"}
 FALLING = {"sides": "'periodic', 'wall' gravity = 0, -1", "helfand": ".false."}
 MIXED = {"packing": UNLIKE.format(1, 9)}
@@ -762,7 +762,8 @@ def test_runs_that_a_script_is_not_for_are_refused(gas, tmp_path, capsys, unusua
 # --- fields ---
 
 SHEARED = """&box upper = 20, 10 boundary = 'wall', 'periodic' /
-&side name = 'left' temperature = 2 / &side name = 'right' temperature = 2 speed = {speed} /
+&side name = 'left' temperature = 2 /
+&side name = 'right' temperature = 2 surface_velocity = {speed} /
 &species count = 40 radius = 0.5 temperature = 2 /
 &stop time = 1600 / &output frames_every_time = 4 observables_every_time = 4 /
 """

@@ -363,8 +363,8 @@ def test_a_run_can_be_kept_after_a_wrong_wish_and_without_a_folder(program, tmp_
 SCANS = {  # of a gas: changes, what is measured, with which values, and what it is proportional to
     "gas, the energy of each disk": ({}, "all/kinetic_energy", ("1", "2"), (1, 4)),
     "gas, collisions per time": ({}, "collisions", ("1", "2"), (1, 2)),
-    "gas, pressure": ({}, "pressure", ("1", "2"), (1, 4)),
-    "a gas that collapses": ({"contact.restitution": "0"}, "pressure", ("1", "2"), ()),
+    "gas, pressure": ({}, "virial_pressure", ("1", "2"), (1, 4)),
+    "a gas that collapses": ({"contact.restitution": "0"}, "virial_pressure", ("1", "2"), ()),
     "a gas that cools, energy per time": (
         {"contact.restitution": "0.9"},
         "dissipated_energy",

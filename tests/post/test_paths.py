@@ -25,7 +25,7 @@ SYSTEMS = {
     "grains": "&contact restitution = 0.9 tangential_restitution = 0.5 friction = 0.3\n"
     "wall_rule = 'normal' /\n" + SHAPES,
     "driven": "&side name = 'left' temperature = 2 /\n"
-    "&side name = 'top' temperature = 1 speed = 3 /\n"
+    "&side name = 'top' temperature = 1 surface_velocity = 3 /\n"
     + SHAPES.replace("/", "temperature = 3 /", 1),
     "moving": "&side name = 'right' motion = 'sine' amplitude = 0.05 period = 0.7 /\n"
     "&side name = 'bottom' motion = 'sawtooth' velocity = 0.5 /\n"

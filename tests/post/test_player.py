@@ -42,7 +42,7 @@ def filmed(run, frames, traced=()):
 def test_speeds_energies_and_pressure_are_those_of_the_run(tmp_path, rng):
     pressure = np.linspace(1, 2, 1000)
     for count in (1000, 3, 2):
-        observables = {"collisions": np.arange(count), "pressure": pressure[:count]}
+        observables = {"collisions": np.arange(count), "virial_pressure": pressure[:count]}
         times = {"observables": observables, "observable_time": np.arange(count)}
         run = read_run(bouncing_gas(tmp_path / "gas.h5", rng, **times))
         curves = filmed(run, [0, 20])[0]["curves"]

@@ -36,11 +36,11 @@ def simulated(program, tmp_path, monkeypatch):
 def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
     """The program divides K + W / 2t by it, at each sample."""
     run = simulated(INPUTS[kind])
-    time, pressure = run.observable("pressure")
+    time, pressure = run.observable("virial_pressure")
     virial = run.observable("virial").value
     kinetic = run.n_disks * run.observable("all/kinetic_energy").value
     if run.shear_rate:  # K is relative to the flow
-        kinetic = run.observable("stress_tensor").value[:, [0, 3]].sum(axis=1) / 2
+        kinetic = run.observable("kinetic_tensor").value[:, [0, 3]].sum(axis=1) / 2
     late = time > 0
     own = (kinetic + virial / (2 * np.where(late, time, 1)))[late] / pressure[late]
     assert run.accessible_area(time)[late] == pytest.approx(own, rel=1e-12)
@@ -49,7 +49,9 @@ def test_the_area_is_that_of_the_pressure_in_the_file(simulated, kind):
 def test_the_pressure_of_a_whole_run_is_the_last_one_in_the_file(simulated):
     """Where nothing changes the kinetic energy."""
     run = simulated(INPUTS["obstacle"])
-    assert run.pressure(0, 2) == pytest.approx(run.observable("pressure").value[-1], rel=1e-12)
+    assert run.pressure(0, 2) == pytest.approx(
+        run.observable("virial_pressure").value[-1], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("kind", ["walls", "heated", "sheared", "container"])

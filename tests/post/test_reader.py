@@ -125,8 +125,8 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
     energy = 0.5 * np.mean(run.inertia * run.angular_velocity[:] ** 2, axis=1)
     assert run.observable("all/rotational_energy").value[-1] == pytest.approx(energy[-1])
     assert run.orientation[-1].any() and not run.orientation[0].any()
-    assert {"sides/left/impulse", "walls/w/energy"} <= set(run.observables)
-    assert run.observable("walls/w/impulse").value.shape[1:] == (2,)
+    assert {"sides/left/impulse", "obstacles/w/energy_to_disks"} <= set(run.observables)
+    assert run.observable("obstacles/w/impulse").value.shape[1:] == (2,)
     size = np.hypot(*run.event_log().momentum_change.T)
     assert size == pytest.approx(run.event_log().impulse)
     with pytest.raises(RunError, match="no wall_hits in its frames"):

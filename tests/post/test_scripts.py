@@ -190,7 +190,7 @@ def test_a_sheared_gas_is_steady_relative_to_its_flow(tmp_path, rng, capsys, fig
 
 
 def test_speeds_of_few_disks_or_at_rest_or_on_sliding_walls_are_refused(tmp_path, rng, capsys):
-    slides = {"parameters": {"side/top": {"speed": 1.0}}, "names": ("disk",)}
+    slides = {"parameters": {"side/top": {"surface_velocity": 1.0}}, "names": ("disk",)}
     said = refusal(capsys, "speeds", gas(tmp_path / "a.h5", rng, **slides), code=1)
     assert "a.h5: has surfaces that slide;" in said
     for count, words in ((2, "needs three disks"), (3, "'disk' is at rest (kT = 0)")):
@@ -346,7 +346,7 @@ def impact(path, mass=25.0, speed=5.0, xi=0.5, seed=1, moved=3, left=0.1, names=
     v[0, 0], v[1, 0] = (0, -speed), (0, -speed * np.sqrt(left))
     hit = np.zeros((2, 81), np.int32)
     hit[1, : 1 + moved + 4] = 2
-    observables = {"collisions": [0, 90], "wall_collisions": [[0] * 4, [0, 0, walls, 0]]}
+    observables = {"collisions": [0, 90], "side_collisions": [[0] * 4, [0, 0, walls, 0]]}
     observables["all/kinetic_energy"] = [1.0, left]
     parameters = {"run": {"seed": seed}, "contact": {"restitution": xi}}
     parameters["stop"] = {"energy_fraction": 0.1}

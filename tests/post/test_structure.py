@@ -274,7 +274,7 @@ def test_what_makes_no_lags_is_refused(tmp_path, rng):
 MIXED = """&run seed = {seed} / &box boundary = 'periodic', 'periodic' /
 &species name = 'a' count = 150 packing_fraction = {packing} temperature = 2 mass = 3 /
 &species name = 'b' count = 150 packing_fraction = {packing} temperature = 2 /
-&stop time = {until} / &output frames_every_time = 0.02 frames_from = 0.001 frames_per_decade = 5 /
+&stop time = {until} / &output frames_every_time = 0.02 decades_from = 0.001 frames_per_decade = 5 /
 """
 
 
@@ -354,7 +354,8 @@ def test_errors_of_one_run_hold_the_truth_as_often_as_they_say(tmp_path, rng):
         ("&contact restitution = 0.9 /", "is not elastic"),
         ("&box boundary = 'periodic', 'periodic' shear_rate = 1 /", "is sheared"),
         (
-            "&box boundary = 'periodic', 'wall' / &side name = 'top' temperature = 1 speed = 1 /",
+            "&box boundary = 'periodic', 'wall' / "
+            "&side name = 'top' temperature = 1 surface_velocity = 1 /",
             "slide",
         ),
     ],

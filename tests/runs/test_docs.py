@@ -261,7 +261,7 @@ def test_the_code_that_the_page_on_output_shows_reads_a_run(tmp_path):
     assert "from ricochet import read_run" in code and "import h5py" in code
     (tmp_path / "runs").mkdir()
     x = np.random.default_rng(1).uniform(size=(2, 30, 2))
-    names = "all/kinetic_energy", "total_energy", "pressure"
+    names = "all/kinetic_energy", "total_energy", "virial_pressure"
     energies = {name: [0.0, 0.0] for name in names}
     for name, periodic in (("gas", (False, False)), ("bulk", (True, True))):
         path = tmp_path / "runs" / f"{name}.h5"
@@ -486,11 +486,14 @@ def test_the_recipes_work(tmp_path):
     with h5py.File(tmp_path / "plain.h5") as file:
         exchanged = file["observables/exchanged_impulse/value"][:]
         hits = file["particles/disks/wall_hits/value"][:]
-        sides = [file[f"observables/sides/{name}/energy/value"][-1] for name in ("bottom", "top")]
+        sides = [
+            file[f"observables/sides/{name}/energy_to_disks/value"][-1]
+            for name in ("bottom", "top")
+        ]
         assert sides[0] == pytest.approx(0, abs=1e-9) and sides[1] < -1  # elastic, and not
-        assert file["observables/wall_collisions/value"][-1].sum() == 1500
+        assert file["observables/side_collisions/value"][-1].sum() == 1500
         assert exchanged[0] == 0 and exchanged[-1] > 0
-        assert (hits.sum(1) == file["observables/wall_collisions/value"][:].sum(1)).all()
+        assert (hits.sum(1) == file["observables/side_collisions/value"][:].sum(1)).all()
 
 
 # --- the notebook runs from its first cell to its last, and shows what it promises ---

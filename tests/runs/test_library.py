@@ -280,7 +280,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
         return gas.observable("total_energy") + gas.observable("dissipated_energy") - sum(flows)
 
     before = balance()
-    soft = {"contact.restitution_law": "power", "contact.restitution_speed": 1}
+    soft = {"contact.restitution_law": "power", "contact.reference_speed": 1}
     gas.change({"box.gravity": (0, 3), "side.top.temperature": 2, **soft})
     gas.advance(events=150).change({"contact.restitution": 0.7})
     gas.advance(events=200).velocity = 2 * gas.velocity
@@ -411,7 +411,7 @@ def test_a_damaged_input_in_a_file_is_called_damaged(tmp_path):
         {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}},
         {"drive": {"kind": "active", "interval": 1e-4, "temperature": 1, "speed": 2}},
         {"output": {"frames_every_time": 0.1, "observables_every_time": 1e-3}},
-        {"output": {"frames_per_decade": 5, "frames_from": 1e-3, "observables_at": [0.1, 0.2]}},
+        {"output": {"frames_per_decade": 5, "decades_from": 1e-3, "observables_at": [0.1, 0.2]}},
         {"run": {"dynamics": "steps", "dt": 1e-4}},
         {"species": {"name": "a", "count": 1, "radius": 0.1, "speed": 1}}
         | {"drive": {"kind": "noise", "interval": 0.01, "strength": 1}}

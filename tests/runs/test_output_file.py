@@ -56,14 +56,14 @@ def test_the_layout_is_h5md(ran):
     for name, kind, shape in [
         ("position", np.float64, (frames, 80, 2)),
         ("velocity", np.float64, (frames, 80, 2)),
-        ("collisions", np.int32, (frames, 80)),
+        ("event_count", np.int32, (frames, 80)),
     ]:
         assert disks[name]["value"].shape == shape and disks[name]["value"].dtype == kind
         assert disks[name]["step"] == disks["position/step"], "a hard link"
         assert disks[name]["time"] == disks["position/time"], "a hard link"
     assert "image" not in disks
     observables = file["observables"]
-    scalars = ["total_energy", "pressure", "virial", "dissipated_energy"]
+    scalars = ["total_energy", "virial_pressure", "virial", "dissipated_energy"]
     scalars += [
         f"{group}/{name}"
         for group in ("all", "light", "heavy")
@@ -71,12 +71,12 @@ def test_the_layout_is_h5md(ran):
     ]
     counts = ["collisions", "obstacle_collisions"]
     samples = len(observables["total_energy/value"])
-    for name in [*scalars, *counts, "momentum", "wall_collisions", "wall_impulse"]:
-        width = {"momentum": (2,), "wall_collisions": (4,), "wall_impulse": (4,)}.get(name, ())
+    for name in [*scalars, *counts, "momentum", "side_collisions", "side_impulse"]:
+        width = {"momentum": (2,), "side_collisions": (4,), "side_impulse": (4,)}.get(name, ())
         assert observables[name]["value"].shape == (samples, *width)
         assert observables[name]["step"] == observables["all/kinetic_energy/step"]
         assert observables[name]["time"] == observables["all/kinetic_energy/time"]
-    for name in [*counts, "wall_collisions"]:
+    for name in [*counts, "side_collisions"]:
         assert observables[name]["value"].dtype == np.int64
     assert disks["committed"][()] == frames and observables["committed"][()] == samples
 
@@ -137,7 +137,7 @@ def test_samples_are_at_the_very_multiples_and_at_the_end(ran, track, cadence, e
     disks, seen = file["particles/disks"], file["observables"]
     times, number = disks["position/time"][:], seen["collisions/value"][:]
     if "events" in cadence:
-        number = number + seen["wall_collisions/value"][:].sum(axis=1)
+        number = number + seen["side_collisions/value"][:].sum(axis=1)
     assert (times if track == "frames" else number).tolist() == expected
     assert disks["position/step"][:].tolist() == list(range(len(times)))
     other = (number[1:-1] % 50 == 0) if track == "frames" else (times[1:-1] % 0.25 == 0)
@@ -155,7 +155,7 @@ def test_single_precision_is_the_same_run_rounded(ran):
 
 
 TURNING = GRAVITY + "&contact friction = 0.2 tangential_restitution = 0.3 /\n"
-COLUMNS = "velocity", "collisions", "image", "angular_velocity", "orientation"
+COLUMNS = "velocity", "event_count", "image", "angular_velocity", "orientation"
 
 
 @pytest.mark.parametrize("wanted", [["position"], COLUMNS[:1], COLUMNS[1:4:2], COLUMNS])
@@ -165,7 +165,7 @@ def test_frames_have_the_columns_that_are_asked_for(ran, wanted):
     words = ", ".join(f"'{name}'" for name in wanted)
     part = ran(TURNING, f"--set=output.frame_columns={words}", name="part")["particles/disks"]
     found, there = ({name for name in disks if f"{name}/value" in disks} for disks in (part, whole))
-    assert there >= {"position", "velocity", "collisions", "image", "angular_velocity"}
+    assert there >= {"position", "velocity", "event_count", "image", "angular_velocity"}
     assert found == there & {"position", *wanted}
     for name in found:
         for item in ("step", "time", "value"):

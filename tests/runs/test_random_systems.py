@@ -193,7 +193,7 @@ UNITS = {
     "/particles/disks/velocity/value": "velocity",
     "/particles/disks/angular_velocity/value": "1 / time",
     "/particles/disks/orientation/value": "1",
-    "/particles/disks/collisions/value": "1",
+    "/particles/disks/event_count/value": "1",
     "/observables/total_energy/value": "energy",
     "/observables/dissipated_energy/value": "energy",
     "/observables/momentum/value": "mass * velocity",
@@ -376,7 +376,7 @@ def test_a_program_whose_result_depends_on_the_way_is_found_out(program, tmp_pat
         ("disks and walls apart", "/parameters/box@shear_rate", lambda x: -x),
         ("log", "/events/j", lambda x: -x),
         ("log", "/events/time", lambda x: x[::-1]),
-        ("log", "/particles/disks/collisions/value", lambda x: x + 1),
+        ("log", "/particles/disks/event_count/value", lambda x: x + 1),
         ("observables", "/particles/disks/velocity/value", lambda x: 1.000001 * x),
     ],
 )

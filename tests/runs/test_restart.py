@@ -148,7 +148,7 @@ def test_a_run_that_breaks_off_leaves_its_last_state_and_makes_way(ricochet, tmp
         assert len(times) == disks["committed"][()] == len(disks["position/value"])
         assert 2 < times[-1] < 2.2 and times[-1] % 0.1 > 1e-3
         assert np.all(disks["position/value"][-1, :, 1] < 0.1)
-        assert file["events/committed"][()] == observables["wall_collisions/value"][-1].sum()
+        assert file["events/committed"][()] == observables["side_collisions/value"][-1].sum()
         assert observables["total_energy/time"][-1] == times[-1]
         assert file["provenance"].attrs["note"].decode() == run.stderr.strip()
     again = ricochet("gas.nml", "-o", "gas.h5", "--quiet", "--resume")
@@ -230,7 +230,7 @@ def test_all_that_happens_at_the_end_happens_whatever_the_cadence(ricochet, tmp_
     assert ricochet(*COMMAND, "--set", f"output.{pause}").returncode == FINISHED
     with h5py.File(tmp_path / "gas.h5") as file:
         assert file["observables/collisions/value"][-1] == 3
-        assert np.all(file["particles/disks/collisions/value"][-1] == 1)
+        assert np.all(file["particles/disks/event_count/value"][-1] == 1)
 
 
 def test_the_last_frame_of_steps_is_after_the_kick_whatever_the_cadence(ricochet, tmp_path):
@@ -266,7 +266,7 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
     assert ricochet(*COMMAND, "--set", "stop.time=1.3").returncode == FINISHED
     new = ["output.frames_every_time=0.5", "output.observables_every_events=100", "stop.time=3.1"]
     many = sorted({0.01 * k for k in range(1, 130)} | {1.6})  # more than are kept as a text
-    new += [f"output.frames_at={','.join(map(repr, many))}", "output.frames_from=0.3"]
+    new += [f"output.frames_at={','.join(map(repr, many))}", "output.decades_from=0.3"]
     new += [
         "output.frames_per_decade=1",
         "run.title='longer'",
@@ -279,7 +279,7 @@ def test_a_new_cadence_counts_from_where_the_run_goes_on(ricochet, tmp_path):
         times = file["particles/disks/position/time"][:]
         assert file["parameters/run"].attrs["title"] == b"longer"
         events = file["observables/collisions/value"][:]
-        events = events + file["observables/wall_collisions/value"][:].sum(axis=1)
+        events = events + file["observables/side_collisions/value"][:].sum(axis=1)
         sampled = file["observables/collisions/time"][:]
     assert times.tolist() == [0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.6, 2, 2.5, 3, 3.1]
     assert {900, 1000, 1100, 1200, 1300} < set(events[sampled > 1.3])

@@ -121,8 +121,8 @@ def test_disks_of_many_sizes_grow_to_their_own(ricochet, tmp_path, bed):
     ("law", "spread", "placement", "packing"),
     [
         ("uniform", 0.47, "random", 0.6),
-        ("normal", 0.1, "lattice", 0.3),
-        ("normal", 0.27, "dense", 0.75),
+        ("gaussian", 0.1, "lattice", 0.3),
+        ("gaussian", 0.27, "dense", 0.75),
         ("lognormal", 0.39, "random", 0.5),
         ("lognormal", 0.2, "grown", 0.7),
     ],
@@ -138,9 +138,9 @@ def test_radii_that_are_drawn_fill_what_was_asked_and_go_on(
     write_input(
         tmp_path,
         f"""&box boundary = 'periodic', 'wall' /
-        &species count = 400 packing_fraction = {packing} mass = 2 mass_by = 'area' {where}
-        radius_spread = {spread} radius_distribution = '{law}' /
-        &species name = 'other' count = 9 relative_to = 'species1' radius = 0.5 radius_spread = 0.2
+        &species count = 400 packing_fraction = {packing} mass = 2 mass_scaling = 'area' {where}
+        polydispersity = {spread} radius_distribution = '{law}' /
+        &species name = 'other' count = 9 relative_to = 'species1' radius = 0.5 polydispersity = 0.2
         temperature = 1 region = 0, 1, 0, 1 placement = 'dense' /
         &stop events = 3000 /""",
     )

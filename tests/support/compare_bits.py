@@ -31,16 +31,42 @@ OLD_WORDS = {
         r"\bend_time(?= *=)": "end",
         "'constant_velocity'": "'steady'",
         "'piston'": "'free'",
+        r"\bsurface_velocity(?= *=)": "speed",
     },
+    "obstacle": {r"\bsurface_velocity(?= *=)": "speed"},
+    "wall": {r"\bsurface_velocity(?= *=)": "speed"},
+    "drive": {r"\bself_propulsion_speed(?= *=)": "speed"},
+    "species": {
+        r"\bpolydispersity(?= *=)": "radius_spread",
+        "'gaussian'": "'normal'",
+        r"\bmass_scaling(?= *=)": "mass_by",
+        "'equal'": "'number'",
+    },
+    "contact": {r"\breference_speed(?= *=)": "restitution_speed"},
+    "output": {r"\bdecades_from(?= *=)": "frames_from", "'event_count'": "'collisions'"},
 }
 # The present names of what it writes: a pattern and its replacement.
 OLD_PATHS = {
+    r"(/parameters/(?:side/\w+@|obstacle/|wall/))speed$": r"\1surface_velocity",
+    r"(/parameters/drive@)speed$": r"\1self_propulsion_speed",
+    r"(/parameters/species/[^@]+@)radius_spread$": r"\1polydispersity",
+    r"(/parameters/species/[^@]+@)mass_by$": r"\1mass_scaling",
+    r"(/parameters/contact@)restitution_speed$": r"\1reference_speed",
+    r"(/parameters/output@)frames_from$": r"\1decades_from",
+    r"(/observables/)wall_(collisions|impulse)(?=[/@]|$)": r"\1side_\2",
+    r"(/observables/)pressure(?=[/@]|$)": r"\1virial_pressure",
+    r"(/observables/)stress_tensor(?=[/@]|$)": r"\1kinetic_tensor",
+    r"(/particles/disks/)collisions(?=[/@]|$)": r"\1event_count",
+    r"(/observables/(?:sides|walls)/[^/]+)/energy(?=[/@]|$)": r"\1/energy_to_disks",
+    r"(/observables/)walls(?=[/@]|$)": r"\1obstacles",
     r"(/observables/sides/\w+)/place(?=[/@]|$)": r"\1/position",
     r"(/parameters/side/\w+@)begin$": r"\1start_time",
     r"(/parameters/side/\w+@)end$": r"\1end_time",
 }
 OLD_VALUES = {
     r"/parameters/side/\w+@motion": {b"steady": b"constant_velocity", b"free": b"piston"},
+    r"/parameters/species/[^@]+@radius_distribution": {b"normal": b"gaussian"},
+    r"/parameters/species/[^@]+@mass_by": {b"number": b"equal"},
 }
 
 

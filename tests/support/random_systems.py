@@ -126,7 +126,7 @@ class Draw:
         if self.chance(0.5):
             return ""
         sliding = rng.choice([-1, 1]) * self.speed * 10.0 ** rng.uniform(-1, 0.5)
-        sliding = self.maybe(0.5, f"speed = {sliding!r}")
+        sliding = self.maybe(0.5, f"surface_velocity = {sliding!r}")
         if self.chance(0.4):
             self.worked = True
             return f" temperature = {self.speed**2 * 10.0 ** rng.uniform(-1, 1)!r}{sliding}"
@@ -151,7 +151,7 @@ class Draw:
             if self.periodic[k // 2] or self.chance(0.65):
                 continue
             words = self.law()
-            if "temperature" not in words and "speed" not in words and self.chance(0.6):
+            if not {"temperature", "surface_velocity"} & set(words.split()) and self.chance(0.6):
                 words += self.side_motion()
             if not re.search("'(sine|parabolic|sawtooth)'", words) and self.chance(0.25):
                 edge, way = self.edges[k // 2], self.rng.choice([1e-6, 0.1, 0.7])
@@ -272,9 +272,9 @@ class Draw:
                 radius = min(radius, 0.4 * min(wide / columns, high / rows))
             spread = ""
             if self.chance(0.25):
-                law, most = rng.choice([("uniform", 0.47), ("normal", 0.27), ("lognormal", 0.39)])
-                spread = f" radius_spread = {most * rng.random()!r} radius_distribution = '{law}'"
-                spread += self.maybe(0.5, "mass_by = 'area'")
+                law, most = rng.choice([("uniform", 0.47), ("gaussian", 0.27), ("lognormal", 0.39)])
+                spread = f" polydispersity = {most * rng.random()!r} radius_distribution = '{law}'"
+                spread += self.maybe(0.5, "mass_scaling = 'area'")
                 radius /= 2  # the largest may be thrice as large
             size = f"radius = {radius!r} mass = {mass!r}"
             if k == 0 and "grid" not in placement and self.chance(0.1):
@@ -348,7 +348,7 @@ class Draw:
         if self.least or self.chance(0.2):
             self.drifts = True  # slower and slower: the last of the events may be a long time away
             words += f" restitution_law = '{'viscoelastic' if self.least else 'power'}'"
-            words += f" restitution_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
+            words += f" reference_speed = {self.speed * 10.0 ** rng.uniform(-2, 1)!r}"
         if self.turns or self.chance(0.5):
             words += " wall_rule = 'normal'"
         if self.turns:
@@ -377,7 +377,8 @@ class Draw:
                 f"kind = 'andersen' temperature = {energy!r}"
                 f" fraction = {rng.choice([1, 0.1, 1e-3])}",
                 f"kind = 'brownian' temperature = {energy!r}",
-                f"kind = 'active' temperature = {energy!r} speed = {self.speed!r}{turn}",
+                f"kind = 'active' temperature = {energy!r}"
+                f" self_propulsion_speed = {self.speed!r}{turn}",
             ]
         )
         words += self.maybe(0.3, "species = 's0'")
@@ -410,7 +411,7 @@ class Draw:
                 words += f" {track}_at = {numbers(*times)}"
             words += self.maybe(0.3, f"{track}_per_decade = {rng.randint(1, 9)}")
         if "per_decade" in words:
-            words += f" frames_from = {self.cadence('time') / 100!r}"
+            words += f" decades_from = {self.cadence('time') / 100!r}"
         words += self.maybe(0.2, "frame_columns = 'velocity', 'image', 'orientation'")
         return words + " /"
 

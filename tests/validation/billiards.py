@@ -88,7 +88,7 @@ def last(run: Run, name: str) -> float:
 
 def free_path(run: Run) -> float:
     """Length of the path over the number of hits, speed 1."""
-    return run.time[-1] / (last(run, "wall_collisions") + last(run, "obstacle_collisions"))
+    return run.time[-1] / (last(run, "side_collisions") + last(run, "obstacle_collisions"))
 
 
 def mean_path(radius: float, hole: float) -> float:
@@ -135,7 +135,7 @@ CASES = [
         "P12-04", "light disk about a very heavy one: hits per time on disk and sides",
         (HEAVY,),
         lambda run: [
-            last(run, "collisions") / run.time[-1], last(run, "wall_collisions") / run.time[-1]
+            last(run, "collisions") / run.time[-1], last(run, "side_collisions") / run.time[-1]
         ],
         [0.511039, 1.518241], relative(0.005), "D, R",
     ),

@@ -65,7 +65,7 @@ def hits_of_masses(*runs: Run) -> Estimate:
 
 def hit_less_bound(run: Run) -> float:
     """Disks hit less M (1/f - 1), if the sides played no part."""
-    if np.sum(run.observable("wall_collisions").value[-1]) > 0:
+    if np.sum(run.observable("side_collisions").value[-1]) > 0:
         raise ValueError("a disk has hit a side")
     return hit(run) - 25 * (1 / 0.1 - 1)
 

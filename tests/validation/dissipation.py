@@ -58,9 +58,9 @@ ENDLESS = tuple(
 SOFT = {
     law: gases(
         20, 500, packing_fraction=ETA, periodic=True, temperature=1.0,
-        contact={"restitution": 0.8, "restitution_law": law, "restitution_speed": 20},
+        contact={"restitution": 0.8, "restitution_law": law, "reference_speed": 20},
         stop={"collisions_per_disk": 150},
-        output={"observables_per_decade": 20, "frames_from": 0.1},
+        output={"observables_per_decade": 20, "decades_from": 0.1},
     )
     for law in ("power", "viscoelastic")
 }  # fmt: skip
@@ -99,7 +99,7 @@ def slow_loss(rule: str) -> tuple[Member, ...]:
 def loss_per_hit(run: Run) -> float:
     """Mean energy lost per hit on a side, over (1 - xi^2) kT."""
     energy = run.observable("total_energy").value
-    hits = run.observable("wall_collisions").value.sum(axis=1)
+    hits = run.observable("side_collisions").value.sum(axis=1)
     return -log(energy[-1] / energy[0]) * run.n_disks / hits[-1] / (1 - SLOW**2)
 
 

@@ -41,7 +41,7 @@ def rate(run: Run, name: str) -> float:
 
 def flux(run: Run) -> float:
     """Heat per time from left to right."""
-    return (rate(run, "sides/left/energy") - rate(run, "sides/right/energy")) / 2
+    return (rate(run, "sides/left/energy_to_disks") - rate(run, "sides/right/energy_to_disks")) / 2
 
 
 # --- a gas between walls of one temperature ---

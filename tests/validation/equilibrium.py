@@ -145,7 +145,7 @@ IDENTITIES = tuple(
 def identity_terms(run: Run) -> tuple[float, float, float]:
     """Wall pressure, virial pressure, and the boundary term d(sum m x v) / (2 K t); whole run."""
     work = 2 * np.sum(run.kinetic_energy(0)) * run.time[-1]
-    impulse, a = run.observable("wall_impulse").value[-1], run.edges - 2 * run.radius[0]
+    impulse, a = run.observable("side_impulse").value[-1], run.edges - 2 * run.radius[0]
     wall = (impulse[:2].mean() * a[0] + impulse[2:].mean() * a[1]) / work
     moved = [np.sum(run.mass[:, None] * run.velocity[k] * (run.position[k] - 0.5)) for k in (0, -1)]
     return wall, 1 + run.observable("virial").value[-1] / work, (moved[1] - moved[0]) / work
@@ -213,7 +213,7 @@ def over_equation_of_state(run: Run) -> SeriesMean:
 
 def polydisperse(eta: float, law: str, spread: float) -> tuple[Member, ...]:
     """Periodic, masses as areas."""
-    size = {"radius_spread": spread, "radius_distribution": law, "mass_by": "area"}
+    size = {"polydispersity": spread, "radius_distribution": law, "mass_scaling": "area"}
     return long_gases(2, N, 2000, packing_fraction=eta, periodic=True, **size)
 
 

@@ -288,7 +288,7 @@ ROD_COUNTS = {1: [54, 8], 10: [566, 95], 100: [5606, 959]}
 
 def rod_counts(run: Run, frame: int) -> list[int]:
     """Pair and wall collisions so far."""
-    walls = run.observable("wall_collisions").value[frame]
+    walls = run.observable("side_collisions").value[frame]
     return [run.observable("collisions").value[frame], walls.sum()]
 
 

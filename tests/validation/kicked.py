@@ -98,7 +98,14 @@ BATHED = free(1, 2000, kind="andersen", temperature=BATH, fraction=FRACTION)
 DIFFUSING = free(1, 2000, kind="brownian", temperature=BATH)
 SWIM, TURN = 1.5, 0.02  #: speed and diffusion of the orientation of an active disk
 WARMTH = 0.5
-SWIMMING = free(10, 20000, kind="active", temperature=WARMTH, speed=SWIM, rotational_diffusion=TURN)
+SWIMMING = free(
+    10,
+    20000,
+    kind="active",
+    temperature=WARMTH,
+    self_propulsion_speed=SWIM,
+    rotational_diffusion=TURN,
+)
 
 
 def memory(run: Run) -> list[float]:

@@ -101,7 +101,7 @@ def between(eta: float, temperatures: tuple[float, float], speed: float) -> tupl
         8,
         box={"upper": (2 * edge, edge), "boundary": ("wall", "periodic")},
         side=[
-            {"name": name, "temperature": kt, "speed": u}
+            {"name": name, "temperature": kt, "surface_velocity": u}
             for name, kt, u in zip(
                 ("left", "right"), temperatures, (-speed, speed), strict=True
             )

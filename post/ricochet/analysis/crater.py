@@ -26,7 +26,7 @@ class Crater(NamedTuple):
     energy_left: float  # over the energy at the start
     time: float
     collisions: int
-    wall_collisions: int
+    side_collisions: int
 
 
 #: What a run may be in which nothing but a projectile moves a bed.
@@ -45,9 +45,9 @@ def ended_by_time(run: Run, size: Crater) -> bool:
     return size.energy_left > energy_fraction(run) * (1 + 1e-9)
 
 
-def box_takes_part(run: Run, wall_collisions: float) -> bool:
-    """The crater reaches the floor or the sides; `wall_collisions` may be a mean over runs."""
-    return wall_collisions > FEW_HITS * run.n_disks
+def box_takes_part(run: Run, side_collisions: float) -> bool:
+    """The crater reaches the floor or the sides; `side_collisions` may be a mean over runs."""
+    return side_collisions > FEW_HITS * run.n_disks
 
 
 def projectile(run: Run) -> int:
@@ -94,7 +94,7 @@ def crater(run: Run) -> Crater:
         energy_left=float(run.kinetic_energy(-1).sum() / run.kinetic_energy(0).sum()),
         time=float(run.time[-1]),
         collisions=int(run.observable("collisions").value[-1]),
-        wall_collisions=int(run.observable("wall_collisions").value[-1].sum()),
+        side_collisions=int(run.observable("side_collisions").value[-1].sum()),
     )
 
 

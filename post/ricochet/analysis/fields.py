@@ -327,7 +327,9 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
     parts = []
     for block in blocks:
         impulse = gained(block, f"sides/{far}/impulse") - gained(block, f"sides/{near}/impulse")
-        energy = gained(block, f"sides/{near}/energy") - gained(block, f"sides/{far}/energy")
+        energy = gained(block, f"sides/{near}/energy_to_disks") - gained(
+            block, f"sides/{far}/energy_to_disks"
+        )
         parts.append([impulse[axis], impulse[1 - axis], *energy, block.end - block.start])
     sums = np.array(parts)
     return jackknife(lambda total: total[:3] / total[3] / length, sums, sums[:, 3:])

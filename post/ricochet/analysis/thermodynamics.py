@@ -262,7 +262,7 @@ def steps(run: Run, skip: float | None = None) -> Steps:
         )
     sums = (
         run.observable(name).value[first:]
-        for name in ("collisions", "virial", "wall_collisions", "wall_impulse")
+        for name in ("collisions", "virial", "side_collisions", "side_impulse")
     )
     collisions, virial, hits, impulse = (np.diff(s, axis=0) for s in sums)
     if not collisions.any():

@@ -191,7 +191,7 @@ def name_walls(axes: plt.Axes, run: Run) -> None:
     walls = rows_of(run.parameters.get("wall", {}))
     shown += [(own, (*ends, 1)) for own, ends in zip(walls, run.walls, strict=False)]
     for own, (start, end, side) in shown:
-        speed = own.get("speed", 0.0)
+        speed = own.get("surface_velocity", 0.0)
         words = [f"kT = {own['temperature']:g}"] if known(own.get("temperature")) else []
         words += [f"{'→' if speed > 0 else '←'} {abs(speed):g}"] if speed else []
         way = np.subtract(end, start)

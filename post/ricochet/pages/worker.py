@@ -288,7 +288,7 @@ class Bench:
         if not self.samples or now > self.samples[-1][0]:
             self.samples.append(sample)
         hit = value["collisions"] > 0
-        pressure = value["pressure"] if hit else None
+        pressure = value["virial_pressure"] if hit else None
         tell(
             {"is": "numbers", "time": now, "pressure": pressure, "settles": self.settles}
             | energies
@@ -364,11 +364,11 @@ def observed(simulation: Simulation) -> dict[str, float]:
 def sampled(count: int, value: dict) -> tuple[float, ...]:
     """What means are made of: time, kinetic energy, virial, and the area for disks of this moment.
 
-    That is what makes the observable `pressure` of the two before it.
+    That is what makes the observable `virial_pressure` of the two before it.
     """
     time, kinetic, virial = (value[name] for name in ("time", "all/kinetic_energy", "virial"))
     whole = count * kinetic + (virial / (2 * time) if time else 0.0)
-    return time, kinetic, virial, whole / (value["pressure"] or 1.0)
+    return time, kinetic, virial, whole / (value["virial_pressure"] or 1.0)
 
 
 def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
@@ -521,7 +521,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
     apart = np.diff(late[0])
     if not apart.any():
         raise ValueError("nothing to measure: no collisions, or all of them at one moment")
-    if name == "pressure":  # that is a mean since the start
+    if name == "virial_pressure":  # that is a mean since the start
         one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart

@@ -129,7 +129,7 @@ def nature_of(
         "active": kind == "active",
         "moving": bool(motions - {"still", "piston"}),
         "pushed": "piston" in motions,
-        "sliding": any(one.get("speed", 0.0) != 0 for one in surfaces),
+        "sliding": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
         "uneven": len(baths) > 1,
         "bathed": kind in ("andersen", "brownian"),
         "thermal": thermal,

@@ -26,9 +26,7 @@ from .nature import Nature, nature_of
 
 DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
-#: Names in the file of what the package calls otherwise.
-EVENT_COUNT, KINETIC_TENSOR = "collisions", "stress_tensor"
-TENSORS = ("virial_tensor", KINETIC_TENSOR, "helfand_stress")
+TENSORS = ("virial_tensor", "kinetic_tensor", "helfand_stress")
 DRIFTING = (
     "constant_velocity",
     "piston",
@@ -464,7 +462,7 @@ class Run:
         It is (<sum of m v_a v_b> + dW_ab / dt) / <A>, with the tensor W of the virial; its trace is
         twice the `pressure`.  It takes `output.virial_tensor`, unless the run has that anyway.
         """
-        time, kinetic = self._between(KINETIC_TENSOR, t1, t2)
+        time, kinetic = self._between("kinetic_tensor", t1, t2)
         virial = np.subtract(*self._between("virial_tensor", t1, t2).value[[-1, 0]])
         duration, area = time[-1] - time[0], time_mean(time, self.accessible_area(time))
         return ((time_mean(time, kinetic) + virial / duration) / area).reshape(2, 2)
@@ -497,7 +495,7 @@ class Run:
         xi = float(values[0]) if len(values) == 1 else float("nan")
         if "soft" not in self.nature:
             return Restitution(xi)
-        return Restitution(xi, contact["restitution_law"], float(contact["restitution_speed"]))
+        return Restitution(xi, contact["restitution_law"], float(contact["reference_speed"]))
 
     @property
     def time_step(self) -> float:
@@ -560,6 +558,8 @@ def read_run(path: str | Path) -> Run:
 def run_of(path: Path, file: h5py.File) -> Run:
     """The run in an open file."""
     disks, count = file[DISKS], committed(file, DISKS)
+    if {"pressure", "wall_collisions"} & set(file["observables"]):
+        raise Unsound("is of an earlier version of Ricochet, with other names: run its input anew")
     if count == 0:
         raise Unsound("holds no frame yet")
     frames = {
@@ -577,7 +577,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         position=frames.pop("position"),
         velocity=frames.pop("velocity", Frames(path, "velocity", plane)),
         image=frames.pop("image", Frames(path, "image", plane) if any(periodic) else None),
-        event_count=frames.pop(EVENT_COUNT, None),
+        event_count=frames.pop("event_count", None),
         elements=frames,
         mass=rows(disks["mass"]),
         radius=rows(disks["radius"]),
