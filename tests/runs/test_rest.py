@@ -52,7 +52,7 @@ def test_a_run_that_comes_to_rest_ends_alike_in_all_ways(ricochet, tmp_path):
     while ricochet(*command, "--resume").returncode == STOPPED:
         pass
     different = differences(tmp_path / "gas.h5", tmp_path / "parts.h5")
-    assert different == ["/parameters/overrides", "/parameters/stop@wall_clock"]
+    assert [name for name in different if not aside.match(name)] == ["/parameters/stop@wall_clock"]
     whole = read_run(tmp_path / "gas.h5")
     for slices in ((), (0.5, 1, 1.5, 100)):
         ball = Simulation(tmp_path / "gas.nml")
