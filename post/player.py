@@ -32,7 +32,7 @@ from ricochet.analysis.paths import seen, turns_between, why_unknown
 from ricochet.figures.drawing import COLOURS, LABELS, caption, chosen_colour, scale_top
 from ricochet.reading.files import destination
 from ricochet.reading.nature import known, rows_of
-from ricochet.reading.reader import SIDES, span
+from ricochet.reading.reader import SIDES, groups_of_rows, span
 from ricochet.script import chosen_disks, chosen_frames, command_line, launch, report
 
 import numpy as np
@@ -102,7 +102,8 @@ def thinned(count: int, most: int) -> np.ndarray:
 def laws_of(run: Run, group: str) -> list[dict]:
     """How each obstacle or wall heats and slides."""
     rows = rows_of(run.parameters.get(group, {}))
-    return [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
+    laws = [{k: float(row[k]) for k in LAWS[-2:] if known(row.get(k))} for row in rows]
+    return [laws[k] for k in groups_of_rows(run.parameters, group)]
 
 
 def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
@@ -242,7 +243,7 @@ def scene(run: Run) -> tuple[dict, dict]:
         "periodic": run.periodic.tolist(),
         "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
         "walls": run.walls.tolist(),
-        "laws": {group: laws_of(run, group) for group in ("obstacle", "wall")},
+        "laws": {name: laws_of(run, name) for name in ("obstacle", "wall")},
         "species": species(run),
         "radii": radii.tolist(),
         "surfaces": [

@@ -10,7 +10,7 @@ module library
   use event_log, only: event_log_t
   use evolution, only: evolution_t, limits_t
   use initial_state, only: check_speeds
-  use input_groups, only: group_t, same_value, same_values
+  use input_groups, only: group_t, most_written, same_value, same_values
   use input_problems, only: problem_list_t
   use kinds, only: int32, int64, never, real64
   use moments, only: frame_column_t, frame_columns, frame_sample
@@ -27,7 +27,7 @@ module library
   use texts, only: eol, growing_text_t, lines_of, place_of, text_t, written, written_exactly
   use timeline, only: adapted, advance_once, passed_collapse
   use variable_help, only: input_of
-  use variables, only: change_of, in_motion, row_of
+  use variables, only: change_of, in_motion, obstacle_groups, row_of
   implicit none
   private
   public :: answer, begin, session_of, session_t, text_of
@@ -422,7 +422,7 @@ contains
     type(session_t), pointer :: session
     type(growing_text_t) :: growing
     character(len=:), allocatable :: words
-    integer :: g, k
+    integer :: g, k, most
 
     session => session_of(handle)
     associate (groups => session%input%groups)
@@ -432,7 +432,10 @@ contains
       case ("parameters")
         do g = 1, size(groups)
           do k = 1, size(groups(g)%values)
-            if (groups(g)%values(k)%is_set()) call growing%add(groups(g)%value_line(k)//eol)
+            if (.not. groups(g)%values(k)%is_set()) cycle
+            most = most_written
+            if (any(obstacle_groups == groups(g)%name)) most = huge(most)          ! the geometry of a file, as a whole
+            call growing%add(groups(g)%value_line(k, most)//eol)
           end do
         end do
       case ("changes")

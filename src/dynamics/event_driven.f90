@@ -237,7 +237,7 @@ contains
       else
         call collide_wall(sim, i, code, t, counts)
       end if
-      if (sim%box%surface(1 - code)%motion%kind == piston) call follow_side(self, sim, code)
+      if (sim%box%surface(sim%box%surface_of(code))%motion%kind == piston) call follow_side(self, sim, code)
     else
       if (is_wall(code)) call pass_side(sim, i, code, t)
       call self%search%cross(sim, i, code)

@@ -4,7 +4,7 @@
 module near_pairs
   use kinds, only: int32, pi, real64
   use box_geometry, only: box_t, obstacle_gap
-  use partners, only: n_sides
+  use partners, only: obstacle_code, obstacle_number
   use shapes, only: spare
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
@@ -71,9 +71,10 @@ contains
     self%skin = wanted_skin()
     self%n = 0
     if (.not. allocated(self%i)) allocate (self%i(100), self%partner(100), self%hit(100))
-    do k = n_sides + 1, size(sim%box%surface)
+    do k = 1, sim%box%n_obstacles()
       do i = 1, sim%n_disks()
-        if (obstacle_gap(sim%box, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) call append(self, i, 1 - k)
+        if (obstacle_gap(sim%box, k, [x(i, 1), x(i, 2)], sim%disk(i)%radius) <= self%skin) &
+          call append(self, i, obstacle_code(k))
       end do
     end do
     self%n_obstacles = self%n
@@ -114,7 +115,7 @@ contains
     period = box%periods()
     associate (i => self%i, j => self%partner)
       do k = 1, self%n_obstacles
-        self%hit(k) = merge(1, 0, obstacle_gap(box, 1 - j(k), [x(i(k), 1), x(i(k), 2)], radius(i(k))) < 0)
+        self%hit(k) = merge(1, 0, obstacle_gap(box, obstacle_number(j(k)), [x(i(k), 1), x(i(k), 2)], radius(i(k))) < 0)
       end do
       !GCC$ VECTOR
       do k = self%n_obstacles + 1, self%n

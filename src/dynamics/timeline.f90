@@ -9,7 +9,7 @@ module timeline
   use evolution, only: evolution_t, limits_t
   use kicks, only: kick
   use kinds, only: int32, int64, never, real64
-  use partners, only: is_side
+  use partners, only: is_side, obstacle_number
   use shapes, only: magnitude
   use signals, only: stop_requested
   use simulation_state, only: simulation_t
@@ -163,7 +163,7 @@ contains
     if (code > 0) then
       yes = sim%law%restitution(sim%tag(i)%species, sim%tag(code)%species) < 1
     else
-      yes = sim%box%surface(1 - code)%law%restitution < 1
+      yes = sim%box%surface(sim%box%surface_of(code))%law%restitution < 1
     end if
   end function may_lose
 
@@ -181,7 +181,7 @@ contains
     v = sim%velocity(i)
     normal = wall_normal(sim%box, code, x, v)
     yes = abs(dot_product(v, normal)) < grazing*magnitude(v) &
-      .and. dot_product(sim%box%surface(1 - code)%shape%middle - x, normal) > 0
+      .and. dot_product(sim%box%obstacle(obstacle_number(code))%shape%middle - x, normal) > 0
   end function slides
 
   !> The report of a collapse that a run has passed; empty if there was none.

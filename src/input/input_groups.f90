@@ -286,14 +286,18 @@ contains
   end function range_of
 
   !> What gives a variable its value: `species.bed.radius = 0.005`.
-  pure function value_line(self, k) result(text)
+  pure function value_line(self, k, most) result(text)
     class(group_t), intent(in) :: self
     integer, intent(in) :: k                   !! its place in the group
+    integer, intent(in), optional :: most      !! values; a longer list is cut
     character(len=:), allocatable :: text
+    integer :: longest
 
+    longest = most_written
+    if (present(most)) longest = most
     text = trim(self%name)//"."
     if (self%instance /= "") text = text//trim(self%instance)//"."
-    text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(most_written)
+    text = text//trim(self%values(k)%name)//" = "//self%values(k)%json(longest)
   end function value_line
 
   !> The value, or a list of them, as JSON; a list that is longer than wanted is cut.
@@ -324,7 +328,7 @@ contains
     end do
     if (last < n) call growing%add(", ... "//written(n)//" values")
     text = growing%text()
-    if (table(self%row)%size /= 1) text = "["//text//"]"
+    if (table(self%row)%size /= 1 .or. n > 1) text = "["//text//"]"
   end function json
 
   !> A text without trailing blanks as JSON.

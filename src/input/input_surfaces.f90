@@ -3,55 +3,129 @@ module input_surfaces
   use box_geometry, only: box_t
   use circles, only: new_circle
   use collisions, only: grip_t, normal_rule, speed_law_t, wall_law_t, wall_rules
+  use errors, only: error_t, exit_files
   use input_problems, only: problem_list_t
   use input_species, only: check_name
-  use kinds, only: real64
+  use kinds, only: int64, real64
   use input_groups, only: group_t
   use variables, only: largest, table, words_of
+  use obstacle_file, only: read_obstacles
   use partners, only: n_sides, side_name
   use segments, only: new_segment
   use side_motion, only: piston, motions, sawtooth, side_motion_t, still, constant_velocity
-  use texts, only: place_of, written
+  use texts, only: counted, place_of, written
   implicit none
   private
-  public :: check_least, take_grip, take_obstacles, take_wall_laws
+  public :: check_least, has_points, take_grip, take_obstacles, take_wall_laws
 
 contains
 
   !> Puts the obstacles into the box; none if one of them is incomplete.
   subroutine take_obstacles(groups, box, problems)
-    type(group_t), intent(in) :: groups(:)                !! all whose name is in `obstacle_groups`
+    type(group_t), intent(inout) :: groups(:)             !! all whose name is in `obstacle_groups`
     type(box_t), intent(inout) :: box
     type(problem_list_t), intent(inout) :: problems
     logical :: complete
-    integer :: k, v
+    integer :: k, m, v, n(size(groups))                   ! n: obstacles of each group
 
     complete = .true.
     do k = 1, size(groups)
       call check_name(groups, k, problems)
+      if (groups(k)%given("file")) call take_file(groups(k), problems)
+      if (groups(k)%name == "wall") call take_points(groups(k), problems)
       do v = 1, size(groups(k)%values)
         associate (value => groups(k)%values(v))
           if (table(value%row)%status /= "example") cycle           ! has a default, or may be left out
-          call groups(k)%demand(trim(value%name), problems)
+          if (.not. (groups(k)%given("file") .or. has_points(groups(k)))) call groups(k)%demand(trim(value%name), problems)
           complete = complete .and. value%is_set()
         end associate
       end do
     end do
     if (.not. complete) return
-    call box%add_obstacles(size(groups))
     do k = 1, size(groups)
-      associate (group => groups(k), obstacle => box%surface(n_sides + k))
-        obstacle%name = trim(group%instance)
-        select case (group%name)
-        case ("wall")
-          allocate (obstacle%shape, source=new_segment(group%reals_of("from"), group%reals_of("to")))
-        case default                                      ! "obstacle"
-          allocate (obstacle%shape, source=new_circle(group%reals_of("centre"), group%real_of("radius", 0.0_real64), &
-            encloses=group%text_of("side") == "inside"))
-        end select
-      end associate
+      n(k) = size(groups(k)%reals_of(trim(merge("to    ", "centre", groups(k)%name == "wall"))))/2
     end do
+    call box%add_obstacles(groups%instance, n)
+    do k = 1, size(groups)
+      m = sum(n(:k - 1))
+      if (groups(k)%name == "wall") then
+        call take_walls(groups(k)%reals_of("from"), groups(k)%reals_of("to"))
+      else
+        call take_circles(groups(k)%reals_of("centre"), groups(k)%reals_of("radius"), groups(k)%text_of("side") == "inside")
+      end if
+    end do
+
+  contains
+
+    !> The straight walls of a group.
+    subroutine take_walls(from, to)
+      real(real64), intent(in) :: from(:), to(:)          !! x, y of each [length]
+      integer :: i
+
+      do i = 1, size(to)/2
+        allocate (box%obstacle(m + i)%shape, source=new_segment(from(2*i - 1:2*i), to(2*i - 1:2*i)))
+      end do
+    end subroutine take_walls
+
+    !> The circles of a group.
+    subroutine take_circles(centre, radius, encloses)
+      real(real64), intent(in) :: centre(:)               !! x, y of each [length]
+      real(real64), intent(in) :: radius(:)               !! [length]
+      logical, intent(in) :: encloses
+      integer :: i
+
+      do i = 1, size(radius)
+        allocate (box%obstacle(m + i)%shape, source=new_circle(centre(2*i - 1:2*i), radius(i), encloses))
+      end do
+    end subroutine take_circles
   end subroutine take_obstacles
+
+  !> Whether a group is a polyline.
+  pure function has_points(group) result(yes)
+    type(group_t), intent(in) :: group
+    logical :: yes
+
+    yes = group%name == "wall"
+    if (yes) yes = group%given("points")
+  end function has_points
+
+  !> Takes the obstacles of a file into the variables that one obstacle has.
+  subroutine take_file(group, problems)
+    type(group_t), intent(inout) :: group
+    type(problem_list_t), intent(inout) :: problems
+    real(real64), allocatable :: rows(:, :)               ! (columns,n)
+    type(error_t), allocatable :: error
+
+    if (group%faulty("file")) return
+    call read_obstacles(group%text_of("file"), group%name == "wall", rows, error)
+    if (allocated(error)) then
+      call group%complain("file", error%message, problems)
+      if (error%code == exit_files) problems%unreadable = problems%unreadable + 1
+    else if (group%name == "wall") then
+      call group%put_reals("from", reshape(rows(:2, :), [2*size(rows, 2)]))
+      call group%put_reals("to", reshape(rows(3:, :), [2*size(rows, 2)]))
+    else
+      call group%put_reals("centre", reshape(rows(:2, :), [2*size(rows, 2)]))
+      call group%put_reals("radius", rows(3, :))
+    end if
+  end subroutine take_file
+
+  !> Takes a polyline as straight walls from each point to the next.
+  subroutine take_points(group, problems)
+    type(group_t), intent(inout) :: group
+    type(problem_list_t), intent(inout) :: problems
+
+    if (.not. has_points(group) .or. group%faulty("points")) return
+    associate (points => group%reals_of("points"))
+      if (modulo(size(points), 2) > 0 .or. size(points) < 4) then
+        call group%complain("points", counted(size(points, kind=int64), "value")//"; allowed: x1, y1, x2, y2, ... of two points " &
+          //"or more", problems)
+      else
+        call group%put_reals("from", points(:size(points) - 2))
+        call group%put_reals("to", points(3:))
+      end if
+    end associate
+  end subroutine take_points
 
   !> The laws of all walls: their own where their groups give one, else that of `&contact`.
   subroutine take_wall_laws(sides, obstacles, otherwise, box, problems)

@@ -11,10 +11,11 @@ module input_text
   use texts, only: digits, eol, letters, shown, written
   implicit none
   private
-  public :: read_text, unix_lines, byte_order_mark
+  public :: read_text, unix_lines, byte_order_mark, find_words
   public :: assignment_t, content, cut, plain, token_t, word, unclosed, ending
 
   integer(int64), parameter :: largest_file = 4194304   !! bytes
+  integer, parameter, public :: longest_line = 1024     !! of a file of disks or obstacles
   integer, private :: i
   character(len=1), parameter :: control(*) = [(achar(i), i=0, 8), achar(11), achar(12), (achar(i), i=14, 31), achar(127)]
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
@@ -40,6 +41,27 @@ module input_text
   end type assignment_t
 
 contains
+
+  !> Finds where the words of a line of a table begin and end; text from a # on is a comment.
+  pure subroutine find_words(line, first, last, n)
+    character(len=*), intent(in) :: line
+    integer, intent(out) :: first(:), last(:)
+    integer, intent(out) :: n                           !! number of words
+    character(len=*), parameter :: separators = " ,"//achar(9)//achar(13)
+    integer :: begin, past, comment
+
+    comment = index(line//"#", "#")
+    n = 0
+    past = 1
+    do
+      begin = past - 1 + verify(line(past:comment - 1)//"x", separators)
+      if (begin >= comment) exit
+      past = begin - 1 + scan(line(begin:comment - 1)//" ", separators)
+      n = n + 1
+      first(n) = begin
+      last(n) = past - 1
+    end do
+  end subroutine find_words
 
   !> The bytes of a regular file.
   subroutine read_text(path, text, error)

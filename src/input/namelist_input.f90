@@ -7,7 +7,7 @@ module namelist_input
   use partners, only: n_sides, side_name
   use old_names, only: new_name
   use texts, only: digits, eol, joined, lower_case, shown, suggestion, text_t, written
-  use variables, only: full_names, group_names, is_repeated, row_of, table, track_of, variables_of
+  use variables, only: full_names, group_names, is_repeated, obstacle_groups, row_of, table, track_of, variables_of
   implicit none
   private
   public :: read_groups
@@ -32,9 +32,11 @@ contains
     character(len=:), allocatable :: own                            ! name of the open group, for messages
     integer :: group                                                ! to which assignments belong; 0: its name is unknown
     integer :: opened                                               ! line of the open group; 0: none is open
+    logical :: too_many                                             ! groups of one name
     logical :: quote_open                                           ! in this group: its / may be part of a text
 
     complete = .true.
+    too_many = .false.
     n = 0
     do k = 1, size(table)
       defaults(k) = value_t(row=k, name=table(k)%name, kind=table(k)%kind)
@@ -322,7 +324,9 @@ contains
         call add_group(name, opened, instances + 1)
         group = n
       else
-        call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name")
+        if (.not. too_many) call problems%add(opened, name, "more than "//written(most_instances)//" groups of this name" &
+          //trim(merge("; a file may hold many obstacles (file)", repeat(" ", 39), any(obstacle_groups == name))))
+        too_many = .true.                                 ! said once
         group = 0
       end if
       if (group > 0) found(group)%first = token(at)%first

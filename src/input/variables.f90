@@ -127,12 +127,20 @@ module variables
     variable_t("obstacle", "centre", "real", 2, "example", "0.5, 0.5", "centre of the circular wall", unit="length"), &
     variable_t("obstacle", "radius", "real", 1, "example", "0.2", "radius of the circular wall", positive, "length"), &
     variable_t("obstacle", "side", "text", 1, "default", "'outside'", &
-      "disks bounce off the outside, or are kept inside", choices="outside inside")]
+      "disks bounce off the outside, or are kept inside", choices="outside inside"), &
+    variable_t("obstacle", "file", "text", 1, "optional", "'scatterers.txt'", "file of many circles instead of centre and " &
+      //"radius: a line of names, then x y radius for each, or HDF5 (.h5: centre, radius); one law, one set of sums", &
+      excludes="centre radius")]
 
   type(variable_t), parameter :: wall_rows(*) = [ &
     variable_t("wall", "name", "text", 1, "optional", "'ramp'", "name; default wall1, wall2, ..."), &
     variable_t("wall", "from", "real", 2, "example", "0.2, 0.3", "one end of the straight wall", unit="length"), &
-    variable_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length")]
+    variable_t("wall", "to", "real", 2, "example", "0.8, 0.1", "the other end", unit="length"), &
+    variable_t("wall", "points", "real", 0, "optional", "0, 0, 0.5, 0.2, 1, 0", "x1, y1, x2, y2, ... of a polyline instead of " &
+      //"from and to; it is closed if the last point equals the first", unit="length", excludes="from to"), &
+    variable_t("wall", "file", "text", 1, "optional", "'walls.txt'", "file of many straight walls instead of from and " &
+      //"to: a line of names, then x1 y1 x2 y2 for each, or HDF5 (.h5: from, to); one law, one set of sums", &
+      excludes="from to points")]
 
   !> The law of a wall, in the group of each.
   type(variable_t), parameter :: law_rows(*) = [ &

@@ -9,6 +9,7 @@ module run_description
     parameters_group, provenance, saved_at, species_counts, species_names, wall_time
   use hdf5_handle, only: hdf5_version
   use hdf5_objects, only: hdf5_file_t, scalar
+  use input_surfaces, only: has_points
   use input_groups, only: group_t, value_t, range_of
   use variables, only: is_repeated, obstacle_groups, table
   use settings, only: run_input_t
@@ -43,6 +44,7 @@ contains
     do k = 1, size(obstacle_groups)
       range = range_of(input%groups, obstacle_groups(k:k))
       call describe_table(file, input%groups(range(1):range(2)))
+      call describe_rows(file, input%groups(range(1):range(2)))
     end do
     call file%put(parameters_group//"seed", scalar, [input%settings%run%seed])
     call describe_end(file, input%settings%run%threads, 0.0_real64, [0.0_real64, 0.0_real64], "")
@@ -231,6 +233,7 @@ contains
       associate (row => table(groups(1)%values(k)%row))
         path = parameters_group//trim(row%group)//"/"
         second = trim(row%choices(index(trim(row%choices), " ", back=.true.) + 1:))
+        if (row%name == "file") cycle                       ! its obstacles are stored: see `describe_rows`
         if (row%kind == "text") then
           do g = 1, n
             texts(g) = groups(g)%text_of(trim(row%name))
@@ -239,9 +242,11 @@ contains
           if (second /= "") call file%put(path//second, [n], merge(1_int32, 0_int32, texts == second))
         else
           if (.not. any([(groups(g)%values(k)%is_set(), g=1, n)])) cycle
+          if (row%size == 0) cycle                          ! a polyline: see `describe_rows`
           values = spread(ieee_value(0.0_real64, ieee_quiet_nan), 1, row%size*n)     ! where it is not given
           do g = 1, n
-            if (groups(g)%values(k)%is_set()) values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
+            if (size(groups(g)%reals_of(trim(row%name))) /= row%size) cycle
+            values(row%size*(g - 1) + 1:row%size*g) = groups(g)%values(k)%reals
           end do
           if (row%size == 1) call file%put(path//trim(row%name), [n], values)
           if (row%size > 1) call file%put(path//trim(row%name), [row%size, n], values)
@@ -249,6 +254,31 @@ contains
       end associate
     end do
   end subroutine describe_table
+
+  !> The geometry of all obstacles of groups of one name, in the order of their codes, and the number of the group of each: where
+  !> a group has several, from a file or as a polyline.
+  subroutine describe_rows(file, groups)
+    type(hdf5_file_t), intent(inout) :: file
+    type(group_t), intent(in) :: groups(:)
+    character(len=:), allocatable :: path
+    integer(int32), allocatable :: group(:)
+    real(real64), allocatable :: values(:)
+    integer :: g, k, n(size(groups))                  ! n: obstacles of each group
+
+    if (.not. any([(groups(g)%given("file") .or. has_points(groups(g)), g=1, size(groups))])) return
+    path = parameters_group//trim(groups(1)%name)//"_rows/"
+    do k = 1, size(groups(1)%values)
+      associate (row => table(groups(1)%values(k)%row))
+        if (row%status /= "example") cycle            ! not what places an obstacle
+        values = [(groups(g)%reals_of(trim(row%name)), g=1, size(groups))]
+        n = [(size(groups(g)%reals_of(trim(row%name)))/row%size, g=1, size(groups))]
+        if (row%size == 1) call file%put(path//trim(row%name), [size(values)], values)
+        if (row%size > 1) call file%put(path//trim(row%name), [row%size, size(values)/row%size], values)
+      end associate
+    end do
+    group = [(spread(int(g, int32), 1, n(g)), g=1, size(groups))]
+    call file%put(path//"group", [size(group)], group)
+  end subroutine describe_rows
 
   !> Writes, or overwrites, what is known only at the end.
   subroutine describe_end(file, threads, wall_seconds, rate, note)

@@ -6,7 +6,7 @@ module box_geometry
   use disks, only: disk_t
   use images, only: images_t, sliding_images
   use kinds, only: int32, never, real64
-  use partners, only: axis_of, is_side, n_sides, sense_of, side_name
+  use partners, only: axis_of, is_side, n_sides, obstacle_number, sense_of, side_name
   use shapes, only: shape_t, spare
   use side_motion, only: piston, side_motion_t, still
   implicit none
@@ -14,13 +14,17 @@ module box_geometry
   public :: box_t, surface_t
   public :: meet_image, next_obstacle, obstacle_gap, strike_velocity, surface_velocity, wall_normal, free_area
 
-  !> What a disk bounces off: a side of the box, or an obstacle.
+  !> A side of the box, or a group of obstacles: its law holds for all of them, and its sums are over all of them.
   type :: surface_t
     character(len=:), allocatable :: name
-    class(shape_t), allocatable :: shape        !! of an obstacle
     type(wall_law_t) :: law
     type(side_motion_t) :: motion               !! of a side
   end type surface_t
+
+  type :: obstacle_t
+    class(shape_t), allocatable :: shape
+    integer(int32) :: surface = 0               !! number of that of its group
+  end type obstacle_t
 
   type :: box_t
     real(real64) :: lower(2) = 0.0_real64       !! [length]
@@ -28,8 +32,9 @@ module box_geometry
     logical :: periodic(2) = .false.            !! by axis
     real(real64) :: gravity(2) = 0.0_real64     !! [length/time**2]
     real(real64) :: shear_rate = 0.0_real64     !! of a sheared box [1/time]
-    !> Left, right, bottom, top, which count where they are walls; then the obstacles: see `partners` for their codes.
+    !> Left, right, bottom, top, which count where they are walls; then the groups of obstacles.
     type(surface_t), allocatable :: surface(:)
+    type(obstacle_t), allocatable :: obstacle(:)   !! those of one group side by side: see `partners` for their codes
     real(real64) :: epoch = 0.0_real64          !! that of the simulation: the motion of sides needs the time of the run [time]
   contains
     procedure :: edges
@@ -43,6 +48,7 @@ module box_geometry
     procedure :: add_obstacles
     procedure :: has_obstacles
     procedure :: n_obstacles
+    procedure :: surface_of
     procedure :: is_wall
     procedure :: has_lossy_walls
     procedure :: has_rough_walls
@@ -63,7 +69,7 @@ contains
     type(box_t) :: box
     integer :: k
 
-    allocate (box%surface(n_sides))
+    allocate (box%surface(n_sides), box%obstacle(0))
     do k = 1, n_sides
       box%surface(k)%name = trim(side_name(k))
     end do
@@ -81,24 +87,37 @@ contains
     box%gravity = self%gravity
     box%shear_rate = self%shear_rate
     box%epoch = self%epoch
-    allocate (box%surface(n_sides))
+    allocate (box%surface(n_sides), box%obstacle(0))
     do k = 1, n_sides
       box%surface(k) = self%surface(k)
     end do
   end function without_obstacles
 
-  !> Makes room for n obstacles more.
-  subroutine add_obstacles(self, n)
+  !> Adds groups of obstacles, whose shapes are to follow.
+  subroutine add_obstacles(self, name, n)
     class(box_t), intent(inout) :: self
-    integer, intent(in) :: n
-    type(surface_t), allocatable :: more(:)
-    integer :: k
+    character(len=*), intent(in) :: name(:)     !! of each group
+    integer, intent(in) :: n(:)                 !! of its obstacles
+    type(surface_t), allocatable :: surface(:)
+    type(obstacle_t), allocatable :: obstacle(:)
+    integer :: k, m
 
-    allocate (more(size(self%surface) + n))
+    allocate (surface(size(self%surface) + size(n)), obstacle(size(self%obstacle) + sum(n)))
     do k = 1, size(self%surface)
-      more(k) = self%surface(k)
+      surface(k) = self%surface(k)
     end do
-    call move_alloc(more, self%surface)
+    do m = 1, size(self%obstacle)
+      call move_alloc(self%obstacle(m)%shape, obstacle(m)%shape)
+      obstacle(m)%surface = self%obstacle(m)%surface
+    end do
+    m = size(self%obstacle)
+    do k = 1, size(n)
+      surface(size(self%surface) + k)%name = trim(name(k))
+      obstacle(m + 1:m + n(k))%surface = int(size(self%surface) + k, int32)
+      m = m + n(k)
+    end do
+    call move_alloc(surface, self%surface)
+    call move_alloc(obstacle, self%obstacle)
   end subroutine add_obstacles
 
   !> Lengths of the sides.
@@ -166,16 +185,27 @@ contains
     class(box_t), intent(in) :: self
     logical :: yes
 
-    yes = size(self%surface) > n_sides
+    yes = self%n_obstacles() > 0
   end function has_obstacles
 
   !> The number of obstacles.
   pure function n_obstacles(self) result(n)
     class(box_t), intent(in) :: self
-    integer :: n
+    integer(int32) :: n
 
-    n = size(self%surface) - n_sides
+    n = 0
+    if (allocated(self%obstacle)) n = size(self%obstacle, kind=int32)
   end function n_obstacles
+
+  !> The number of the surface of a side or obstacle with this code.
+  elemental function surface_of(self, code) result(k)
+    class(box_t), intent(in) :: self
+    integer(int32), intent(in) :: code
+    integer :: k
+
+    k = 1 - code
+    if (.not. is_side(code)) k = self%obstacle(obstacle_number(code))%surface
+  end function surface_of
 
   !> Whether disks bounce off surface k.
   pure function is_wall(self, k) result(yes)
@@ -252,7 +282,7 @@ contains
     integer :: k, image
 
     do k = 1, size(list)
-      images = merge(images_t(), box%images(), box%surface(1 - list(k))%shape%encloses)
+      images = merge(images_t(), box%images(), box%obstacle(obstacle_number(list(k)))%shape%encloses)
       do image = 1, images%count()
         call meet_image(box, disk, last, list(k), images%shift(images%around(image)), t, code)
       end do
@@ -271,7 +301,7 @@ contains
     integer(int32), intent(inout) :: code
     real(real64) :: t_image, d(2)
 
-    associate (shape => box%surface(1 - obstacle)%shape)
+    associate (shape => box%obstacle(obstacle_number(obstacle))%shape)
       d = disk%x - (shape%middle + shift)
       if (last == obstacle .and. .not. (shape%encloses .or. box%falling())) then
         if (all(abs(d - shape%from_nearest(disk%x, box%images(), heading=disk%v)) < 0.5_real64*box%edges())) return
@@ -308,14 +338,14 @@ contains
     end do
   end function passes_by
 
-  !> Distance between surface k, an obstacle, and the rim of a disk at x; negative if they overlap.
-  pure function obstacle_gap(box, k, x, radius) result(length)
+  !> Distance between the m-th obstacle and the rim of a disk at x; negative if they overlap.
+  pure function obstacle_gap(box, m, x, radius) result(length)
     type(box_t), intent(in) :: box
-    integer, intent(in) :: k
+    integer(int32), intent(in) :: m
     real(real64), intent(in) :: x(2), radius    !! [length]
     real(real64) :: length
 
-    associate (shape => box%surface(k)%shape)
+    associate (shape => box%obstacle(m)%shape)
       length = shape%gap(shape%from_nearest(x, box%images()), radius)
     end associate
   end function obstacle_gap
@@ -328,11 +358,11 @@ contains
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
-    associate (surface => box%surface(1 - code))
+    associate (law => box%surface(box%surface_of(code))%law)
       if (is_side(code)) then
-        u(3 - axis_of(code)) = surface%law%speed
-      else if (abs(surface%law%speed) > 0) then
-        u = surface%law%speed*surface%shape%direction(normal)
+        u(3 - axis_of(code)) = law%speed
+      else if (abs(law%speed) > 0) then
+        u = law%speed*box%obstacle(obstacle_number(code))%shape%direction(normal)
       end if
     end associate
   end function surface_velocity
@@ -346,6 +376,7 @@ contains
     real(real64) :: u(2)                        !! [length/time]
 
     u = 0
+    if (.not. is_side(code)) return
     associate (motion => box%surface(1 - code)%motion)
       if (motion%kind /= still) u = motion%velocity(motion%moment(box%epoch, t))*normal
     end associate
@@ -363,7 +394,7 @@ contains
       normal = 0
       normal(axis_of(code)) = -sense_of(code)
     else
-      associate (shape => box%surface(1 - code)%shape)
+      associate (shape => box%obstacle(obstacle_number(code))%shape)
         d = shape%from_nearest(x, box%images(), heading=-v)
         normal = shape%normal(d)
       end associate
@@ -374,14 +405,14 @@ contains
   pure function free_area(box) result(area)
     type(box_t), intent(in) :: box
     real(real64) :: area                        !! [length**2]
-    integer :: k
+    integer(int32) :: m
 
     area = product(box%edges())
-    do k = n_sides + 1, size(box%surface)
-      if (box%surface(k)%shape%encloses) area = min(area, box%surface(k)%shape%area)
+    do m = 1, box%n_obstacles()
+      if (box%obstacle(m)%shape%encloses) area = min(area, box%obstacle(m)%shape%area)
     end do
-    do k = n_sides + 1, size(box%surface)
-      if (.not. box%surface(k)%shape%encloses) area = area - box%surface(k)%shape%area
+    do m = 1, box%n_obstacles()
+      if (.not. box%obstacle(m)%shape%encloses) area = area - box%obstacle(m)%shape%area
     end do
   end function free_area
 

@@ -363,7 +363,7 @@ contains
     else if (is_side(code)) then
       text = text//" and the "//sim%box%surface(1 - code)%name//" side"
     else if (is_wall(code)) then
-      text = text//" and obstacle "//sim%box%surface(1 - code)%name
+      text = text//" and obstacle "//sim%box%surface(sim%box%surface_of(code))%name
     end if
     text = text//" at time "//written(sim%time())
 

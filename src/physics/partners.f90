@@ -1,12 +1,13 @@
 !> Whom or what a disk meets, as one number: another disk (> 0), a surface of the box (0, -1, -2, -3: the left, right,
 !> bottom, top side; -4, -5, ...: an obstacle), or the end of its cell (far below). The event log writes the same numbers.
-!> Surface k of the box has the code 1 - k.
+!> Side k of the box has the code 1 - k; the codes of obstacles follow.
 module partners
   use kinds, only: int32
   implicit none
   private
   public :: n_sides, side_name, is_side, is_wall, axis_of, sense_of, crossing, side_crossed, looks_again, nothing
   public :: met_id, most_repeats, repeated, repeats
+  public :: obstacle_code, obstacle_number
 
   integer(int32), parameter :: n_sides = 4
   integer(int32), parameter :: first_crossing = -2000000000
@@ -33,6 +34,22 @@ contains
 
     yes = code > first_crossing
   end function is_wall
+
+  !> The code of the m-th obstacle.
+  elemental function obstacle_code(m) result(code)
+    integer(int32), intent(in) :: m
+    integer(int32) :: code
+
+    code = 1 - n_sides - m
+  end function obstacle_code
+
+  !> The number of the obstacle with this code.
+  elemental function obstacle_number(code) result(m)
+    integer(int32), intent(in) :: code
+    integer(int32) :: m
+
+    m = 1 - n_sides - code
+  end function obstacle_number
 
   !> The axis across a side.
   elemental function axis_of(side) result(axis)

@@ -27,11 +27,13 @@ contains
     real(real64) :: normal(2), strike(2), u(2), v(2), omega
     type(wall_law_t) :: law
     logical :: elastic
+    integer :: k
 
     elastic = .false.
     if (sim%law%contact_time > 0) call sim%make_contact(i, t, elastic)
     call land(sim%disk(i), sim%box%gravity, t)
-    law = sim%box%surface(1 - code)%law
+    k = sim%box%surface_of(code)
+    law = sim%box%surface(k)%law
     normal = wall_normal(sim%box, code, sim%disk(i)%x, sim%disk(i)%v)
     strike = strike_velocity(sim%box, code, normal, t)
     u = surface_velocity(sim%box, code, normal) + strike
@@ -48,10 +50,10 @@ contains
       if (elastic .and. law%restitution <= 0 .and. sim%epoch_end > 0) call part(sim, i, code, normal)    ! no time steps
       if (law%grip%is_rough()) call rub_wall(sim, i, law%grip, normal, u, v)
     end if
-    if (sim%box%surface(1 - code)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
+    if (sim%box%surface(k)%motion%kind == piston) call push(sim, i, code, normal, v, u, t)
     sim%tag(i)%collisions = sim%tag(i)%collisions + 1
     sim%tag(i)%met = merge(0, code, is_side(code))
-    if (counts) call count_hit(sim, i, 1 - code, law%temperature > 0, u, v, omega)
+    if (counts) call count_hit(sim, i, k, law%temperature > 0, u, v, omega)
   end subroutine collide_wall
 
   !> Ends the bouncing on a side that moves where a hit loses less than rounding can tell: it would go on for ever.

@@ -12,7 +12,7 @@ module cell_grid
   use free_flight, only: time_to_circle
   use images, only: images_t
   use neighbour_search, only: earliest_contact, latest_clock, no_gravity, prospect_t
-  use partners, only: axis_of, is_wall, looks_again, n_sides, nothing, sense_of, side_crossed
+  use partners, only: axis_of, is_wall, looks_again, nothing, obstacle_code, sense_of, side_crossed
   use reach_lists, only: largest_small_radius, place_t, reach_lists_t
   use shapes, only: spare
   use simulation_state, only: simulation_t
@@ -421,7 +421,7 @@ contains
 
       number = self%reach%number_of(i)
       call next_side(sim%box, sim%disk(i), near%time, near%partner)
-      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(1 - m, m=n_sides + 1, size(sim%box%surface))], &
+      call next_obstacle(sim%box, sim%disk(i), sim%tag(i)%met, [(obstacle_code(m), m=1, sim%box%n_obstacles())], &
         near%time, near%partner)
       t_margin = sim%now + time_to_circle(sim%position(i) - self%reach%big(number)%centre, sim%velocity(i), &
         sim%box%gravity, self%reach%margin, inside=.true.)

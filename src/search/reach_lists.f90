@@ -8,7 +8,7 @@ module reach_lists
   use cell_faces, only: cell_faces_t, patch_t
   use circles, only: new_circle
   use disks, only: disk_t
-  use partners, only: n_sides
+  use partners, only: obstacle_code
   use shapes, only: shape_t, spare
   use simulation_state, only: simulation_t
   implicit none
@@ -108,9 +108,9 @@ contains
       self%patch = patch
       self%span = span_of(patch, faces)
     end if
-    do k = n_sides + 1, size(sim%box%surface, kind=int32)
-      call find_places(sim%box%surface(k)%shape, 0.0_real64, patch, faces, places)
-      call enter(self, 1 - k, places)
+    do k = 1, sim%box%n_obstacles()
+      call find_places(sim%box%obstacle(k)%shape, 0.0_real64, patch, faces, places)
+      call enter(self, obstacle_code(k), places)
     end do
     call self%renew_big(sim, patch, faces)
   end subroutine renew

@@ -10,7 +10,6 @@ module dense_growth
   use event_driven, only: event_driven_t
   use evolution, only: limits_t
   use packing, only: packing_t
-  use partners, only: n_sides
   use random_insertion, only: insert_at_random
   use random_stream, only: random_stream_t
   use shapes, only: magnitude
@@ -240,10 +239,10 @@ contains
     type(box_t), intent(in) :: box
     real(real64), intent(in) :: x(2)                    !! [length]
     real(real64) :: distance
-    integer :: k
+    integer(int32) :: k
 
     distance = min(never, minval([x - box%lower, box%upper - x], mask=.not. [box%periodic, box%periodic]))
-    do k = n_sides + 1, size(box%surface)
+    do k = 1, box%n_obstacles()
       distance = min(distance, obstacle_gap(box, k, x, 0.0_real64))
     end do
   end function wall_distance

@@ -1,13 +1,14 @@
 !> Whether the system of an input fits together: obstacles and regions in the box, and disks in their regions. What is wrong
 !> is reported with the line of the input.
 module input_fit
-  use kinds, only: int64, pi, real64
+  use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
   use box_sides, only: bounds
   use errors, only: exit_files
   use input_groups, only: group_t, range_of
-  use input_problems, only: problem_list_t
+  use input_problems, only: most_problems, problem_list_t
   use memory, only: check_memory
+  use obstacle_file, only: origin_of_row
   use partners, only: n_sides, side_name
   use position_file, only: angle_row, radius_row, spin_row
   use radii, only: drawn_radii
@@ -61,16 +62,17 @@ contains
     type(problem_list_t), intent(inout) :: problems
     character(len=:), allocatable :: misfit                   ! variable: what
     real(real64) :: beyond(2, 2)
-    integer :: o(2), s(2), k, colon
+    integer :: o(2), s(2), k
 
     o = range_of(groups, obstacle_groups)
     s = range_of(groups, ["species"])
     associate (box => settings%box, species => settings%species)
       beyond = box%reach()                                    ! of sides that move
-      do k = n_sides + 1, size(box%surface)                   ! obstacles say themselves what is wrong with their places
-        misfit = box%surface(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
-        colon = index(misfit, ": ")
-        if (colon > 0) call groups(o(1) + k - n_sides - 1)%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
+      do k = 1, box%n_obstacles()                             ! obstacles say themselves what is wrong with their places
+        misfit = box%obstacle(k)%shape%misfit(box%lower - beyond(:, 1), box%upper + beyond(:, 2), box%periodic)
+        if (misfit /= "") call complain_of_obstacle(box, k, groups(o(1) + box%obstacle(k)%surface - n_sides - 1), misfit, &
+          problems)
+        if (problems%count >= most_problems) exit
       end do
       do k = 1, size(species)
         call check_species(groups(s(1) + k - 1), species(k), box, settings%n_disks() == 1, problems)
@@ -78,6 +80,27 @@ contains
       if (problems%count == 0) call check_strokes(box, pi*sum(species%count*species%radius**2), groups, problems)
     end associate
   end subroutine check_fit
+
+  !> Reports what is wrong with the place of an obstacle: of those of a file the line, of a polyline the part.
+  subroutine complain_of_obstacle(box, m, group, misfit, problems)
+    type(box_t), intent(in) :: box
+    integer(int32), intent(in) :: m                           !! its number
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: misfit                    !! variable: what
+    type(problem_list_t), intent(inout) :: problems
+    integer :: colon, number
+
+    colon = index(misfit, ": ")
+    number = count(box%obstacle(:m)%surface == box%obstacle(m)%surface)          ! in its group
+    if (group%given("file")) then
+      call group%complain("file", origin_of_row(group%text_of("file"), number)//": "//misfit, problems)
+    else if (size(group%reals_of(misfit(:colon - 1))) > 2) then
+      call group%complain("points", "point "//written(number + merge(1, 0, misfit(:colon - 1) == "to"))//" "//misfit(colon + 2:), &
+        problems)
+    else
+      call group%complain(misfit(:colon - 1), misfit(colon + 2:), problems)
+    end if
+  end subroutine complain_of_obstacle
 
   !> Reports sides that would crush the disks: these would fill more than the box when a side has come to its end. Where
   !> disks push one side, they may make room.
@@ -186,10 +209,10 @@ contains
       if (.not. sound) return
     end do
     if (.not. (s%radius_in_file .or. s%polydispersity > 0)) call check_fraction()
-    do k = n_sides + 1, size(box%surface)
-      associate (shape => box%surface(k)%shape)
+    do k = 1, box%n_obstacles()
+      associate (shape => box%obstacle(k)%shape)
         if (shape%encloses .and. any(shape%extent <= s%radius)) call group%complain("radius", "a disk of radius "// &
-          written(s%radius)//" does not fit in obstacle """//box%surface(k)%name//'"', problems)
+          written(s%radius)//" does not fit in obstacle """//box%surface(box%obstacle(k)%surface)%name//'"', problems)
       end associate
     end do
 

@@ -3,7 +3,7 @@
 module packing
   use images, only: images_t
   use kinds, only: int32, real64
-  use partners, only: n_sides
+  use partners, only: obstacle_code, obstacle_number
   use box_geometry, only: box_t
   implicit none
   private
@@ -108,7 +108,7 @@ contains
     real(real64) :: rho
     integer :: s, kx, ky, first(2), last(2)
 
-    do blocker = -n_sides, 1 - size(self%box%surface), -1
+    do blocker = obstacle_code(1), obstacle_code(self%box%n_obstacles()), -1
       if (self%covers(blocker, centre, half, radius)) return
     end do
     blocker = 0
@@ -226,7 +226,7 @@ contains
     logical :: yes
 
     if (by < 0) then
-      associate (shape => self%box%surface(1 - by)%shape)
+      associate (shape => self%box%obstacle(obstacle_number(by))%shape)
         yes = shape%covers(shape%from_nearest(centre, self%box%images()), half, radius)
       end associate
     else

@@ -8,7 +8,6 @@ module placement
   use kinds, only: int32, int64, pi, real64
   use box_geometry, only: box_t
   use box_sides, only: bounds
-  use collisions, only: wall_law_t
   use circles, only: new_circle
   use dense_growth, only: grow_disks, smallest_scale
   use disks, only: disks_before
@@ -17,7 +16,7 @@ module placement
   use input_groups, only: group_t
   use input_problems, only: problem_list_t
   use packing, only: packing_t
-  use partners, only: n_sides
+  use partners, only: obstacle_number
   use position_file, only: angle_row, mass_row, radius_row, spin_row
   use radii, only: drawn_radii
   use random_insertion, only: insert_at_random, largest_first
@@ -164,9 +163,10 @@ contains
               //species(other)%name//'"')
           end associate
         else if (blocker < 0) then
-          associate (obstacle => packing%box%surface(1 - blocker))
+          associate (box => packing%box)
             call report(s, k, x(:, k), overlapping, trim(merge("is not wholly inside", "overlaps            ", &
-              obstacle%shape%encloses))//" obstacle """//obstacle%name//'"')
+              box%obstacle(obstacle_number(blocker))%shape%encloses))//" obstacle """ &
+              //box%surface(box%surface_of(blocker))%name//'"')
           end associate
         end if
       end do
@@ -273,7 +273,7 @@ contains
     box%periodic = spans(region, packing%box)
     images = packing%box%images()
     do pass = 1, 2                                          ! count, then fill
-      n = size(packing%box%surface)
+      n = packing%box%n_obstacles()
       do k = 1, size(packing%disk)
         if (packing%disk(k)%species == 0) cycle
         radius = packing%disk(k)%radius
@@ -282,15 +282,14 @@ contains
           if (any(centre < box%lower - radius .or. centre > box%upper + radius)) cycle
           n = n + 1
           if (pass == 1) cycle
-          box%surface(n)%name = "a disk"
-          allocate (box%surface(n)%shape, source=new_circle(centre, radius, encloses=.false.))
+          allocate (box%obstacle(n)%shape, source=new_circle(centre, radius, encloses=.false.))
         end do
       end do
-      if (pass == 1) call box%add_obstacles(n - n_sides)
+      if (pass == 1) call box%add_obstacles(["obstacles", "disks    "], &
+        [packing%box%n_obstacles(), n - packing%box%n_obstacles()])                  ! elastic
     end do
-    do k = n_sides + 1, size(packing%box%surface)
-      box%surface(k) = packing%box%surface(k)
-      box%surface(k)%law = wall_law_t()                     ! elastic
+    do k = 1, packing%box%n_obstacles()
+      allocate (box%obstacle(k)%shape, source=packing%box%obstacle(k)%shape)
     end do
   end function growth_box
 

@@ -3,7 +3,7 @@
 module position_file
   use kinds, only: int64, real64
   use errors, only: exit_files, exit_usage, fail
-  use input_text, only: byte_order_mark
+  use input_text, only: byte_order_mark, find_words, longest_line
   use input_words, only: read_real
   use settings, only: disks_in_file_t
   use system, only: read_file
@@ -17,7 +17,6 @@ module position_file
   integer, parameter :: spin_row = 5, angle_row = 6, radius_row = 7, mass_row = 8
   character(len=*), parameter :: known_names(*) = [character(len=7) :: column_names, "species"]
   integer, parameter :: species_column = size(known_names)
-  integer, parameter :: longest_line = 1024
   character(len=*), parameter :: numpy_mark = char(147)//"NUMPY", zip_mark = "PK"//achar(3)//achar(4)
 
 contains
@@ -77,7 +76,7 @@ contains
       if (len_trim(line) == longest_line) problem = "the line is too long"
       if (number == 1 .and. (index(line, numpy_mark) == 1 .or. index(line, zip_mark) == 1)) &
         problem = "arrays of NumPy; write_start of the Python package makes a starting file of them"
-      call find_words()
+      call find_words(line, first, last, n_words)
       if (n_words == 0 .or. problem /= "") return
       if (size(column) == 0) then
         if (are_names()) then
@@ -111,24 +110,6 @@ contains
       n = n + 1
       table(:, n) = value
     end subroutine read_line
-
-    !> Where the words of the line begin and end.
-    subroutine find_words()
-      character(len=*), parameter :: blanks = " ,"//achar(9)//achar(13)
-      integer :: begin, past, comment
-
-      comment = index(line//"#", "#")
-      n_words = 0
-      past = 1
-      do
-        begin = past - 1 + verify(line(past:comment - 1)//"x", blanks)
-        if (begin >= comment) exit
-        past = begin - 1 + scan(line(begin:comment - 1)//" ", blanks)
-        n_words = n_words + 1
-        first(n_words) = begin
-        last(n_words) = past - 1
-      end do
-    end subroutine find_words
 
     !> Whether the words of the line name columns: one of them is the name of a column, or none is a number.
     function are_names() result(yes)

@@ -168,12 +168,9 @@ contains
     character(len=*), intent(in) :: name
     class(shape_t), intent(in) :: shape
 
-    call box%add_obstacles(1)
-    associate (added => box%surface(size(box%surface)))
-      added%name = name
-      added%law = box%surface(1)%law
-      allocate (added%shape, source=shape)
-    end associate
+    call box%add_obstacles([name], [1])
+    box%surface(size(box%surface))%law = box%surface(1)%law
+    allocate (box%obstacle(size(box%obstacle))%shape, source=shape)
   end subroutine add_obstacle
 
   !> The dynamics that a method names: `cells`, `pairs` or `rescan`; with `heap`, else a calendar.
@@ -283,7 +280,7 @@ contains
           gap = min(gap, norm2(dx)/(r + sim%disk(j)%radius) - 1)
         end do
         gap = min(gap, minval(merge(never, min(x - low, high - x) - r, sim%box%periodic))/(2*r))
-        do m = n_sides + 1, size(sim%box%surface)
+        do m = 1, sim%box%n_obstacles()
           gap = min(gap, obstacle_gap(sim%box, m, x, r)/(2*r))
         end do
       end associate

@@ -10,7 +10,7 @@ from textwrap import wrap
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.collections import EllipseCollection, LineCollection, PatchCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
@@ -18,7 +18,7 @@ from ..analysis.statistics import Estimate, kurtosis_noise
 from ..analysis.structure import bond_order, periods
 from ..reading.files import destination, did_you_mean
 from ..reading.nature import known, rows_of
-from ..reading.reader import SIDES, Run, RunError
+from ..reading.reader import SIDES, Run, RunError, groups_of_rows
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
@@ -158,18 +158,9 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     axes.add_patch(Rectangle(low, *(high - low), zorder=-2, **grey))
     axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", zorder=-1))
     axes.add_collection(LineCollection(lines, **sides, **WALL))
-    for wall in run.walls:
-        for shift in periods(run):
-            axes.plot(*(wall + shift).T, zorder=3, **WALL)
-    for obstacle in run.obstacles:
-        if obstacle.inside:
-            axes.add_patch(Rectangle(run.lower, *run.edges, zorder=0, **grey))
-        fill, level = ("white", 0.1) if obstacle.inside else ("0.75", 0.5)  # a map is at 0.2
-        for shift in periods(run):
-            centre = obstacle.centre + shift
-            axes.add_patch(
-                Circle(centre, obstacle.radius, facecolor=fill, edgecolor="0.25", zorder=level)
-            )
+    walls = [wall + shift for wall in run.walls for shift in periods(run)]
+    axes.add_collection(LineCollection(walls, zorder=3, capstyle="projecting", **WALL))
+    draw_circles(axes, run, grey)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     (x0, y0), (x1, y1) = run.lower, run.upper
     axes.set_xticks([x0, x1], [f"{x0:g}", f"{x1:g}"])
@@ -182,6 +173,24 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     name_walls(axes, run)
 
 
+def draw_circles(axes: plt.Axes, run: Run, grey: dict) -> None:
+    """Circular obstacles, with those of their periodic images that reach into the box."""
+    if any(obstacle.inside for obstacle in run.obstacles):
+        axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
+    width = min(1.0, 20 / np.sqrt(max(len(run.obstacles), 1)))  # of lines: many circles are small
+    for inside, fill, level in ((True, "white", 0.1), (False, "0.75", 0.5)):  # a map is at 0.2
+        circles = [
+            Circle(obstacle.centre + shift, obstacle.radius)
+            for shift in periods(run)
+            for obstacle in run.obstacles
+            if obstacle.inside == inside
+            and np.all(obstacle.centre + shift + obstacle.radius >= run.lower)
+            and np.all(obstacle.centre + shift - obstacle.radius <= run.upper)
+        ]
+        style = {"facecolor": fill, "edgecolor": "0.25", "linewidth": width, "zorder": level}
+        axes.add_collection(PatchCollection(circles, **style))
+
+
 def name_walls(axes: plt.Axes, run: Run) -> None:
     """Along each side and wall its temperature, and how fast and where to it slides."""
     (x0, y0), (x1, y1) = run.room
@@ -189,7 +198,9 @@ def name_walls(axes: plt.Axes, run: Run) -> None:
     shown += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
     shown = [*zip(run.sides, shown, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
-    shown += [(own, (*ends, 1)) for own, ends in zip(walls, run.walls, strict=False)]
+    groups = groups_of_rows(run.parameters, "wall")
+    firsts = np.unique(groups, return_index=True)[1]  # of each polyline, or file, one wall
+    shown += [(walls[groups[k]], (*run.walls[k], 1)) for k in firsts]
     for own, (start, end, side) in shown:
         speed = own.get("surface_velocity", 0.0)
         words = [f"kT = {own['temperature']:g}"] if known(own.get("temperature")) else []

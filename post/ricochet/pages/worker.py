@@ -348,8 +348,8 @@ def pictured_run(simulation: Simulation) -> Pictured:
         lower=lower,
         edges=upper - lower,
         periodic=np.array([kind == "periodic" for kind in box["boundary"]]),
-        obstacles=obstacles_of(parameters.get("obstacle", {})),
-        walls=walls_of(parameters.get("wall", {})),
+        obstacles=obstacles_of(parameters),
+        walls=walls_of(parameters),
         parameters=parameters,
         provenance={},
     )

@@ -586,8 +586,8 @@ def run_of(path: Path, file: h5py.File) -> Run:
         lower=box["lower"],
         edges=box["edges"],
         periodic=periodic,
-        obstacles=obstacles_of(parameters.get("obstacle", {})),
-        walls=walls_of(parameters.get("wall", {})),
+        obstacles=obstacles_of(parameters),
+        walls=walls_of(parameters),
         parameters=parameters,
         provenance=tree(file["provenance"]),
     )
@@ -658,14 +658,26 @@ def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
     return values.astype(float, copy=False) if values.dtype.kind == "f" else values
 
 
-def obstacles_of(group: dict) -> tuple[Obstacle, ...]:
-    """The circular walls in /parameters/obstacle."""
-    if "centre" not in group:
+def obstacles_of(parameters: dict) -> tuple[Obstacle, ...]:
+    """The circular obstacles of a run, in the order of their codes in the event log."""
+    groups = parameters.get("obstacle", {})
+    if "inside" not in groups:
         return ()
-    parts = (group[name] for name in ("centre", "radius", "inside"))
+    rows = parameters.get("obstacle_rows", groups)
+    inside = np.asarray(groups["inside"])[groups_of_rows(parameters, "obstacle")]
+    parts = (rows["centre"], rows["radius"], inside)
     return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
 
 
-def walls_of(group: dict) -> np.ndarray:
-    """(W, 2, 2) the straight walls in /parameters/wall."""
-    return np.stack([group["from"], group["to"]], axis=1) if group else np.empty((0, 2, 2))
+def walls_of(parameters: dict) -> np.ndarray:
+    """(W, 2, 2) the straight walls of a run, in the order of their codes in the event log."""
+    rows = parameters.get("wall_rows", parameters.get("wall"))
+    return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
+
+
+def groups_of_rows(parameters: dict, name: str) -> np.ndarray:
+    """(W,) the group, from 0, of each obstacle: one with a file or points has several."""
+    rows = parameters.get(f"{name}_rows")
+    if rows:
+        return np.asarray(rows["group"]) - 1
+    return np.arange(len(parameters.get(name, {}).get("name", ())))

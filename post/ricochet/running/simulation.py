@@ -250,6 +250,7 @@ class Simulation:
             place[name] = value
         for group in {"obstacle", "wall"} & found.keys():  # the file has columns of them
             rows = list(found[group].values())
+            found |= geometry_of(group, rows)
             found[group] = {name: [row.get(name, np.nan) for row in rows] for name in rows[0]}
             if "side" in found[group]:
                 found[group]["inside"] = [side == "inside" for side in found[group]["side"]]
@@ -358,6 +359,25 @@ class Simulation:
         if n < 0:
             raise RunError("next_events: time steps do not know what comes")
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
+
+
+def geometry_of(group: str, rows: list[dict]) -> dict[str, dict]:
+    """The table of all obstacles, if a group has a file or points; its own row is emptied."""
+    if not any({"file", "points"} & row.keys() for row in rows):
+        return {}
+    wide = {"from": 2, "to": 2} if group == "wall" else {"centre": 2, "radius": 1}
+    table = {
+        name: np.concatenate([np.reshape(row[name], (-1, 2)[:width]) for row in rows])
+        for name, width in wide.items()
+    }
+    counts = [np.size(row[name]) // width for row in rows for name, width in [*wide.items()][-1:]]
+    table["group"] = np.repeat(np.arange(1, len(rows) + 1), counts)
+    for row in rows:
+        several = {"file", "points"} & row.keys()
+        row |= {
+            name: [np.nan] * 2 if width == 2 else np.nan for name, width in wide.items() if several
+        }
+    return {f"{group}_rows": table}
 
 
 def after_fork() -> None:

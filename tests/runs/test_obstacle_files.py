@@ -1,0 +1,162 @@
+"""Many obstacles as one group: circles and straight walls from files, and polylines."""
+
+from itertools import pairwise
+
+import h5py
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from ricochet import Simulation, read_run
+from ricochet.drawing import draw_box
+
+from whole_runs import FINISHED, USAGE, ran, write_input
+
+SIDE = 9
+BOX = f"&box upper = {SIDE}, {SIDE} boundary = 'periodic', 'periodic' /"
+END = """&obstacle name = 'last' centre = 3, 3 radius = 0.2 /
+&species count = 3 radius = 0.03 velocities = 'maxwell' /
+&stop events = 2000 /
+&output frames_every_events = 50 event_log = .true. /"""
+POINTS = [(1, 1), (2, 1.5), (2, 2.5), (1, 1)]
+
+
+def scatterers() -> np.ndarray:
+    """(n, 3) circles that overlap here and there."""
+    rng = np.random.default_rng(4)
+    cells = np.stack(np.meshgrid(*2 * [np.arange(SIDE) + 0.5]), axis=-1).reshape(-1, 2)
+    places = cells + rng.uniform(-0.4, 0.4, cells.shape)
+    return np.column_stack([places, rng.uniform(0.1, 0.3, len(cells))])
+
+
+def walls() -> np.ndarray:
+    """(n, 4) some straight walls."""
+    start = np.random.default_rng(5).uniform(1, SIDE - 1, (20, 2))
+    return np.column_stack([start, start + np.array([0.3, -0.2])])
+
+
+def table(names: str, rows: np.ndarray) -> str:
+    return (
+        "\n".join(["# many", names, "", *(" ".join(map(repr, row)) for row in rows.tolist())])
+        + "\n"
+    )
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Inputs with the same obstacles, in groups of many and one by one."""
+    (tmp_path / "circles.txt").write_text(table("x y radius", scatterers()))
+    (tmp_path / "walls.txt").write_text(table("X1 y1 x2 y2", walls()))
+    points = ", ".join(f"{x}, {y}" for x, y in POINTS)
+    many = [
+        "&obstacle name = 'circles' file = 'circles.txt' /",
+        "&wall name = 'triangle' points = " + points + " /",
+        "&wall name = 'lines' file = 'walls.txt' /",
+    ]
+    one = [f"&obstacle centre = {x!r}, {y!r} radius = {r!r} /" for x, y, r in scatterers().tolist()]
+    ends = [(*a, *b) for a, b in pairwise(POINTS)] + walls().tolist()
+    one += [f"&wall from = {a!r}, {b!r} to = {c!r}, {d!r} /" for a, b, c, d in ends]
+    write_input(tmp_path, "\n".join([BOX, *many, END]), "many.nml")
+    write_input(tmp_path, "\n".join([BOX, *one, END]), "single.nml")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_obstacles_of_a_file_are_met_as_if_each_had_a_group(program, folder):
+    for name in ("many", "single"):
+        assert ran(program, f"{name}.nml", "-o", f"{name}.h5").returncode == FINISHED
+    with h5py.File("many.h5") as many, h5py.File("single.h5") as single:
+        for name in (
+            "particles/disks/position/value",
+            "particles/disks/velocity/value",
+            "events/j",
+        ):
+            assert np.array_equal(many[name][()], single[name][()])
+        codes = many["events/j"][()]
+        assert codes.min() < -4 - len(scatterers())  # walls, too
+        sums = many["observables"]["obstacles" if "obstacles" in many["observables"] else "walls"]
+        assert set(sums) == {"circles", "last", "triangle", "lines"}
+        hits = sum(int(sums[name]["collisions/value"][-1]) for name in sums)
+        assert hits == int(many["observables/obstacle_collisions/value"][-1])
+
+
+def test_a_reader_has_every_obstacle_in_the_order_of_its_codes(program, folder):
+    assert ran(program, "many.nml", "-o", "many.h5").returncode == FINISHED
+    run = read_run("many.h5")
+    assert np.array_equal([o.centre for o in run.obstacles], [*scatterers()[:, :2], [3, 3]])
+    assert [o.radius for o in run.obstacles] == [*scatterers()[:, 2], 0.2]
+    assert np.array_equal(run.walls[:3], [*pairwise(POINTS)])
+    assert np.array_equal(run.walls[3:].reshape(-1, 4), walls())
+    axes = plt.figure().subplots()
+    draw_box(axes, run)
+    plt.close()
+
+
+def test_a_simulation_has_them_too(folder):
+    with Simulation("many.nml") as simulation:
+        rows = simulation.parameters["obstacle_rows"]
+        assert np.array_equal(rows["centre"], [*scatterers()[:, :2], [3, 3]])
+        assert np.array_equal(rows["group"], [1] * len(scatterers()) + [2])
+        assert np.array_equal(simulation.parameters["wall_rows"]["to"][:3], POINTS[1:])
+
+
+def test_a_file_of_hdf5_has_the_same_obstacles(program, folder):
+    assert ran(program, "many.nml", "-o", "text.h5").returncode == FINISHED
+    with h5py.File("circles.h5", "w") as circles, h5py.File("walls.h5", "w") as lines:
+        circles["centre"], circles["radius"] = scatterers()[:, :2], scatterers()[:, 2]
+        lines["from"], lines["to"] = walls()[:, :2], walls()[:, 2:]
+    text = (folder / "many.nml").read_text().replace(".txt", ".h5")
+    path = write_input(folder, text, "hdf5.nml")
+    assert ran(program, path, "-o", "hdf5.h5").returncode == FINISHED
+    with h5py.File("text.h5") as one, h5py.File("hdf5.h5") as other:
+        for name in ("particles/disks/position/value", "parameters/wall_rows/to"):
+            assert np.array_equal(one[name][()], other[name][()])
+    with h5py.File("circles.h5", "r+") as circles:
+        circles["radius"][7] = np.nan
+    done = ran(program, "hdf5.nml", "-o", "hdf5.h5", "--force")
+    assert done.returncode == USAGE
+    assert "circles.h5: row 8: NaN is out of range" in done.stderr
+    with h5py.File("circles.h5", "w") as circles:
+        circles["centre"] = scatterers()[:, :2]
+    done = ran(program, "hdf5.nml", "-o", "hdf5.h5", "--force")
+    assert "circles.h5: has no dataset radius" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x y radius\n1 1 0.2\n1 2 0\n", "circles.txt:3: 0 is not a radius"),
+        ("x y radius\n\n1 1 0.2\n1 2\n", "circles.txt:4: 2 values; expected: x y radius"),
+        ("x y radius\n1 1 O.2\n", 'circles.txt:2: "O.2" is not a number'),
+        ("1 1 0.2\n", "circles.txt:1: the first line must name the columns, x y radius"),
+        ("x y radius\n# none\n", "circles.txt: holds no obstacles"),
+        (
+            "radius y x\n0.1 2 3\n\n0.1 2 30 # far\n",
+            "circles.txt:4: centre: the obstacle is outside",
+        ),
+    ],
+)
+def test_mistakes_in_a_file_are_named_with_their_line(program, folder, text, message):
+    (folder / "circles.txt").write_text(text)
+    done = ran(program, "many.nml", "-o", "many.h5")
+    assert done.returncode == USAGE
+    assert "obstacle.file: " + message in done.stderr
+
+
+def test_a_run_does_not_go_on_among_other_obstacles(program, folder):
+    assert ran(program, "many.nml", "-o", "many.h5").returncode == FINISHED
+    more = ["many.nml", "-o", "many.h5", "--resume", "--set", "stop.events=3000"]
+    (folder / "circles.txt").write_text(table("x y radius", scatterers()[::-1]))
+    done = ran(program, *more)
+    assert done.returncode == USAGE
+    assert "obstacle.circles.centre" in done.stderr
+    (folder / "circles.txt").write_text(table("x y radius", scatterers()))
+    assert ran(program, *more).returncode == FINISHED
+
+
+def test_too_many_groups_are_refused_in_one_line(program, tmp_path):
+    text = "&obstacle centre = 0.5, 0.5 radius = 0.1 /\n" * 5003
+    done = ran(program, write_input(tmp_path, text + "&species count = 1 /\n&stop time = 1 /"))
+    assert done.returncode == USAGE
+    assert done.stderr.count("more than 5000 groups") == 1
+    assert "(file)" in done.stderr
