@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 from . import packages as packages  # first: it reports packages that are missing
 from .aliases import Aliases
 from .reading.bridges import mdanalysis_universe
-from .reading.reader import EventLog, Obstacle, Run, RunError, Series, read_run
+from .reading.files import RunError
+from .reading.reader import EventLog, Obstacle, Run, Series, read_run
 from .running.ensembles import ensemble, sweep
 from .running.program import ProgramError, run
 from .running.simulation import Simulation

@@ -5,6 +5,7 @@ what is measured on them as estimates.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ SMOOTH = ("lossy", "soft", "mixture", "turning")  # what a gas may be that cools
 SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so close to its limit
 
 
-def on_grid(x: Sequence, y: Sequence, points: int) -> tuple[np.ndarray, np.ndarray]:
+def on_grid(x: Sequence[Any], y: Sequence[Any], points: int) -> tuple[np.ndarray, np.ndarray]:
     """A grid from 0 to the last x of the shortest run, and the tracks y (K, T) there: (R, K, P)."""
     grid = np.linspace(0, min(own[-1] for own in x), points)
     each = zip(x, y, strict=True)
@@ -137,7 +138,7 @@ def haff(
     in_time = [np.exp(np.interp(np.log(time), np.log(t[1:]), np.log(k[1:]))) for t, _, k in tracks]
     if soft is not None:
         slopes = [exponent(time, k) for k in in_time]
-    curves = {
+    curves: Curves = {
         "w0_t": time,
         "K_by_time": estimate([np.interp(time, t, k) for t, _, k in tracks]),
         "haff": by_time,
@@ -180,8 +181,9 @@ def rough_law(run: Run) -> tuple[float, float, float]:
 
 def temperatures(run: Run) -> tuple[np.ndarray, np.ndarray]:
     """T of translation and of rotation at the observables."""
-    names = "temperature", "rotational_temperature"
-    return tuple(run.observable(f"all/{name}").value for name in names)
+    kinds = "temperature", "rotational_temperature"
+    t, rotational = (run.observable(f"all/{kind}").value for kind in kinds)
+    return t, rotational
 
 
 def rough(runs: list[Run], points: int = 200) -> Curves:

@@ -26,13 +26,15 @@ eighth of it, and none (NaN) for longer ones.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
+from ..reading.files import RunError
 from ..reading.nature import KICKED, TRAITS, allow
-from ..reading.reader import Run, RunError
+from ..reading.reader import Run
 from ..running.simulation import Simulation
 from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
 from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
@@ -88,7 +90,7 @@ class Correlator:
     def __init__(
         self,
         source: Run | Simulation,
-        times: Sequence[float],
+        times: ArrayLike,
         waves: Iterable[float] = (),
         reach: float | None = None,
         lags: np.ndarray | None = None,
@@ -112,8 +114,10 @@ class Correlator:
         self.pairs = np.zeros(size)
         self.sums = np.zeros((*size, len(self.names), len(FIXED) + len(self.waves)))
         self.done = 0  # samples
-        self.held: dict[int, tuple] = {}  # by number: place, velocity, the last partner
-        self.due: dict[int, list] = {}  # by number: its (origin, lag)
+        self.held: dict[
+            int, tuple[np.ndarray, np.ndarray, int]
+        ] = {}  # by number: place, velocity, the last partner
+        self.due: dict[int, list[tuple[int, int]]] = {}  # by number: its (origin, lag)
         self.last = np.full(len(self.lags), -1.0)  # where in the time of a lag its last origin was
 
     def follow(self, source: Run | Simulation) -> Self:
@@ -136,16 +140,19 @@ class Correlator:
         part = np.where(self.lags > 0, np.floor(since + 1e-6), now)
         fresh = np.flatnonzero(there & (part > self.last))
         self.last[fresh] = part[fresh]
-        for lag in fresh:
+        for lag in fresh.tolist():
             self.due.setdefault(int(partner[lag]), []).append((now, lag))
         if len(fresh):
             self.held[now] = place, velocity, partner[fresh].max()
         if now in self.due:
-            self.count(*np.transpose(self.due.pop(now)), place, velocity)
+            origins, lags = np.transpose(self.due.pop(now))
+            self.count(origins, lags, place, velocity)
         self.held = {k: one for k, one in self.held.items() if one[2] > now}
         self.done += 1
 
-    def count(self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray):
+    def count(
+        self, origins: np.ndarray, lags: np.ndarray, place: np.ndarray, v: np.ndarray
+    ) -> None:
         """Pairs of this sample with the origins (P,), at these lags."""
         before, v0 = (np.stack([self.held[k][part] for k in origins]) for part in (0, 1))
         way = place - before
@@ -176,7 +183,7 @@ class Correlator:
         return self.amounts(name, species).sum(axis=1) / np.where(number > 0, number, np.nan)
 
 
-def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple]:
+def samples(source: Run | Simulation, times: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Places, continuous in time, and velocities at these times, as far as there are any."""
     if isinstance(source, Simulation):
         box = source.parameters["box"]
@@ -248,6 +255,6 @@ def correlators(
     return found
 
 
-def measured(runs: Sequence[Run], **options) -> dict[str, dict[str, Curve]]:
+def measured(runs: Sequence[Run], **options: Any) -> dict[str, dict[str, Curve]]:
     """The curves of runs that differ by their seed; options as of `correlators`."""
     return curves(correlators(runs, **options))

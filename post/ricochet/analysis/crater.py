@@ -4,14 +4,15 @@ The projectile is the species of that name, or else the only disk that moves at 
 others are the bed.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import contourpy
 import numpy as np
 import scipy
 
+from ..reading.files import RunError
 from ..reading.nature import allow
-from ..reading.reader import Run, RunError
+from ..reading.reader import Run
 
 
 class Crater(NamedTuple):
@@ -30,6 +31,7 @@ class Crater(NamedTuple):
 
 
 #: What a run may be in which nothing but a projectile moves a bed.
+QUIET: tuple[str, ...]
 QUIET = ("lossy", "soft", "rough", "turning", "unlike", "mixture", "obstructed", "walled")
 QUIET += ("stepped",)
 FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
@@ -108,7 +110,7 @@ def hole(run: Run) -> np.ndarray:
     half = 0.5 * np.median(before[before > 0.05])
     gone = np.pad(np.minimum(before - half, half - after), 1, constant_values=-half)
     x, y = (np.concatenate([[2 * u[0] - u[1]], u, [2 * u[-1] - u[-2]]]) for u in (x, y))
-    lines = contourpy.contour_generator(x, y, gone).lines(0.0)
+    lines: list[np.ndarray] = contourpy.contour_generator(x, y, gone).lines(0.0)  # type: ignore[assignment]
     return max(lines, key=area, default=np.empty((0, 2)))
 
 
@@ -122,9 +124,11 @@ def packing_field(run: Run, frame: int, cells: int = 240) -> tuple[np.ndarray, .
     """Area fraction smoothed over a few disks: x and y of the cells and values (y, x)."""
     here = bed(run)
     side = run.edges.max() / cells
-    shape = np.maximum(1, np.round(run.edges / side)).astype(int)
-    limits, disks = np.stack([run.lower, run.upper], axis=1), np.pi * run.radius[here] ** 2
-    area, xs, ys = np.histogram2d(*run.position[frame][here].T, shape, limits, weights=disks)
+    shape: Any = np.maximum(1, np.round(run.edges / side)).astype(int)
+    limits: Any = np.stack([run.lower, run.upper], axis=1)
+    disks = np.pi * run.radius[here] ** 2
+    x, y = run.position[frame][here].T
+    area, xs, ys = np.histogram2d(x, y, shape, limits, weights=disks)
     reach = 2.5 * np.median(run.radius[here]) / side
     smooth = scipy.ndimage.gaussian_filter(area, reach, mode="reflect")
     fraction = smooth.T / (np.diff(xs)[0] * np.diff(ys)[0])

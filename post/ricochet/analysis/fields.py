@@ -9,13 +9,14 @@ small by 1 / n.  Blocks of unequal weight as in Busing, Meijer and van der Leede
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
 from ..predictions import hard_disks
-from ..reading.reader import SIDES, Run, RunError
+from ..reading.files import RunError
+from ..reading.reader import SIDES, Run
 from .statistics import Estimate, memory, student
 from .structure import periods
 from .thermodynamics import after_start, free_disks, refuse_others
@@ -34,9 +35,9 @@ Cells = tuple[int, int]
 class Fluxes(NamedTuple):
     """What passes from one wall to the opposite one, per length and time."""
 
-    pressure: float  # momentum along the axis
-    shear: float  # momentum along the walls
-    energy: float
+    pressure: Any  # momentum along the axis; a number or an `Estimate`
+    shear: Any  # momentum along the walls; likewise
+    energy: Any
 
 
 class Block(NamedTuple):
@@ -254,7 +255,7 @@ def of_sums(total: np.ndarray, run: Run, cells: Cells) -> np.ndarray:
     heat_x = qx - u * (xx + yy) / 2 - u * xx - v * xy + u * (u**2 + v**2) * mass
     heat_y = qy - v * (xx + yy) / 2 - u * xy - v * yy + v * (u**2 + v**2) * mass
     stress = [xx - mass * u * u, xy - mass * u * v, yy - mass * v * v]
-    for axis in np.flatnonzero(np.array(cells) > 1):
+    for axis in np.flatnonzero(np.array(cells) > 1).tolist():
         start, end = reach(run, cells, axis, run.radius.min())
         shape = (-1, 1) if axis else (1, -1)
         slopes = (
@@ -335,7 +336,9 @@ def fluxes(blocks: list[Block], axis: int) -> Members:
     return jackknife(lambda total: total[:3] / total[3] / length, sums, sums[:, 3:])
 
 
-def expected(run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]):
+def expected(
+    run: Run, axis: int, x: np.ndarray, flux: Fluxes, middle: tuple[float, float]
+) -> np.ndarray:
     """(C, 3) flow along the walls, kT and n at the places x, from those in the middle on.
 
     Pressure is the same everywhere; dT/dx = -(energy - shear u) / conductivity, du/dx = -shear /

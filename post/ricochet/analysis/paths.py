@@ -37,6 +37,8 @@ def seen(run: Run, log: EventLog, frames: list[int]) -> np.ndarray:
 
 def turns_between(run: Run, log: EventLog, frames: list[int], ends: np.ndarray) -> Turns:
     """All turns from the first of these frames, which have seen so many events, to the last."""
+    if log.momentum_change is None:
+        raise ValueError("the log has no momentum_change")
     some = slice(ends[0], ends[-1])
     i, j = log.i[some], log.j[some]
     pair = np.flatnonzero(j > 0)

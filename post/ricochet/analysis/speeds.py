@@ -70,8 +70,10 @@ def relaxation(
     Frames with disks at rest have none: they are left out, or refused among the first.
     """
     tau = run.collisions_per_disk_at(run.time)
-    until_then = (k for k in np.flatnonzero(tau <= until) if all_move(run, k))
-    chosen = list(until_then if frames is None else range(min(frames, run.n_frames)))
+    if frames is None:
+        chosen = [k for k in np.flatnonzero(tau <= until).tolist() if all_move(run, k)]
+    else:
+        chosen = list(range(min(frames, run.n_frames)))
     return tau[chosen], np.array([excess_kurtosis(reduced_speeds(run, [k])) for k in chosen])
 
 
@@ -95,7 +97,8 @@ def means(runs: list[Run], frames: list[list[int]], name: str) -> tuple[Estimate
         for run, own in zip(runs, frames, strict=True)
     ]
     if len(members) > 1:
-        both = zip(*estimate([one.mean(axis=0) for one in members]), strict=True)
-    else:
-        both = (series_mean(column)[:2] for column in members[0].T)
-    return tuple(Estimate(*one) for one in both)
+        whole = estimate([one.mean(axis=0) for one in members])
+        (v, k), (dv, dk) = whole.mean, whole.error
+        return Estimate(v, dv), Estimate(k, dk)
+    speed, energy = (series_mean(column) for column in members[0].T)
+    return Estimate(speed.mean, speed.error), Estimate(energy.mean, energy.error)

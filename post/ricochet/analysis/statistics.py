@@ -5,10 +5,11 @@ Two kinds of error: `estimate` is for independent members, such as runs that dif
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from ..predictions.theory import Law
 
@@ -19,8 +20,8 @@ FEWEST_RUNS = 4  # for an error of their error, and so to weigh by
 class Estimate(NamedTuple):
     """A mean with its error, half the 68 % interval."""
 
-    mean: np.ndarray | float
-    error: np.ndarray | float
+    mean: Any  # a number, or an array of any shape
+    error: Any  # likewise
 
 
 class Curve(NamedTuple):
@@ -85,12 +86,12 @@ def hold_against(
 ONE_SIGMA = float(scipy.special.ndtr(1))  # scipy.stats takes a second to be read
 
 
-def student(samples: np.ndarray | float) -> np.ndarray | float:
+def student(samples: ArrayLike) -> Any:
     """Half the 68 % interval of a mean over its standard error, both from so many samples."""
     return scipy.special.stdtrit(np.maximum(1.0, np.subtract(samples, 1.0)), ONE_SIGMA)
 
 
-def estimate(values: np.ndarray, axis: int = 0) -> Estimate:
+def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
     """Mean and error over independent members; a single member has no error (NaN)."""
     values = np.asarray(values, dtype=float)
     mean, count = values.mean(axis=axis), values.shape[axis]

@@ -3,11 +3,13 @@
 A handful of lines of scipy each, and no library: those know periodic boxes, but not walls.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from typing import overload
 
 import numpy as np
 import scipy
 
+from ..reading.arrays import Index, chosen
 from ..reading.nature import TRAITS, allow
 from ..reading.reader import Run
 from .statistics import Curve, estimate, series_mean
@@ -29,7 +31,7 @@ def refuse(run: Run, *traits: str) -> None:
 
 
 def pair_correlation(
-    run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
+    run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
     """g(r) in bins, `edges` in mean diameters, over the mean density of the box; NaN without pairs.
 
@@ -43,7 +45,7 @@ def pair_correlation(
     other = others[0] if others else one
     sums = np.zeros(len(edges) - 1)
     expected = 0.0  # pairs per area, of disks at random
-    for k in frames:
+    for k in chosen(run.n_frames, frames):
         x, (lower, upper) = run.position[k], run.sides_at(run.time[k])
         margin = np.where(run.periodic, -np.inf, r[-1])
         inner = one & np.all((x > lower + margin) & (x < upper - margin), axis=1)
@@ -62,7 +64,7 @@ def masks(run: Run, pair: tuple[str, str] | None) -> list[np.ndarray]:
 
 
 def structure_factor(
-    run: Run, frames: list[int], edges: np.ndarray, pair: tuple[str, str] | None = None
+    run: Run, frames: Index, edges: np.ndarray, pair: tuple[str, str] | None = None
 ) -> np.ndarray:
     """S(k) = <|sum of exp(ikx)|^2> / N in bins, `edges` of k in 1 / mean diameters; NaN without k.
 
@@ -78,15 +80,15 @@ def structure_factor(
     k = np.hypot(*np.meshgrid(along_x * unit[0], along_y * unit[1], indexing="ij"))
     k *= 2 * run.radius.mean()
     both = masks(run, pair)
-    sums = np.zeros(k.shape)
-    for frame in frames:
+    sums, numbers = np.zeros(k.shape), chosen(run.n_frames, frames)
+    for frame in numbers:
         x, y = (run.position[frame] * unit).T
         waves = [
             np.exp(1j * np.outer(along_x, x[some])) @ np.exp(1j * np.outer(y[some], along_y))
             for some in both
         ]
         sums += (waves[0] * waves[-1].conj()).real
-    sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(frames)
+    sums /= np.sqrt(both[0].sum() * both[-1].sum()) * len(numbers)
     sums[k == 0] = np.nan
     known = np.isfinite(sums)
     total, _ = np.histogram(k[known], edges, weights=sums[known])
@@ -94,23 +96,29 @@ def structure_factor(
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
-def evenly(run: Run, frames: slice = slice(None), most: int = 50) -> list[int]:
+def evenly(run: Run, frames: Index = slice(None), most: int = 50) -> list[int]:
     """At most so many of the frames [all], those next to even steps of time."""
-    which = np.arange(run.n_frames)[frames]
+    which = np.array(chosen(run.n_frames, frames))
     time = run.time[which]
     at = np.interp(np.linspace(time[0], time[-1], most), time, np.arange(len(time)))
     return which[np.unique(at.round().astype(int))].tolist()
 
 
 def averaged(
-    of: Callable, runs: list[Run], frames: list[list[int]], edges: np.ndarray, *more: object
+    of: Callable[..., np.ndarray],
+    runs: Sequence[Run],
+    frames: Sequence[Index],
+    edges: np.ndarray,
+    *more: object,
 ) -> Curve:
     """The means of of(run, frames, edges, *more), and their errors, in the bins that have any.
 
     Errors are over the runs, or over the frames of a single one, which remember each other.
     """
     middle, alone = (edges[1:] + edges[:-1]) / 2, len(runs) == 1
-    parts = [(runs[0], [k]) for k in frames[0]] if alone else zip(runs, frames, strict=True)
+    parts: Iterable[tuple[Run, Index]] = zip(runs, frames, strict=True)
+    if alone:
+        parts = [(runs[0], [k]) for k in chosen(runs[0].n_frames, frames[0])]
     values = np.array([of(run, part, edges, *more) for run, part in parts])
     seen = np.isfinite(values).any(axis=1)  # between walls that are near there may be no pairs
     known = np.isfinite(values[seen]).all(axis=0) & seen.any()
@@ -121,9 +129,16 @@ def averaged(
     return Curve(middle[known], *np.reshape(each, (-1, 2)).T)
 
 
-def largest_cluster(run: Run, frame: int, gap: float) -> int:
+@overload
+def largest_cluster(run: Run, frame: int, gap: float) -> int: ...
+@overload
+def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray: ...
+def largest_cluster(run: Run, frame: Index, gap: float) -> int | np.ndarray:
     """Disks in the largest cluster: those that hang together by gaps below `gap`."""
     refuse(run, "sheared")
+    if not isinstance(frame, int | np.integer):
+        each = chosen(run.n_frames, frame)
+        return np.array([largest_cluster(run, k, gap) for k in each], dtype=int)
     x = np.clip(run.position[frame] - run.lower, 0, np.nextafter(run.edges, 0))
     tree = scipy.spatial.cKDTree(x, boxsize=np.where(run.periodic, run.edges, 0.0))
     i, j = tree.query_pairs(2 * float(run.radius.max()) + gap, output_type="ndarray").T
@@ -137,8 +152,11 @@ def largest_cluster(run: Run, frame: int, gap: float) -> int:
     return int(np.bincount(cluster).max())
 
 
-def bond_order(run: Run, frame: int) -> np.ndarray:
-    """(N,) complex psi6 of each disk, over its Delaunay neighbours."""
+def bond_order(run: Run, frame: Index) -> np.ndarray:
+    """(N,) complex psi6 of each disk, over its Delaunay neighbours; (F, N) of several frames."""
+    if not isinstance(frame, int | np.integer):
+        each = chosen(run.n_frames, frame)
+        return np.array([bond_order(run, k) for k in each]).reshape(-1, run.n_disks)
     near = 4 * np.sqrt(np.prod(run.edges) / run.n_disks)
     points = run.position[frame]  # then their periodic copies near the box
     for axis in np.flatnonzero(run.periodic):
@@ -158,7 +176,7 @@ def bond_order(run: Run, frame: int) -> np.ndarray:
 
 
 def bond_correlation(
-    run: Run, frames: list[int], psi: list[np.ndarray], edges: np.ndarray
+    run: Run, frames: Index, psi: Sequence[np.ndarray] | np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
     """g6(r) = Re <psi6*(0) psi6(r)> in bins, `edges` in mean diameters; NaN without pairs.
 
@@ -167,7 +185,7 @@ def bond_correlation(
     few = np.linspace(0, run.n_disks - 1, min(run.n_disks, max(16, MOST_PAIRS // run.n_disks)))
     centres = few.astype(int)
     sums, pairs = np.zeros((2, len(edges) + 1))
-    for frame, own in zip(frames, psi, strict=True):
+    for frame, own in zip(chosen(run.n_frames, frames), psi, strict=True):
         x = run.position[frame]
         gap = x[centres, None] - x
         gap -= np.where(run.periodic, run.edges * np.round(gap / run.edges), 0.0)

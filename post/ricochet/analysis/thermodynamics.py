@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictions import hard_disks
+from ..reading.files import RunError
 from ..reading.nature import KICKED, ROUNDING, SETTLED, Refused, allow
-from ..reading.reader import SIDES, Run, RunError, Species
+from ..reading.reader import SIDES, Run, Species
+from ..running.simulation import Simulation
 from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
 
 TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
@@ -129,7 +131,7 @@ def later(run: Run, skip: float | None = None) -> slice:
 # --- temperature ---
 
 
-def unmoved(source: Run) -> np.ndarray:
+def unmoved(source: Run | Simulation) -> np.ndarray:
     """(2,) along which axes nothing changes the total momentum, of a run or a simulation.
 
     But for walls along the axis, and these only with `ALONG_WALLS`.

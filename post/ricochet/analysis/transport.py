@@ -24,8 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictions import hard_disks
+from ..reading.files import RunError
 from ..reading.nature import allow
-from ..reading.reader import Run, RunError
+from ..reading.reader import Run
 from . import thermodynamics as td
 from .correlations import Correlator
 from .statistics import Curve, SeriesMean, estimate, series_mean
@@ -66,10 +67,11 @@ def motion(run: Run, frames: slice) -> tuple[np.ndarray, np.ndarray]:
     Relative to the centre of mass, where that moves as at the start.
     """
     kept = td.conserved(run)
-    return tuple(
+    place, velocity = (
         values - kept * np.average(values, axis=1, weights=run.mass, keepdims=True)
         for values in (run.unwrapped(frames), run.velocity[frames])
     )
+    return place, velocity
 
 
 def diffusion_lag(runs: list[Run], frames: list[slice]) -> int:
@@ -192,8 +194,8 @@ def enskog_of(run: Run, reduced: bool = False) -> dict[str, float]:
         return hard_disks.enskog(z, eta, diameter[0], kt, mass[0])
     kinds = np.round(np.log([diameter, mass]), 2)
     _, which, count = np.unique(kinds, axis=1, return_inverse=True, return_counts=True)
-    means = [np.bincount(which.ravel(), one) / count for one in (diameter, mass)]
-    return hard_disks.enskog_mixture(z, count / area, *means, kt)
+    diameter, mass = (np.bincount(which.ravel(), one) / count for one in (diameter, mass))
+    return hard_disks.enskog_mixture(z, count / area, diameter, mass, kt)
 
 
 def of_moments(runs: list[Run], starts: list[float]) -> dict[str, Found]:

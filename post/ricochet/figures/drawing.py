@@ -6,23 +6,29 @@
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection, PatchCollection
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from ..analysis.statistics import Estimate, kurtosis_noise
 from ..analysis.structure import bond_order, periods
-from ..reading.files import destination, did_you_mean
+from ..reading.arrays import Index, as_index
+from ..reading.files import RunError, destination, did_you_mean
 from ..reading.nature import known, rows_of
-from ..reading.reader import SIDES, Run, RunError, groups_of_rows
+from ..reading.reader import SIDES, Run, groups_of_rows
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 COLOURS = matplotlib.rc_params_from_file(STYLE)["axes.prop_cycle"].by_key()["color"]
-WALL = {"color": "0.25", "linewidth": 1.2}
+WALL: dict[str, Any] = {"color": "0.25", "linewidth": 1.2}
 
 #: What disks can be coloured by, apart from their species.
 LABELS = {
@@ -96,10 +102,10 @@ def panel_grid(count: int, aspect: float) -> tuple[int, int]:
     return rows, int(np.ceil(count / rows))
 
 
-def values_of(run: Run, frame: int | list[int], colour: str) -> np.ndarray:
+def values_of(run: Run, frame: Index, colour: str) -> np.ndarray:
     """(..., N) the number that colours each disk, see `LABELS`; psi6 of one frame only."""
-    if colour == "collisions":
-        return run.event_count[frame].astype(float)
+    if colour == "collisions" and run.event_count is not None:
+        return run.event_count[as_index(frame)].astype(float)
     if colour == "psi6":
         psi = bond_order(run, frame)
         return np.degrees(np.angle(psi * psi.mean().conj()))
@@ -125,7 +131,7 @@ def colour_map(colour: str) -> str:
 def chosen_colour(run: Run, wish: str | None) -> str:
     """The wish if the run has the data; without one by species where there are several."""
     known = ("species", *LABELS)
-    if wish not in (None, *known):
+    if wish is not None and wish not in known:
         hint = did_you_mean(wish, known)
         raise RunError(f"'{wish}' is not one of {', '.join(known)}{hint}")
     if wish == "collisions" and run.event_count is None:
@@ -139,12 +145,12 @@ def aspect_of(run: Run) -> float:
     return height / width
 
 
-def lone(x: np.ndarray) -> dict:
+def lone(x: np.ndarray) -> dict[str, Any]:
     """Style of a curve: a single point is not seen without a marker."""
     return {"marker": "o", "ms": 3, "clip_on": False} if len(x) < 2 else {}
 
 
-def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
+def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     """Walls solid, periodic sides dashed, obstacles grey; equal scales, ticks at the corners.
 
     Sides that move are drawn where they are at this time [their own places], what lies beyond them
@@ -154,8 +160,10 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.sides_at(time)
     lines = [(x0, y0), (x0, y1)], [(x1, y0), (x1, y1)], [(x0, y0), (x1, y0)], [(x0, y1), (x1, y1)]
     styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
+    sides: dict[str, Any]
+    grey: dict[str, Any]
     sides, grey = {"linestyles": styles, "clip_on": False, "zorder": 3}, {"facecolor": "0.85"}
-    axes.add_patch(Rectangle(low, *(high - low), zorder=-2, **grey))
+    axes.add_patch(Rectangle((low[0], low[1]), *(high - low), zorder=-2, **grey))
     axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", zorder=-1))
     axes.add_collection(LineCollection(lines, **sides, **WALL))
     walls = [wall + shift for wall in run.walls for shift in periods(run)]
@@ -173,7 +181,7 @@ def draw_box(axes: plt.Axes, run: Run, time: float | None = None) -> None:
     name_walls(axes, run)
 
 
-def draw_circles(axes: plt.Axes, run: Run, grey: dict) -> None:
+def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
     """Circular obstacles, with those of their periodic images that reach into the box."""
     if any(obstacle.inside for obstacle in run.obstacles):
         axes.add_patch(Rectangle((run.lower[0], run.lower[1]), *run.edges, zorder=0, **grey))
@@ -187,16 +195,17 @@ def draw_circles(axes: plt.Axes, run: Run, grey: dict) -> None:
             and np.all(obstacle.centre + shift + obstacle.radius >= run.lower)
             and np.all(obstacle.centre + shift - obstacle.radius <= run.upper)
         ]
+        style: dict[str, Any]
         style = {"facecolor": fill, "edgecolor": "0.25", "linewidth": width, "zorder": level}
         axes.add_collection(PatchCollection(circles, **style))
 
 
-def name_walls(axes: plt.Axes, run: Run) -> None:
+def name_walls(axes: Axes, run: Run) -> None:
     """Along each side and wall its temperature, and how fast and where to it slides."""
     (x0, y0), (x1, y1) = run.room
-    shown = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
-    shown += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
-    shown = [*zip(run.sides, shown, strict=True)]
+    ends_of = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
+    ends_of += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
+    shown: list[Any] = [*zip(run.sides, ends_of, strict=True)]
     walls = rows_of(run.parameters.get("wall", {}))
     groups = groups_of_rows(run.parameters, "wall")
     firsts = np.unique(groups, return_index=True)[1]  # of each polyline, or file, one wall
@@ -234,7 +243,7 @@ def with_images(run: Run, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.concatenate(which), np.concatenate(places)
 
 
-def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> EllipseCollection:
+def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) -> EllipseCollection:
     """Disks of true size at `position` (N, 2) and their periodic images.
 
     Of their style `array` (N,) colours them by value, or else `facecolors`.
@@ -249,7 +258,7 @@ def disk_collection(axes: plt.Axes, run: Run, position: np.ndarray, **style) -> 
     return disks
 
 
-def radius_marks(axes: plt.Axes, run: Run, frame: int) -> LineCollection | None:
+def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
     """A radius of each disk that shows how it has turned; None where disks have no orientation."""
     if "orientation" not in run.elements:
         return None
@@ -257,31 +266,31 @@ def radius_marks(axes: plt.Axes, run: Run, frame: int) -> LineCollection | None:
     angle = run.orientation[frame][which]
     rim = run.radius[which] * np.array([np.cos(angle), np.sin(angle)])
     lines = np.stack([places, places + rim.T], axis=1)
-    marks = LineCollection(lines, colors="black", linewidths=0.6, zorder=1.5)
+    marks = LineCollection([*lines], colors="black", linewidths=0.6, zorder=1.5)
     axes.add_collection(marks)
     return marks
 
 
-def band(axes: plt.Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style) -> None:
+def band(axes: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, **style: Any) -> None:
     """A line with its error."""
     axes.plot(x, y, **style)
     axes.fill_between(x, y - error, y + error, color=style["color"], alpha=0.25, lw=0)
 
 
-def bars(axes: plt.Axes, height: Estimate, bins: np.ndarray, **style) -> None:
+def bars(axes: Axes, height: Estimate, bins: np.ndarray, **style: Any) -> None:
     """A histogram with its errors."""
     axes.stairs(height.mean, bins, **style)
     middle = (bins[1:] + bins[:-1]) / 2
     axes.errorbar(middle, *height, fmt="none", color=style["color"], elinewidth=1)
 
 
-def noise_band(axes: plt.Axes, count: int, colour: str) -> None:
+def noise_band(axes: Axes, count: int, colour: str) -> None:
     """Within which a2 of so many speeds lies in 95 % of all cases if they are Maxwellian."""
     reach = 2 * kurtosis_noise(count)
     axes.axhspan(-reach, reach, color=colour, alpha=0.12, lw=0, zorder=0)
 
 
-def dilute_limit(axes: plt.Axes, points: np.ndarray, of: str = "") -> None:
+def dilute_limit(axes: Axes, points: np.ndarray, of: str = "") -> None:
     """Points (P, 2) of a solution of the Boltzmann equation as open circles."""
     label = f"{of}dilute limit (Boltzmann equation)"
     axes.plot(*points.T, ls="", marker="o", mfc="none", color="black", label=label)
@@ -292,17 +301,17 @@ def species_colours(run: Run) -> list[str]:
     return [COLOURS[(s - 1) % len(COLOURS)] for s in run.species]
 
 
-def species_legend(figure: plt.Figure, run: Run) -> None:
+def species_legend(figure: Figure, run: Run) -> None:
     """Which colour is which species, below all panels; nothing for a single one."""
     handles = [
-        plt.Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
+        Line2D([], [], ls="", marker="o", color=COLOURS[k % len(COLOURS)])
         for k in range(len(run.names))
     ]
     if len(run.names) > 1:
         figure.legend(handles, run.names, loc="outside lower center", ncols=len(run.names))
 
 
-def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
+def warn(figure: Figure, notes: Sequence[str]) -> None:
     """Below the figure, what speaks against its numbers; at most three notes in full."""
     if not notes:
         return
@@ -311,13 +320,13 @@ def warn(figure: plt.Figure, notes: Sequence[str]) -> None:
     lines = [wrap(f"Warning: {note}", 15 * int(figure.get_figwidth())) for note in notes[:3]]
     text = "\n".join([line for part in lines for line in part] + more)
     if figure.legends:  # one lies where the label would
-        figure.legends[0].set_title(text, {"size": 9})
+        figure.legends[0].set_title(text, FontProperties(size=9))
         figure.legends[0].get_title().set_color("firebrick")
     else:
         figure.supxlabel(text, fontsize=9, color="firebrick")
 
 
-def save(figure: plt.Figure, path: Path, runs: list[Run], title: str) -> None:
+def save(figure: Figure, path: Path, runs: list[Run], title: str) -> None:
     """Write the figure, its source in the metadata; missing folders are made."""
     sources = ", ".join(run.path.name for run in runs[:20]) + (", ..." if len(runs) > 20 else "")
     commits = sorted({str(run.provenance.get("git_commit", "unknown")) for run in runs})

@@ -10,7 +10,9 @@ from functools import cache
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
+from ..reading.arrays import Number
 from ..reading.reader import Restitution
 
 CLOSE_PACKING = math.pi / math.sqrt(12)
@@ -46,30 +48,30 @@ MELTING = {
 
 
 @cache
-def splines() -> tuple[Callable, Callable]:
+def splines() -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
     """Z (1 - eta)^2, which is close to 1 and smooth and so safe to interpolate, and c."""
     eta, z = FLUID.T
     smooth = scipy.interpolate.CubicSpline(np.append(0, eta), np.append(1, z * (1 - eta) ** 2))
     return smooth, scipy.interpolate.CubicSpline(np.append(0, eta[:10]), np.append(0, SHIFT))
 
 
-def henderson(eta: np.ndarray) -> np.ndarray:
+def henderson(eta: Number) -> Number:
     """Z of the fluid by Henderson, Mol. Phys. 30, 971 (1975)."""
     return (1 + eta**2 / 8) / (1 - eta) ** 2
 
 
-def simulated(eta: np.ndarray) -> np.ndarray:
+def simulated(eta: ArrayLike) -> np.ndarray:
     """Z of the fluid between the points of `FLUID`; NaN beyond the last."""
     eta = np.asarray(eta, dtype=float)
     return np.where(eta <= FLUID[-1, 0], splines()[0](eta) / (1 - eta) ** 2, np.nan)
 
 
-def simulated_finite(eta: np.ndarray, count: int) -> np.ndarray:
+def simulated_finite(eta: ArrayLike, count: int) -> np.ndarray:
     """The same for `count` disks in a periodic box, eta up to 0.5."""
     return simulated(eta) + splines()[1](eta) / count
 
 
-def crystal(eta: np.ndarray, count: float = math.inf) -> np.ndarray:
+def crystal(eta: Number, count: float = math.inf) -> Number:
     """Z of the crystal by Alder, Hoover and Young, J. Chem. Phys. 49, 3688 (1968).
 
     `count` disks in a periodic box: their centre of mass is free, as in an ideal gas of one.
@@ -115,12 +117,14 @@ def of_sizes(z: np.ndarray, eta: np.ndarray, alike: float) -> np.ndarray:
     return (1 - alike) / (1 - eta) + alike * z
 
 
-def contact_value(z: float, eta: float) -> float:
+def contact_value(z: Number, eta: Number) -> Number:
     """The chi of Z = 1 + 2 eta chi."""
     return (z - 1) / (2 * eta)
 
 
-def collision_rate(z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0):
+def collision_rate(
+    z: float, diameter: float, free: float, kt: float = 1.0, mass: float = 1.0
+) -> float:
     """The w that follows from Z; `free` = N between walls, N - 1 in a periodic box."""
     # Mean relative speed for fixed energy over that of the Maxwell law.
     c_n = math.exp(math.lgamma(free) - math.lgamma(free + 0.5)) * math.sqrt(free)
@@ -178,7 +182,9 @@ def speed_of_sound(eta: float, kt: float = 1.0, mass: float = 1.0) -> float:
     return math.sqrt((slope + henderson(eta) ** 2) * kt / mass)
 
 
-def enskog(z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0) -> dict:
+def enskog(
+    z: float, eta: float, diameter: float, kt: float = 1.0, mass: float = 1.0
+) -> dict[str, float]:
     """Viscosities, heat conductivity (k = 1) and D, by name; Gass, J. Chem. Phys. 54, 1898 (1971).
 
     The bulk viscosity is all of it collisional; D is the first Sonine approximation.
@@ -233,6 +239,8 @@ def enskog_mixture(
     }
 
 
-def long_time_tail(time: np.ndarray, density: float, diffusion: float, viscosity: float):
+def long_time_tail(
+    time: np.ndarray, density: float, diffusion: float, viscosity: float
+) -> np.ndarray:
     """<v(0) v(t)> / <v^2> at late times by mode coupling; Dorfman and Cohen, PRL 25, 1257."""
     return 1 / (8 * math.pi * density * (diffusion + viscosity) * np.asarray(time))

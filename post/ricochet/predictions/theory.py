@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 #: A distribution function, or its density.
 Law = Callable[[np.ndarray], np.ndarray]
@@ -57,7 +58,9 @@ def path_density(x: np.ndarray) -> np.ndarray:
     return np.array([np.sum(weight * rate * np.exp(-rate * value)) for value in x])
 
 
-def scattering_angle(b: np.ndarray, mass_ratio: float = np.inf, restitution: float = 1.0):
+def scattering_angle(
+    b: ArrayLike, mass_ratio: float = np.inf, restitution: float = 1.0
+) -> np.ndarray:
     """Deflection [rad] of a disk hitting one at rest, b = impact parameter / (r1 + r2).
 
     `mass_ratio` is the mass at rest over the moving mass; infinite and elastic: 2 acos b.

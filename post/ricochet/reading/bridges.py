@@ -1,11 +1,16 @@
 """Runs for other programs, in their own types; for pandas see `Run.to_dataframe`."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .reader import Run
 
+if TYPE_CHECKING:
+    import MDAnalysis
 
-def mdanalysis_universe(run: Run):
+
+def mdanalysis_universe(run: Run) -> "MDAnalysis.Universe":
     """The run as an MDAnalysis Universe (needs the package MDAnalysis).
 
     MDAnalysis has three dimensions only: z = 0 is added.  Lengths and times keep their

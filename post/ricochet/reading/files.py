@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -56,7 +57,7 @@ def did_you_mean(word: str, others: Iterable[str]) -> str:
     return "".join(f"; did you mean {near}?" for near in get_close_matches(word, others, 1))
 
 
-def tree(group: h5py.Group) -> dict:
+def tree(group: h5py.Group) -> dict[str, Any]:
     """A group as a dictionary of plain values; attributes and datasets alike."""
     values = {name: plain(value) for name, value in group.attrs.items()}
     for name, item in group.items():

@@ -10,6 +10,7 @@ both: a file, a file that is still being written and a simulation in memory have
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Refused(RunError):
     """A run that a law does not hold for; the message names the cause."""
 
 
-class Nature(frozenset):
+class Nature(frozenset[str]):
     """The traits of a run."""
 
     @property
@@ -91,7 +92,7 @@ class Nature(frozenset):
 
 
 def nature_of(
-    parameters: Mapping,
+    parameters: Mapping[str, Any],
     mass: np.ndarray,
     radius: np.ndarray,
     lost: float,
@@ -149,7 +150,7 @@ def nature_of(
     return Nature(name for name, there in found.items() if there)
 
 
-def held_round(parameters: Mapping) -> bool:
+def held_round(parameters: Mapping[str, Any]) -> bool:
     """Whether nothing but one round container, which does not reach the sides, holds the disks."""
     box, rows = parameters.get("box", {}), rows_of(parameters.get("obstacle", {}))
     if len(rows) != 1 or not rows[0].get("inside") or "wall" in parameters:
@@ -159,18 +160,18 @@ def held_round(parameters: Mapping) -> bool:
     return bool(gap.min() >= rows[0]["radius"] * (1 - ROUNDING))
 
 
-def rows_of(group: Mapping) -> list[dict]:
+def rows_of(group: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The obstacles, or the straight walls, one by one: the file has a column for each variable."""
     columns = {name: column for name, column in group.items() if np.ndim(column) > 0}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def known(value: object) -> bool:
+def known(value: Any) -> bool:
     """Whether a variable was given: a wall among others that has none is NaN, or 0, there."""
     return value is not None and bool(np.isfinite(value)) and float(value) > 0
 
 
-def allow(run, law: str, *traits: str) -> None:
+def allow(run: Any, law: str, *traits: str) -> None:
     """Refuse a run that has any trait but these; `law` says in words what is not for it."""
     for trait, reason in TRAITS.items():
         if trait in run.nature and trait not in traits:

@@ -12,17 +12,22 @@ Frames are read on demand, so a file may be larger than memory.  A file that is 
 (`.part`) is read up to its last committed frame.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
 
+from .arrays import Index, as_index
 from .files import RunError, Unsound, did_you_mean, open_file, tree
 from .nature import Nature, nature_of
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 DISKS = "particles/disks"
 SIDES = ("left", "right", "bottom", "top")
@@ -107,7 +112,7 @@ class Frames:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         """All frames, for functions of NumPy."""
         if copy is False:
             raise ValueError(f"{self.path}: {self.name} is read from the file, that is copied")
@@ -119,26 +124,26 @@ class Frames:
         return len(self.shape)
 
     @property
-    def dtype(self) -> np.dtype:
+    def dtype(self) -> np.dtype[Any]:
         """Of the numbers as they are read."""
-        return self.read([]).dtype
+        return self.read(np.arange(0)).dtype
 
-    def __getitem__(self, index: object) -> np.ndarray:
+    def __getitem__(self, index: Any) -> np.ndarray:
         """As NumPy has it: the first axis chooses in the file, the others in what was read."""
         first, *rest = index if isinstance(index, tuple) and index else (index,)
         try:
             if type(first) in WHOLE or np.ndim(first) > 1:
-                return self.read(range(len(self)))[index]
+                return self.read(np.arange(len(self)))[index]
             chosen = np.arange(len(self))[first]
             if chosen.ndim == 0:
-                return self.read([chosen])[(0, *rest)]
+                return self.read(chosen[None])[(0, *rest)]
             whole = slice(None) if isinstance(first, slice) else np.arange(len(chosen))
             return self.read(chosen)[(whole, *rest)]
         except IndexError as problem:
             shape = " x ".join(map(str, self.shape))
             raise NoSuchFrame(f"{self.path}: {self.name} ({shape}): {problem}") from None
 
-    def read(self, chosen: Sequence[int]) -> np.ndarray:
+    def read(self, chosen: np.ndarray) -> np.ndarray:
         """These frames, in this order."""
         steps = np.unique(np.diff(chosen))
         with open_file(self.path) as file:
@@ -198,8 +203,8 @@ class Run:
     periodic: np.ndarray  # (2,) bool
     obstacles: tuple[Obstacle, ...]
     walls: np.ndarray  # (W, 2, 2) straight walls, from one point to another
-    parameters: dict  # group -> variable -> value, as used
-    provenance: dict
+    parameters: dict[str, Any]  # group -> variable -> value, as used
+    provenance: dict[str, Any]
 
     def __repr__(self) -> str:
         """One line, however many disks there are."""
@@ -223,7 +228,7 @@ class Run:
         return self.lower + self.edges
 
     @property
-    def sides(self) -> list[dict]:
+    def sides(self) -> list[dict[str, Any]]:
         """What the input says of each side, in the order of `SIDES`; empty if nothing."""
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
@@ -248,7 +253,7 @@ class Run:
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
 
     @cached_property
-    def pushed(self) -> dict:
+    def pushed(self) -> dict[int, Series]:
         """Places of the sides that disks push, by their numbers in `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
@@ -278,19 +283,20 @@ class Run:
             raise RunError(f"{self.path}: no species '{name}', there are {', '.join(self.names)}")
         return self.species == self.names.index(name) + 1
 
-    def speed(self, frame: int | slice | list[int]) -> np.ndarray:
+    def speed(self, frame: Index) -> np.ndarray:
         """(..., N) length of the velocity."""
-        return np.linalg.norm(self.velocity[frame], axis=-1)
+        return np.linalg.norm(self.velocity[as_index(frame)], axis=-1)
 
-    def kinetic_energy(self, frame: int | slice | list[int]) -> np.ndarray:
+    def kinetic_energy(self, frame: Index) -> np.ndarray:
         """(..., N) m v^2 / 2."""
-        return 0.5 * self.mass * np.sum(self.velocity[frame] ** 2, axis=-1)
+        return 0.5 * self.mass * np.sum(self.velocity[as_index(frame)] ** 2, axis=-1)
 
-    def unwrapped(self, frame: int | slice | list[int]) -> np.ndarray:
+    def unwrapped(self, frame: Index) -> np.ndarray:
         """(..., N, 2) position with whole periods added: continuous in time.
 
         In a sheared box (Lees and Edwards) the image above is displaced by gamma L_y t along x.
         """
+        frame = as_index(frame)
         if self.image is None:
             return self.position[frame]
         image = self.image[frame]
@@ -300,7 +306,7 @@ class Run:
             place[..., 0] += image[..., 1] * np.asarray(slide)[..., None]
         return place
 
-    def displacement(self, frame: int | slice | list[int], origin: int = 0) -> np.ndarray:
+    def displacement(self, frame: Index, origin: int = 0) -> np.ndarray:
         """(..., N) straight-line distance from the place in the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
@@ -342,7 +348,7 @@ class Run:
         with open_file(self.path) as file:
             return tuple(series_in(file["observables"]))
 
-    def to_dataframe(self):
+    def to_dataframe(self) -> "pandas.DataFrame":
         """The observables as a pandas DataFrame (needs that package), a row per sample.
 
         The index is the time, the columns are called like the observables: `all/kinetic_energy`; of
@@ -350,7 +356,7 @@ class Run:
         """
         import pandas
 
-        columns = {}
+        columns: dict[str, np.ndarray] = {}
         with open_file(self.path) as file:
             series = {name: series_of(file, name, self._samples) for name in self.observables}
         for name, (time, value) in series.items():
@@ -361,7 +367,7 @@ class Run:
             columns |= zip([name + part for part in parts[value.shape[1:]]], values, strict=True)
         return pandas.DataFrame(columns, index=pandas.Index(time, name="time"))
 
-    def to_xarray(self):
+    def to_xarray(self) -> "xarray.Dataset":
         """The frames as an xarray Dataset (needs that package): time, disk, component ("x", "y").
 
         What disks have in each frame, and mass, radius, species; path and seed are in its `attrs`.
@@ -372,9 +378,10 @@ class Run:
             raise ImportError("to_xarray needs a package: pip install xarray") from None
 
         dimensions = ("time", "disk", "component")
+        frames: dict[str, Frames | None]
         frames = {"position": self.position, "velocity": self.velocity, **self.elements}
         frames |= {"image": self.image, "event_count": self.event_count}
-        data = {
+        data: dict[str, tuple[Any, np.ndarray]] = {
             name: (dimensions[: values.ndim], values[:])
             for name, values in frames.items()
             if values is not None
@@ -425,7 +432,9 @@ class Run:
     @cached_property
     def events_per_disk(self) -> np.ndarray:
         """(T,) events per disk since the start, at the frames."""
-        return np.array([count.mean() for count in self.event_count])
+        if self.event_count is None:
+            raise RunError(f"{self.path}: has no event_count in its frames")
+        return np.array([self.event_count[k].mean() for k in range(self.n_frames)])
 
     def accessible_area(self, time: float | np.ndarray) -> np.ndarray:
         """(...) area that disks can reach, of the box less its obstacles, or of a round container.
@@ -478,7 +487,7 @@ class Run:
             )
         return Series(time[first : last + 1], value[first : last + 1])
 
-    def parameter(self, group: str, variable: str, default: object = None) -> object:
+    def parameter(self, group: str, variable: str, default: Any = None) -> Any:
         """A variable of the input file as it was used."""
         return self.parameters.get(group, {}).get(variable, default)
 
@@ -593,14 +602,14 @@ def run_of(path: Path, file: h5py.File) -> Run:
     )
 
 
-def outmost(side: Mapping) -> float:
+def outmost(side: Mapping[str, Any]) -> float:
     """How far outwards of its place a side ever is; one that only strikes does not leave it."""
     if side.get("motion") == "constant_velocity":
         return max(0.0, -float(side["velocity"]) * float(side["end_time"] - side["start_time"]))
     return float(side["amplitude"]) if side.get("motion") in ("sine", "parabolic") else 0.0
 
 
-def displaced(side: Mapping, time: np.ndarray) -> np.ndarray:
+def displaced(side: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """How far inwards of its place a side is at these times: see docs/theory.md."""
     if side.get("motion") == "constant_velocity":
         start, end = side["start_time"], side["end_time"]
@@ -658,7 +667,7 @@ def rows(data: h5py.Dataset, count: int | None = None) -> np.ndarray:
     return values.astype(float, copy=False) if values.dtype.kind == "f" else values
 
 
-def obstacles_of(parameters: dict) -> tuple[Obstacle, ...]:
+def obstacles_of(parameters: Mapping[str, Any]) -> tuple[Obstacle, ...]:
     """The circular obstacles of a run, in the order of their codes in the event log."""
     groups = parameters.get("obstacle", {})
     if "inside" not in groups:
@@ -669,13 +678,13 @@ def obstacles_of(parameters: dict) -> tuple[Obstacle, ...]:
     return tuple(Obstacle(c, float(r), bool(i)) for c, r, i in zip(*parts, strict=True))
 
 
-def walls_of(parameters: dict) -> np.ndarray:
+def walls_of(parameters: Mapping[str, Any]) -> np.ndarray:
     """(W, 2, 2) the straight walls of a run, in the order of their codes in the event log."""
     rows = parameters.get("wall_rows", parameters.get("wall"))
     return np.stack([rows["from"], rows["to"]], axis=1) if rows else np.empty((0, 2, 2))
 
 
-def groups_of_rows(parameters: dict, name: str) -> np.ndarray:
+def groups_of_rows(parameters: Mapping[str, Any], name: str) -> np.ndarray:
     """(W,) the group, from 0, of each obstacle: one with a file or points has several."""
     rows = parameters.get(f"{name}_rows")
     if rows:

@@ -22,7 +22,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
@@ -31,17 +31,20 @@ from ..reading.reader import committed, series_in
 from .program import STOPPED, ProgramError, find_program, settings_of, tied, value_text
 from .simulation import Simulation, read_input
 
+if TYPE_CHECKING:
+    import pandas
+
 BROKE_OFF = ": its run broke off "
 LOOK = 0.2  # s, between two looks whether members are still wanted
 GOES_ON = re.compile(r"(stopped.*|killed by signal.*|.*--resume goes on.*|)")
 
 
 def sweep(
-    system: str | Path | Mapping,
-    values: Mapping[str, object],
+    system: str | Path | Mapping[str, Any],
+    values: Mapping[str, Any],
     folder: str | Path,
     executor: Executor | None = None,
-):
+) -> "pandas.DataFrame":
     """Run every combination of values, the first varying slowest; a DataFrame as of `ensemble`.
 
     `system` is that of `ricochet.run`; a variable has a list of values (None is its default), or
@@ -52,14 +55,14 @@ def sweep(
     import pandas  # noqa: F401 (who has none hears of it before members run)
 
     text = read_input(system)
-    values = {
+    choices = {
         name: [own] if isinstance(own, str) or not isinstance(own, Iterable) else list(own)
         for name, own in values.items()
     }
-    if not values:
+    if not choices:
         raise ValueError("sweep: there are no values; ricochet.run makes a single run")
-    members = combinations(values)
-    check(text, values)
+    members = combinations(choices)
+    check(text, choices)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     overrides = {name: words_of(settings) for name, settings in members.items()}
@@ -83,7 +86,7 @@ def sweep(
     return ensemble(folder)
 
 
-def check(text: str, values: Mapping[str, list]) -> None:
+def check(text: str, values: Mapping[str, list[Any]]) -> None:
     """Refuse now what a member would refuse: each value, with the first of the other variables."""
     first = {name: own[0] for name, own in values.items() if own}
     for name, own in values.items():
@@ -93,7 +96,7 @@ def check(text: str, values: Mapping[str, list]) -> None:
                     raise ProgramError("stop: no rule ends a member", 2)
 
 
-def combinations(values: Mapping[str, list]) -> dict[str, dict[str, object]]:
+def combinations(values: Mapping[str, list[Any]]) -> dict[str, dict[str, object]]:
     """The settings of each member by its name, which is that of runs/ensemble.sh."""
     choices = [[(name, value) for value in own] for name, own in values.items()]
     members = {}
@@ -149,7 +152,7 @@ def remember_alone(folder: Path, text: str, overrides: Mapping[str, str]) -> Non
                 f"{folder}: holds a member '{name}' with other settings ({before[name]})"
             )
     put(path, text)
-    lines = sorted(f"{name}\t{rest}\n" for name, rest in (before | overrides).items())
+    lines = sorted(f"{name}\t{rest}\n" for name, rest in {**before, **overrides}.items())
     put(folder / "manifest.txt", "".join(lines))
 
 
@@ -162,8 +165,8 @@ def put(path: Path, text: str) -> None:
 
 def files_of(folder: Path, name: str) -> tuple[Path | None, Path | None]:
     """The finished and the unfinished file of a member, where there are."""
-    paths = folder / f"{name}.h5", folder / f"{name}.h5.part"
-    return tuple(path if path.is_file() else None for path in paths)
+    whole, part = folder / f"{name}.h5", folder / f"{name}.h5.part"
+    return whole if whole.is_file() else None, part if part.is_file() else None
 
 
 def log_of(path: Path) -> TextIO:
@@ -227,9 +230,9 @@ def wanted(mark: Path) -> bool:
     return mark.exists()
 
 
-def finished_with(command: list, mark: Path, **pipes: object) -> int:
+def finished_with(command: list[Any], mark: Path, **pipes: Any) -> int:
     """The exit code of a command, which ends, with a checkpoint, when nobody wants it any more."""
-    process = subprocess.Popen(tied(command), **pipes)
+    process: subprocess.Popen[bytes] = subprocess.Popen(tied(command), **pipes)
     try:
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -239,7 +242,7 @@ def finished_with(command: list, mark: Path, **pipes: object) -> int:
     finally:
         process.terminate()  # nothing, if it has ended
         parent = multiprocessing.parent_process()
-        if parent and not is_there(parent.pid):
+        if parent and parent.pid and not is_there(parent.pid):
             os._exit(STOPPED)  # this process of a pool would wait for work for ever
 
 
@@ -266,7 +269,7 @@ def failed(folder: Path, name: str) -> bool:
 # --- the table ---
 
 
-def ensemble(folder: str | Path):
+def ensemble(folder: str | Path) -> "pandas.DataFrame":
     """A pandas DataFrame (needs that package) of the members of a folder, a row for each.
 
     Columns: member; one for each override, named in full; seed; state: 'finished', 'unfinished' or
@@ -278,7 +281,7 @@ def ensemble(folder: str | Path):
     return pandas.DataFrame(gathered(Path(folder)))
 
 
-def gathered(folder: Path) -> list[dict]:
+def gathered(folder: Path) -> list[dict[str, Any]]:
     """The rows of `ensemble`."""
     if not folder.is_dir():
         raise RunError(f"{folder}: there is no such folder")
@@ -292,15 +295,15 @@ def gathered(folder: Path) -> list[dict]:
     return [row_of(folder, name, overrides[name]) for name in sorted(overrides, key=in_order)]
 
 
-def in_order(name: str) -> list:
+def in_order(name: str) -> list[tuple[int, float, str]]:
     """Members by their names, numbers in them by size."""
     parts = re.split(r"(\d+\.?\d*(?:e[+-]?\d+)?)", name)
     return [(0, float(part), "") if k % 2 else (1, 0.0, part) for k, part in enumerate(parts)]
 
 
-def row_of(folder: Path, name: str, overrides: str) -> dict:
+def row_of(folder: Path, name: str, overrides: str) -> dict[str, Any]:
     """What there is of a member."""
-    row: dict = {"member": name}
+    row: dict[str, Any] = {"member": name}
     row |= {variable: typed(value) for variable, value in pairs_of(overrides)}
     finished, unfinished = files_of(folder, name)
     said = last_words(folder, name)
@@ -323,7 +326,7 @@ def typed(value: str) -> object:
         return None
     if value.strip(".").lower() in ("true", "false", "t", "f"):
         return value.strip(".").lower()[0] == "t"
-    numbers = []
+    numbers: list[float] = []
     for word in value.split(","):
         for kind in (int, float):
             try:
@@ -336,7 +339,7 @@ def typed(value: str) -> object:
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 
-def last_values(path: Path) -> dict:
+def last_values(path: Path) -> dict[str, Any]:
     """Seed, wall time, and the last value of each scalar observable; the file is opened once."""
     with open_file(path) as file:
         row = {"seed": plain(file["parameters/run"].attrs["seed"])}

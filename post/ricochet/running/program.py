@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator, Mapping
 from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -41,8 +42,8 @@ class ProgramError(RunError):
 
 
 def run(
-    system: str | Path | Mapping,
-    overrides: Mapping[str, object] | None = None,
+    system: str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
     output: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
@@ -66,8 +67,8 @@ def run(
         system = work / "input.nml"
         system.write_text(text, encoding="utf-8")
     output = work / "run.h5" if output is None else Path(output)
-    threads = {"run.threads": threads} if whole_threads(threads) else {}
-    pairs = settings_of({} if overrides is None else overrides) + settings_of(threads)
+    cores = {"run.threads": threads} if whole_threads(threads) else {}
+    pairs = settings_of({} if overrides is None else overrides) + settings_of(cores)
     words = [word for pair in pairs for word in ("--set", pair)]
     command = [program, "-o", output, *words]
     command += ["--force"] * force + ["--resume"] * resume + ["--", system]
@@ -174,7 +175,7 @@ def lines_from(terminal: int) -> Iterator[str]:
 # --- the input ---
 
 
-def unseen(system: str | Path | Mapping) -> str | None:
+def unseen(system: str | Path | Mapping[str, Any]) -> str | None:
     """The text of an input that is no file: of groups, or the words themselves; None of a file."""
     if isinstance(system, Mapping):
         return namelist(system)
@@ -184,7 +185,7 @@ def unseen(system: str | Path | Mapping) -> str | None:
     return system if isinstance(system, str) and ("&" in system or "\n" in system) else None
 
 
-def namelist(groups: Mapping[str, object]) -> str:
+def namelist(groups: Mapping[str, Any]) -> str:
     """The text of an input file; whether it makes sense is for the program to say."""
     text = []
     for name, content in groups.items():
@@ -201,7 +202,7 @@ def namelist(groups: Mapping[str, object]) -> str:
     return "".join(text)
 
 
-def settings_of(overrides: Mapping[str, object]) -> list[str]:
+def settings_of(overrides: Mapping[str, Any]) -> list[str]:
     """GROUP.VARIABLE=VALUE of each; without a value it is the default."""
     if not isinstance(overrides, Mapping):
         kind = type(overrides).__name__
@@ -214,16 +215,17 @@ def settings_of(overrides: Mapping[str, object]) -> list[str]:
 
 def named(message: str, text: str | None) -> str:
     """The program's lines about an input that nobody sees, with names instead of its lines."""
+    if text is None:
+        return message
+    input_lines = text.splitlines()
 
-    def place(found: re.Match) -> str:
-        before = text.splitlines()[: int(found[1] or 0)]
+    def place(found: re.Match[str]) -> str:
+        before = input_lines[: int(found[1] or 0)]
         starts = [k for k, line in enumerate(before) if line.lstrip().startswith("&")]
-        own = "\n".join(text.splitlines()[starts[-1] :] if starts else [])
+        own = "\n".join(input_lines[starts[-1] :] if starts else [])
         name = re.match(r"[^&]*&\w+\s[^/&]*?\bname\s*=\s*'([^']*)'", own)
         return f"{found[2]}.{name[1]}" if name else found[2]
 
-    if text is None:
-        return message
     return re.sub(r"^input(?:\.nml)?(?::(\d+))?: &?(\w+)", place, message, flags=re.MULTILINE)
 
 

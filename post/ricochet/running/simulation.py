@@ -17,11 +17,12 @@ import sys
 import threading
 import weakref
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Self
+from typing import Any, NoReturn, Self, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..commands import HERE
 from ..reading.files import RunError, did_you_mean
@@ -33,7 +34,7 @@ PATIENCE = 0.05  # s, between two looks whether Python wants something
 NEVER = 2**63 - 1
 ROUNDING = 1e-14  # of a time
 FASTEST = 1e100  # that an input can name
-ALIVE: weakref.WeakSet = weakref.WeakSet()
+ALIVE: "weakref.WeakSet[Simulation]" = weakref.WeakSet()
 #: The arrays of a simulation, and their numbers.
 COLUMNS = {
     "position": float,
@@ -54,10 +55,16 @@ class Simulation:
     `overrides` as there.  `threads` are those of the input, or one.
     """
 
+    __slots__ = ("__weakref__", "_handle", "_lock", "_settled", "_start_energy")
+    _handle: int | None
+    _lock: threading.RLock
+    _settled: float
+    _start_energy: float
+
     def __init__(
         self,
-        system: str | Path | Mapping,
-        overrides: Mapping[str, object] | None = None,
+        system: str | Path | Mapping[str, Any],
+        overrides: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ):
         """Problems with the input raise `ProgramError`, with the program's own lines."""
@@ -129,23 +136,8 @@ class Simulation:
         if not sys.is_finalizing():
             self.close()
 
-    def __reduce__(self):
+    def __reduce__(self) -> NoReturn:
         raise TypeError("a simulation cannot be copied or sent; save it, and load it there")
-
-    def __setattr__(self, name: str, value: object) -> None:
-        """Give all disks other velocities (N, 2), now; all else is only to be read."""
-        if name.startswith("_"):
-            super().__setattr__(name, value)
-            return
-        if name != "velocity":
-            raise AttributeError(f"{name} cannot be set in a simulation at work; velocity can")
-        array = np.ascontiguousarray(value, dtype=float)
-        if array.shape != (self.n_disks, 2):
-            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.n_disks}, 2)")
-        if not np.abs(array).max() < FASTEST:
-            raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
-        with self._open() as handle:
-            called(library().ricochet_set_velocities, handle, array.ctypes.data)
 
     def _open(self) -> "Held":
         return Held(self)
@@ -200,7 +192,7 @@ class Simulation:
             self.advance(time=self._settled)
         return self._settled
 
-    def change(self, values: Mapping[str, object]) -> Self:
+    def change(self, values: Mapping[str, Any]) -> Self:
         """Let something else act on the disks from now on: `{"box.gravity": (0, -1)}`.
 
         It may be gravity, the drive, and the laws of contacts, sides, walls and obstacles with
@@ -239,9 +231,9 @@ class Simulation:
         return found
 
     @property
-    def parameters(self) -> dict:
+    def parameters(self) -> dict[str, Any]:
         """All variables with their values, by groups, as `Run.parameters` has them."""
-        found: dict = {}
+        found: dict[str, Any] = {}
         for whole, value in self._values().items():
             *groups, name = whole.split(".")
             place = found
@@ -258,7 +250,7 @@ class Simulation:
             found["changes"] = changes
         return found
 
-    def _values(self) -> dict[str, object]:
+    def _values(self) -> dict[str, Any]:
         """The values of all variables that have one, by GROUP.NAME.VARIABLE."""
         lines = (line.split(" = ", 1) for line in self._text("parameters").splitlines())
         return {name: json.loads(text) if ", ... " not in text else text for name, text in lines}
@@ -304,10 +296,8 @@ class Simulation:
         """Collisions of pairs, and with walls and obstacles, since the start."""
         return self._counts()[2]
 
-    def __getattr__(self, name: str) -> np.ndarray:
+    def _column(self, name: str) -> np.ndarray:
         """An array of `COLUMNS`, (N,) or (N, 2): a copy, disks in the order of the input."""
-        if name not in COLUMNS:
-            raise AttributeError(f"a simulation has no {name}")
         values = np.empty((self.n_disks, 2))
         with self._open() as handle:
             width = library().ricochet_column(handle, name.encode(), values.ctypes.data)
@@ -316,8 +306,55 @@ class Simulation:
         values = values.reshape(-1)[: width * len(values)].astype(COLUMNS[name])
         return values.reshape(-1, 2) if width == 2 else values
 
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *COLUMNS]
+    @property
+    def position(self) -> np.ndarray:
+        """(N, 2) positions [length], wrapped into the box along a periodic axis; a copy."""
+        return self._column("position")
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(N, 2) velocities [length/time]; a copy.  All of them can be set at once."""
+        return self._column("velocity")
+
+    @velocity.setter
+    def velocity(self, value: ArrayLike) -> None:
+        array = np.ascontiguousarray(value, dtype=float)
+        if array.shape != (self.n_disks, 2):
+            raise ValueError(f"velocity: has the shape {array.shape}, not ({self.n_disks}, 2)")
+        if not np.abs(array).max() < FASTEST:
+            raise ValueError(f"velocity: has values that are not below {FASTEST:g}")
+        with self._open() as handle:
+            called(library().ricochet_set_velocities, handle, array.ctypes.data)
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """(N,) angular velocities [1/time]; AttributeError if the disks cannot turn."""
+        return self._column("angular_velocity")
+
+    @property
+    def orientation(self) -> np.ndarray:
+        """(N,) angles to the x axis [rad], not wrapped; AttributeError without a direction."""
+        return self._column("orientation")
+
+    @property
+    def image(self) -> np.ndarray:
+        """(N, 2) periods that each disk has crossed; AttributeError without a periodic side."""
+        return self._column("image")
+
+    @property
+    def radius(self) -> np.ndarray:
+        """(N,) radii [length]."""
+        return self._column("radius")
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(N,) masses."""
+        return self._column("mass")
+
+    @property
+    def species(self) -> np.ndarray:
+        """(N,) numbers of the species, from 1, in the order of the input."""
+        return self._column("species")
 
     def _observed(self) -> dict[str, np.ndarray]:
         room = ROOM
@@ -341,7 +378,7 @@ class Simulation:
         """The names of what can be observed, as in the output file."""
         return list(self._observed())
 
-    def observable(self, name: str) -> float | int | np.ndarray:
+    def observable(self, name: str) -> Any:
         """The value of an observable now: a number, or an array of its components."""
         found = self._observed()
         if name not in found:
@@ -361,7 +398,7 @@ class Simulation:
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
 
-def geometry_of(group: str, rows: list[dict]) -> dict[str, dict]:
+def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict]:
     """The table of all obstacles, if a group has a file or points; its own row is emptied."""
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
@@ -452,12 +489,12 @@ def write_input(path: Path, text: str) -> None:
         raise ProgramError(f"{path}: cannot be written: {error.strerror}", 3) from error
 
 
-def read_input(system: str | Path | Mapping) -> str:
+def read_input(system: str | Path | Mapping[str, Any]) -> str:
     """The text of an input, of whatever kind."""
     if (text := unseen(system)) is not None:
         return text
     try:
-        return Path(system).read_text(encoding="utf-8", errors="surrogateescape")
+        return Path(cast(str, system)).read_text(encoding="utf-8", errors="surrogateescape")
     except OSError as error:
         raise ProgramError(f"{system}: cannot be read: {error.strerror}", 3) from error
 
@@ -470,7 +507,7 @@ def c_text(text: str | Path) -> bytes:
     return words
 
 
-def opened(make, *arguments: object) -> int:
+def opened(make: Callable[..., int], *arguments: object) -> int:
     """A new handle, by a function of the library."""
     message, code = ctypes.create_string_buffer(ROOM), ctypes.c_int()
     handle = make(*arguments, message, ROOM, ctypes.byref(code))
@@ -479,7 +516,7 @@ def opened(make, *arguments: object) -> int:
     return handle
 
 
-def called(function, *arguments: object) -> bool:
+def called(function: Callable[..., int], *arguments: object) -> bool:
     """Call a function that answers with a code; whether it wants to be called again."""
     message = ctypes.create_string_buffer(ROOM)
     code = function(*arguments, message, ROOM)

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..reading.files import destination
 
@@ -15,13 +16,13 @@ TURNING = {"angular_velocity": "omega", "orientation": "angle"}
 
 def write_start(
     path: str | Path,
-    position,
-    velocity=None,
-    radius=None,
-    mass=None,
-    species=None,
-    angular_velocity=None,
-    orientation=None,
+    position: ArrayLike,
+    velocity: ArrayLike | None = None,
+    radius: ArrayLike | None = None,
+    mass: ArrayLike | None = None,
+    species: ArrayLike | None = None,
+    angular_velocity: ArrayLike | None = None,
+    orientation: ArrayLike | None = None,
 ) -> Path:
     """Write N disks for `file = 'PATH'` of a species; what is not given the input says.
 
@@ -58,7 +59,7 @@ def write_start(
     return path
 
 
-def table(name: str, values, count: int | None = None, width: int = 0) -> np.ndarray:
+def table(name: str, values: ArrayLike, count: int | None = None, width: int = 0) -> np.ndarray:
     """Finite numbers: (count, width), or (count,)."""
     values = np.asarray(values)
     if values.dtype.kind not in "iuf":

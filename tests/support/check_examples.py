@@ -1,0 +1,67 @@
+"""Writes the Python examples of the pages to files, for a type checker.
+
+    python tests/support/check_examples.py FOLDER
+
+One file for each section of README.md and of the pages in docs/ that has an example; a section that
+imports nothing continues the one before.  The cells of the tour are one file, too.
+"""
+
+import ast
+import json
+import re
+import sys
+import textwrap
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TOUR = ROOT / "docs" / "tour.ipynb"
+
+
+def blocks_of(section: str) -> list[str]:
+    """The Python code in a section: indented blocks that import or call something."""
+    blocks = re.findall(r"(?:^    .*\n(?:\n(?=    ))?)+", section, re.MULTILINE)
+    return [block for block in map(textwrap.dedent, blocks) if is_python(block)]
+
+
+def is_python(block: str) -> bool:
+    """Whether a block is code in Python, and not in a shell or in Fortran."""
+    try:
+        nodes = [*ast.walk(ast.parse(block))]
+    except SyntaxError:
+        return False
+    return any(isinstance(node, ast.Import | ast.ImportFrom | ast.Call) for node in nodes)
+
+
+def examples_of(page: str) -> list[str]:
+    """The programs on a page."""
+    found: list[str] = []
+    for section in re.split(r"^#+ ", page, flags=re.MULTILINE):
+        code = "\n".join(blocks_of(section))
+        if re.search(r"^(import|from) ", code, re.MULTILINE):
+            found.append(code)
+        elif code and found:
+            found[-1] += code
+    return found
+
+
+def cells_of(notebook: str) -> str:
+    """The code of a notebook as one program."""
+    cells = json.loads(notebook)["cells"]
+    code = ["".join(cell["source"]) + "\n" for cell in cells if cell["cell_type"] == "code"]
+    return "\n".join(["from IPython.display import display", *code])
+
+
+def main(folder: Path) -> None:
+    """Write the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.py"):
+        old.unlink()
+    for page in PAGES:
+        for number, code in enumerate(examples_of(page.read_text()), start=1):
+            (folder / f"{page.stem.replace('-', '_')}_{number}.py").write_text(code)
+    (folder / "tour.py").write_text(cells_of(TOUR.read_text()))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
