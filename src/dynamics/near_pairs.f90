@@ -137,7 +137,7 @@ contains
 
     period = sim%box%periods()
     do i = 1, size(x, 1, kind=int32)
-      low = modulo(bin_at([x(i, 1), x(i, 2)]), bins)
+      low = modulo(bin_at(in_box([x(i, 1), x(i, 2)])), bins)
       bin(i) = 1 + low(1) + bins(1)*low(2)
     end do
     call sort_by_count(bin, product(bins), first, place)
@@ -146,8 +146,8 @@ contains
     do i = 1, size(x, 1, kind=int32)
       centre = [x(i, 1), x(i, 2)]
       reach = (2*sim%disk(i)%radius + self%skin)*(1 + spare)
-      low = bin_at(centre - reach)
-      high = min(bin_at(centre + reach), low + bins - 1)    ! each once
+      low = bin_at(in_box(centre) - reach)
+      high = min(bin_at(in_box(centre) + reach), low + bins - 1)    ! each once
       from = 1 + modulo(low(1), bins(1))
       to = from + high(1) - low(1)
       do iy = low(2), high(2)
@@ -160,7 +160,15 @@ contains
 
   contains
 
-    !> Column and row of a point, from 0.
+    !> The image of a point that is in the box: a disk may have travelled more periods than an integer can count.
+    pure function in_box(point) result(image)
+      real(real64), intent(in) :: point(2)
+      real(real64) :: image(2)
+
+      image = sim%box%lower + modulo(point - sim%box%lower, sim%box%edges())
+    end function in_box
+
+    !> Column and row of a point in or near the box, from 0.
     pure function bin_at(point) result(c)
       real(real64), intent(in) :: point(2)
       integer(int32) :: c(2)
