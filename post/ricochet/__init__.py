@@ -59,6 +59,7 @@ if TYPE_CHECKING:  # the modules that `__getattr__` loads, for type checkers
     from .pages import worker as worker
     from .predictions import hard_disks as hard_disks
     from .predictions import theory as theory
+    from .reading import arrays as arrays
     from .reading import bridges as bridges
     from .reading import files as files
     from .reading import nature as nature

@@ -398,7 +398,7 @@ class Simulation:
         return [(float(t), int(i), int(j)) for t, i, j in records[:n, :3]]
 
 
-def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict]:
+def geometry_of(group: str, rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """The table of all obstacles, if a group has a file or points; its own row is emptied."""
     if not any({"file", "points"} & row.keys() for row in rows):
         return {}
