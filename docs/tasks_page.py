@@ -13,7 +13,7 @@ import re
 import textwrap
 from pathlib import Path
 
-from ricochet.analysis.statistics import fit_power_law, to_error
+from ricochet.analysis.statistics import fit_power_law, rounded_to_error
 
 DOCS = Path(__file__).resolve().parent
 TABLES = DOCS.parent / "runs" / "figures"
@@ -115,7 +115,7 @@ def words(number: tuple[float, float | None]) -> str:
     mean, error = number
     if error is None:
         return f"{mean:.1g}" if mean < 1e-6 else f"{mean:.4g}"
-    return " ± ".join(to_error(mean, error))
+    return " ± ".join(rounded_to_error(mean, error))
 
 
 def filled(page: str, numbers: Numbers) -> str:

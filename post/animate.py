@@ -86,7 +86,7 @@ def animate(
         species_legend(figure, run)
     else:
         figure.colorbar(disks, label=LABELS[colour], shrink=0.8, extend="max")
-    warn(figure, [run.shortcoming] if run.shortcoming else [])
+    warn(figure, [run.termination_note] if run.termination_note else [])
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the layout stays; solving it for each frame is slow
     return animation.FuncAnimation(

@@ -34,7 +34,7 @@ def draw_ratio(axes: plt.Axes, groups: list, results: list[Curves]) -> None:
             band(axes, tau, *ratio, color=colour, label=f"ξ = {xi:g}")
     runs = [run for _, own in groups for run in own]
     kinds = sorted((kind.mass, kind.disks.sum()) for kind in runs[0].by_species)
-    alone = all(run.nature <= {*SMOOTH, "obstructed", "walled"} for run in runs)
+    alone = all(run.nature <= {*SMOOTH, "obstacles", "walls"} for run in runs)
     equal_speeds = all(abs(found["ratio"].mean[0] - 4) < 1e-6 for found in results)
     if alone and equal_speeds and len(kinds) == 2 and kinds[1] == (4 * kinds[0][0], kinds[0][1]):
         dilute_limit(axes, EQUIPARTITION, "ξ = 1, ")

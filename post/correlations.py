@@ -41,9 +41,9 @@ from ricochet.analysis.statistics import (
     Curve,
     Estimate,
     SeriesMean,
-    combined,
+    combine_runs,
     estimate,
-    series_mean,
+    correlated_mean,
 )
 from ricochet.analysis.structure import (
     averaged,
@@ -61,9 +61,17 @@ from ricochet.script import by_packing, command_line, launch, measured, over_run
 
 import numpy as np
 
-PLAIN = {"walled"}  # what equal smooth elastic disks may be
+PLAIN = {"walls"}  # what equal smooth elastic disks may be
 #: What has no equilibrium, but a structure.
-RESTLESS = ("lossy", "soft", "unlike", "uneven", "noisy", "active", "sliding")
+RESTLESS = (
+    "inelastic",
+    "soft_contacts",
+    "pair_restitution",
+    "unequal_temperatures",
+    "noise_driven",
+    "active",
+    "sliding_surfaces",
+)
 NUMBERS = ("D_displacement", "D_velocities", "psi6_local", "psi6_global")
 
 
@@ -103,8 +111,8 @@ def structure(runs: list[Run], frames: list[slice]) -> tuple[dict, dict[str, Cur
     psi = {(r.path, k): bond_order(r, k) for r, own in zip(runs, some, strict=True) for k in own}
     each = [[psi[run.path, k] for k in own] for run, own in zip(runs, some, strict=True)]
     members = {
-        "psi6_local": [series_mean([np.abs(one).mean() for one in own]) for own in each],
-        "psi6_global": [series_mean([abs(one.mean()) for one in own]) for own in each],
+        "psi6_local": [correlated_mean([np.abs(one).mean() for one in own]) for own in each],
+        "psi6_global": [correlated_mean([abs(one.mean()) for one in own]) for own in each],
     }
 
     def g6(run: Run, own: list[int], edges: np.ndarray) -> np.ndarray:
@@ -177,7 +185,7 @@ def analysed(runs: list[Run], skip: float | None, wave: float = 2 * np.pi) -> Fo
     ):
         steps = transport.diffusion_lag(runs, frames)
         both = [transport.diffusion(*one, steps) for one in pairs]
-        ways = 1 if "bathed" in runs[0].nature else 2
+        ways = 1 if "thermostatted" in runs[0].nature else 2
         members = dict(zip(NUMBERS[:ways], map(list, zip(*both, strict=True)), strict=False))
         apart = runs[0].time[frames[0].start + 1] - runs[0].time[frames[0].start]
         lag = steps * float(apart / free_time(runs, frames))
@@ -208,7 +216,7 @@ def curves(groups: list, results: list[Found]) -> list[dict]:
     names, rows = ("what", "packing", "x", "y", "error"), []
     for (eta, _), found in zip(groups, results, strict=True):
         for what, members in found.members.items():
-            mean, error, *_ = combined(members)
+            mean, error, *_ = combine_runs(members)
             x = found.lag if what.startswith("D_") else None
             rows.append(dict(zip(names, (what, eta, x, mean, error), strict=True)))
         rows += points(names, {(what, eta): curve for what, curve in found.curves.items()})

@@ -31,7 +31,7 @@ from ricochet.analysis.statistics import (
     PowerLaw,
     estimate,
     fit_power_law,
-    to_error,
+    rounded_to_error,
 )
 from ricochet.figures.drawing import COLOURS, colours, panel_grid, plt
 from ricochet.reading.reader import span
@@ -146,7 +146,7 @@ def power(axis: str, curve: list[Point], fit: PowerLaw | None) -> str:
     """The law of a fit, for a legend."""
     if not fit:
         return ""
-    exponent = "\\pm".join(to_error(fit.exponent, fit.exponent_error))
+    exponent = "\\pm".join(rounded_to_error(fit.exponent, fit.exponent_error))
     missed = f", $\\chi^2$/dof {fit.chi2:.2g}" if fit.misses(fewest(curve)) else ""
     return f", $\\propto {SYMBOLS[axis]}^{{{exponent}}}${missed}"
 

@@ -34,7 +34,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ricochet import Run, RunError, drawing, hard_disks, theory
-from ricochet.analysis.statistics import Estimate, combined, grows, series_mean, windows
+from ricochet.analysis.statistics import Estimate, combine_runs, correlated_mean, has_trend, windows
 from ricochet.analysis.structure import largest_cluster
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import plt
@@ -63,7 +63,7 @@ def temperature(run: Run) -> Curves:
 def noise_law(run: Run) -> float | None:
     """The temperature at which noise and collisions balance."""
     drive = run.parameters.get("drive", {})
-    known = {"noisy", "lossy"} <= run.nature <= {"noisy", "lossy", "turning"}
+    known = {"noise_driven", "inelastic"} <= run.nature <= {"noise_driven", "inelastic", "rotating"}
     if not known or drive.get("species"):
         return None
     gas = packing(run), 2 * run.radius[0], run.mass[0]
@@ -82,13 +82,13 @@ def temperature_law(run: Run) -> np.ndarray | float | None:
 def only_moving(run: Run, motion: str) -> int | None:
     """The number of the only side that moves, if it does so, and equal elastic disks are inside."""
     moves = [k for k, side in enumerate(run.sides) if side.get("motion", "still") != "still"]
-    plain = run.nature <= {"moving", "pushed", "walled", "turning"} and len(moves) == 1
+    plain = run.nature <= {"moving_sides", "piston", "walls", "rotating"} and len(moves) == 1
     return moves[0] if plain and run.sides[moves[0]]["motion"] == motion else None
 
 
 def widths(run: Run, side: int) -> np.ndarray:
     """(S,) widths of the box along the way of a side, at the observables."""
-    lower, upper = run.sides_at(run.observable("total_energy").time)
+    lower, upper = run.corners_at(run.observable("total_energy").time)
     return (upper - lower)[:, side // 2]
 
 
@@ -100,9 +100,9 @@ def adiabat(run: Run, side: int, widths: np.ndarray) -> np.ndarray:
 
 def width(run: Run) -> Curves:
     """Of the box along the way of a side that disks push."""
-    if not run.pushed:
+    if not run.piston_positions:
         raise Refused(f"{run.path}: has no piston (side.motion = 'piston')")
-    return {"": (run.observable("total_energy").time, widths(run, min(run.pushed)))}
+    return {"": (run.observable("total_energy").time, widths(run, min(run.piston_positions)))}
 
 
 class Room(NamedTuple):
@@ -131,7 +131,7 @@ def width_law(run: Run) -> Room | None:
 
 def balances(run: Run) -> tuple[float, float]:
     """The largest changes of what disks and side have together: of enthalpy, and of momentum."""
-    k = min(run.pushed)
+    k = min(run.piston_positions)
     side = run.sides[k]
     time, energy = run.observable("total_energy")
     speed, impulse = (
@@ -169,7 +169,7 @@ def demon_law(run: Run) -> float | None:
     parting = [wall for wall in run.walls if np.allclose(wall[:, 0], middle)]
     heights = [w[:, 1].max() for w in parting if np.isclose(w[:, 1].min(), run.lower[1])]
     across, down = run.gravity
-    alike = run.nature <= {"moving", "falling", "lossy", "obstructed", "turning", "walled"}
+    alike = run.nature <= {"moving_sides", "gravity", "inelastic", "obstacles", "rotating", "walls"}
     if floor.get("motion") != "sawtooth" or not heights or across != 0 or not alike:
         return None
     if run.obstacles or run.restitution == 1 or run.parameter("contact", "wall_restitution") != 1:
@@ -281,7 +281,7 @@ def draw(
     for panel, (run, frame, name) in zip(panels, pictures, strict=True):
         drawing.draw_box(panel, run, run.time[frame])
         shades = drawing.species_colours(run)
-        across = 72 * width * 2 * run.radius.mean() / (run.room[1] - run.room[0])[0]
+        across = 72 * width * 2 * run.radius.mean() / (run.bounds[1] - run.bounds[0])[0]
         rim = {"linewidths": max(0.0, SMALLEST - across), "edgecolors": "face"}
         drawing.disk_collection(panel, run, run.position[frame], facecolors=shades, **rim)
         panel.set_title("\n".join(filter(None, (name, f"t = {run.time[frame]:.4g}"))))
@@ -311,13 +311,13 @@ def main() -> None:
         late = [compared(value[time >= (time[0] + time[-1]) / 2]) for time, value in curves]
         about = ", ".join(filter(None, (args.show, name, species)))
         row = {"input": name or None, "species": species or None, "runs": len(curves)}
-        row |= over_runs("late", [series_mean(half) for half in late], notes, about)
+        row |= over_runs("late", [correlated_mean(half) for half in late], notes, about)
         notes += [f"{about}: grows or falls all the time, 'late' is not what lasts"] * any(
-            map(grows, late)
+            map(has_trend, late)
         )
         law, mean, error = expected[name], row["late"], row["late_error"]
         if isinstance(law, Room):
-            squares = combined([series_mean((half - mean) ** 2) for half in late])
+            squares = combine_runs([correlated_mean((half - mean) ** 2) for half in late])
             found = Estimate(squares.mean**0.5, squares.error / 2 / squares.mean**0.5)
             row |= measured("deviation", found) | {"theory_deviation": law.deviation}
             changes = np.max([balances(run) for run in groups[name]], axis=0)

@@ -14,7 +14,7 @@ Santos, Yuste and Lopez de Haro 1999, of the fluid, for their <r>^2 / <r^2>: one
 """
 
 from ricochet import Run, RunError, hard_disks
-from ricochet.analysis.statistics import combined
+from ricochet.analysis.statistics import combine_runs
 from ricochet.analysis.thermodynamics import z_ways
 from ricochet.figures.drawing import COLOURS, caption, plt
 from ricochet.script import by_packing, columns, command_line, launch, measured, over_runs, report
@@ -49,7 +49,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
             members, about = [one[name] for one in found if name in one], f"η = {eta:g}, {way}"
             cells = over_runs(f"Z_{name}", members, notes, about) if members else {}
             row |= cells if len(members) == len(same) else measured(f"Z_{name}", None)
-        row["samples"] = round(combined([one["virial"] for one in found]).samples, 1)
+        row["samples"] = round(combine_runs([one["virial"] for one in found]).samples, 1)
         z = hard_disks.published(eta, same[0].n_disks, bool(same[0].periodic.all()))
         z = hard_disks.of_sizes(z, eta, alike)
         known = np.isfinite(z) and (alike == 1 or eta <= hard_disks.FLUID[-1, 0])

@@ -14,7 +14,13 @@ from functools import reduce
 from typing import NamedTuple
 
 from ricochet import Run
-from ricochet.analysis.statistics import Estimate, estimate, to_error, when, windows
+from ricochet.analysis.statistics import (
+    Estimate,
+    estimate,
+    rounded_to_error,
+    propagate_error,
+    windows,
+)
 from ricochet.analysis.thermodynamics import lightest_and_heaviest, start_of_equilibrium
 from ricochet.figures.drawing import caption, colours, plt
 from ricochet.reading.nature import SETTLED, allow
@@ -54,7 +60,9 @@ def approach(runs: list[Run], width: float, within: float) -> Approach:
     light, heavy = map(estimate, both)
     difference = estimate(both[1] - both[0])
     gap = Estimate(difference.mean / light.mean, difference.error / light.mean)
-    agreed = when(lambda curve: entry(time, curve, within), gap._replace(mean=np.abs(gap.mean)))
+    agreed = propagate_error(
+        lambda curve: entry(time, curve, within), gap._replace(mean=np.abs(gap.mean))
+    )
     return Approach(time, light, heavy, gap, agreed)
 
 
@@ -86,7 +94,7 @@ def draw(groups: list, results: list[Approach], until: float, within: float) -> 
             axes.errorbar(found.time, *energy, **style)
         if np.isfinite(found.thermalisation.mean):
             label = f"means differ by less than {100 * within:g} % for three windows from t = "
-            label += " ± ".join(to_error(*found.thermalisation))
+            label += " ± ".join(rounded_to_error(*found.thermalisation))
             axes.axvline(found.thermalisation.mean, color="0.5", ls="--", lw=1, label=label)
         axes.set(ylabel="⟨K⟩ per disk", title=f"$v_0$ = {v0:g},  {caption(runs)}", xlim=(0, until))
         axes.set_ylim(0, None)

@@ -24,7 +24,7 @@ def rows(run: Run, frame: int) -> list[list[str]]:
     """Species, x, y, vx, vy, radius, mass, and the elements of each disk, as words."""
     species = [run.names[s - 1] for s in run.species]
     moving = [*run.position[frame].T, *run.velocity[frame].T, run.radius, run.mass]
-    columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.elements.values()))]
+    columns = [one.tolist() for one in (*moving, *(own[frame] for own in run.disk_data.values()))]
     return [list(map(str, disk)) for disk in zip(species, *columns, strict=True)]
 
 
@@ -32,7 +32,7 @@ def xyz_frame(run: Run, frame: int) -> str:
     """One frame as extended XYZ; positions from the lower corner as origin of the lattice."""
     (width, height), (x0, y0) = run.edges, run.lower
     pbc = " ".join("T" if p else "F" for p in (*run.periodic, False))
-    properties = ":".join([PROPERTIES, *(f"{name}:R:1" for name in run.elements), "id:I:1"])
+    properties = ":".join([PROPERTIES, *(f"{name}:R:1" for name in run.disk_data), "id:I:1"])
     head = (
         f'Lattice="{width} 0 0 0 {height} 0 0 0 1" Origin="{x0} {y0} 0" pbc="{pbc}" '
         f"Time={run.time[frame]} Properties={properties}"
@@ -63,7 +63,7 @@ def main() -> None:
     one = csv_frame if path.suffix == ".csv" else xyz_frame
     with destination(path).open("w") as file:
         if path.suffix == ".csv":
-            file.write(",".join([HEAD, *run.elements]) + "\n")
+            file.write(",".join([HEAD, *run.disk_data]) + "\n")
         for frame in tqdm(frames, unit="frame", desc="export", disable=None):
             file.write(one(run, frame))
     report(args, None, [{"export": path, "frames": len(frames), "of": run.n_frames}])

@@ -23,8 +23,8 @@ from ricochet.analysis.statistics import (
     SeriesMean,
     binned,
     estimate,
-    series_mean,
-    to_error,
+    correlated_mean,
+    rounded_to_error,
 )
 from ricochet.figures.drawing import bars, caption, colours, plt
 from ricochet.reading.nature import allow
@@ -141,7 +141,7 @@ def table(run: Run, species: list[Samples], kt: Estimate | SeriesMean) -> list[d
         shared = sharing(0.5 * s.mass * squares, temperature, sharers(run))
         row = {"species": name, "mass": s.mass, "kT": temperature, "kT_error": kt[1]}
         for part, energies in (("K", s.square), ("K_x", s.square_x)):
-            row |= measured(part, series_mean(0.5 * s.mass * energies.mean(axis=1)))
+            row |= measured(part, correlated_mean(0.5 * s.mass * energies.mean(axis=1)))
         for kind, other, law, values, reach, x, weight in (
             ("speed", "shared", v_law, s.square, SPEED_RANGE, squares, shared),
             ("height", "crowded", h_law, s.height, HEIGHT_RANGE, grid, density),
@@ -189,7 +189,7 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
             ("shared", "crowded"),
             strict=True,
         ):
-            fitted = " ± ".join(to_error(row[f"{kind}_slope"], row[f"{kind}_slope_error"]))
+            fitted = " ± ".join(rounded_to_error(row[f"{kind}_slope"], row[f"{kind}_slope_error"]))
             label = f"{run.by_species[k].label}: {fitted}"
             if np.isfinite(own := row[f"{kind}_{other}"]):
                 label += f" (dashed: {own:.3f})"
@@ -216,14 +216,14 @@ def draw(run: Run, species: list[Samples], result: list[dict], start: float) -> 
             )
             row[1].legend(*(part[-2:] for part in row[1].get_legend_handles_labels()))
     when, found = f"t = {start:.4g} to {run.time[-1]:g}", (kt, result[0]["kT_error"])
-    figure.suptitle(f"{caption([run])},  {when},  kT = {' ± '.join(to_error(*found))}")
+    figure.suptitle(f"{caption([run])},  {when},  kT = {' ± '.join(rounded_to_error(*found))}")
     return figure
 
 
 def main() -> None:
     args = command_line(__doc__, "gravity.png", one=True, equilibration=None).parse_args()
     (run,) = args.runs
-    known = "walled", "falling", "mixture", "thermal", "bathed", "stepped"
+    known = "walls", "gravity", "mixture", "thermal_walls", "thermostatted", "time_stepped"
     allow(run, "it follows no exponential laws", *known)
     start = thermodynamics.start_of_equilibrium(run, args.equilibration)
     frames = thermodynamics.frames_from(run, start)
@@ -232,8 +232,8 @@ def main() -> None:
     species = [samples(run, kind, frames) for kind in thermodynamics.kinds_of_disks(run)]
     result, notes = table(run, species, thermodynamics.temperature(run, args.equilibration)), []
     for kind, s in zip(run.by_species, species, strict=True):
-        mean = series_mean(s.height.mean(axis=1))
-        notes += statistics.doubts(f"height of {kind.label}", [mean])
+        mean = correlated_mean(s.height.mean(axis=1))
+        notes += statistics.diagnostics(f"height of {kind.label}", [mean])
     if (share := crowding(run, species, result[0]["kT"])) > CROWDED:
         notes.append(f"points would take {share:.2g} of the area at the floor: no law of heights")
     report(args, draw(run, species, result, run.time[frames[0]]), result, notes=notes)

@@ -22,7 +22,7 @@ from the law.
 
 from ricochet import Run
 from ricochet.analysis.cooling import SLOW, energy_left, exponent, haff, soft_law
-from ricochet.analysis.statistics import Estimate, to_error
+from ricochet.analysis.statistics import Estimate, rounded_to_error
 from ricochet.analysis.thermodynamics import packing
 from ricochet.figures.drawing import band, caption, colours, plt
 from ricochet.predictions.hard_disks import haff_rate
@@ -53,7 +53,7 @@ def draw(runs: list[Run], groups: list, results: list) -> plt.Figure:
                 band(axes, x, np.where(after, mean, np.nan), error, color=colour, alpha=0.4)
             upper.plot(x, law, color="black", ls="--", lw=1)
         name, known = expected(xi, found)
-        label = f"ξ = {xi:g},  {name} {' ± '.join(to_error(*rate))}  ({known:.4g})"
+        label = f"ξ = {xi:g},  {name} {' ± '.join(rounded_to_error(*rate))}  ({known:.4g})"
         panels[0, 0].plot([], [], color=colour, label=f"ξ = {xi:g}")
         panels[0, 1].plot([], [], color=colour, label=label)
     laws = "Haff 1983", "van Noije and Ernst 1998"

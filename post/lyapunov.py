@@ -86,7 +86,7 @@ def main() -> None:
     if len(args.runs) % 2:
         raise RunError(f"{len(args.runs)} runs: not pairs")
     for run in args.runs:
-        fading = {"changed", "collapsed", *({"lossy"} if run.nature.cooling else ())}
+        fading = {"changed", "collapsed", *({"inelastic"} if run.nature.cooling else ())}
         allow(run, "it has no one rate of divergence", *TRAITS.keys() - fading)
     apart = [distance(*pair) for pair in zip(args.runs[::2], args.runs[1::2], strict=True)]
     frames = min(map(len, apart))

@@ -11,7 +11,7 @@ the warnings.
 """
 
 from ricochet import Run
-from ricochet.analysis.statistics import combined
+from ricochet.analysis.statistics import combine_runs
 from ricochet.analysis.thermodynamics import z_virial
 from ricochet.figures.drawing import caption, colours, plt
 from ricochet.predictions.hard_disks import MELTING
@@ -29,7 +29,7 @@ def table(runs: list[Run], skip: float | None) -> tuple[list[dict], list[str]]:
             members = [z_virial(run, skip).scaled(4 * eta / np.pi) for run in same]
             row = {"N": count, "packing": eta, "runs": len(same)}
             row |= over_runs("P", members, notes, f"N = {count}, η = {eta:g}")
-            rows.append(row | {"samples": round(combined(members).samples, 1)})
+            rows.append(row | {"samples": round(combine_runs(members).samples, 1)})
     return rows, notes
 
 
@@ -51,7 +51,13 @@ def draw(rows: list[dict], runs: list[Run]) -> plt.Figure:
 def main() -> None:
     args = command_line(__doc__, "melting.png", equilibration=None).parse_args()
     for run in args.runs:
-        allow(run, "melting is that of equal disks in a periodic box", "bathed", "rough", "turning")
+        allow(
+            run,
+            "melting is that of equal disks in a periodic box",
+            "thermostatted",
+            "rough",
+            "rotating",
+        )
     rows, notes = table(args.runs, args.equilibration)
     report(args, draw(rows, args.runs), rows, notes=notes)
 

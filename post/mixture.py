@@ -12,7 +12,13 @@ over all disks in equilibrium, with its error.
 
 from ricochet import Run, RunError
 from ricochet.analysis.speeds import means
-from ricochet.analysis.statistics import binned, combined, hold_against, memory, to_error
+from ricochet.analysis.statistics import (
+    binned,
+    combine_runs,
+    goodness_of_fit,
+    statistical_inefficiency,
+    rounded_to_error,
+)
 from ricochet.analysis.thermodynamics import kinds_of_disks, mean_energy
 from ricochet.figures.drawing import COLOURS, bars, caption, plt
 from ricochet.predictions.theory import maxwell_cdf, maxwell_pdf
@@ -35,7 +41,7 @@ def independent(runs: list[Run], frames: list[list[int]], name: str) -> int:
     mask, found = runs[0].of_species(name), 0.0
     for run, own in zip(runs, frames, strict=True):
         series = np.array([run.kinetic_energy(frame)[mask].mean() for frame in own])
-        found += mask.sum() * len(own) / max(1.0, memory(series))
+        found += mask.sum() * len(own) / max(1.0, statistical_inefficiency(series))
     return max(1, round(found))
 
 
@@ -46,10 +52,10 @@ def table(runs: list[Run], frames: list[list[int]], skip: float | None = None) -
         name, mass = kind.name, kind.mass
         start = np.mean([np.ravel(means([run], [[0]], name)) for run in runs], axis=0)
         speed, energy = means(runs, frames, name)
-        theory = combined([mean_energy(run, mass, skip) for run in runs])
+        theory = combine_runs([mean_energy(run, mass, skip) for run in runs])
         expected = theory.mean
         u = pooled(runs, frames, name) * np.sqrt(mass / (2 * expected))
-        test = hold_against(u, maxwell_cdf, independent(runs, frames, name))
+        test = goodness_of_fit(u, maxwell_cdf, independent(runs, frames, name))
         row = {"species": name, "mass": mass, "v_start": float(start[0])}
         row |= {"K_start": float(start[2]), **measured("v", speed)}
         row |= {"v_theory": float(np.sqrt(np.pi * expected / (2 * mass))), **measured("K", energy)}
@@ -85,7 +91,7 @@ def draw(runs: list[Run], frames: list[list[int]], result: list[dict]) -> plt.Fi
         moments = (
             "⟨v⟩ = {v_start:.4g},  ⟨K⟩ = {K_start:.4g}".format(**found),
             "\n".join(
-                f"⟨{x}⟩ = {' ± '.join(to_error(found[x], found[x + '_error']))} "
+                f"⟨{x}⟩ = {' ± '.join(rounded_to_error(found[x], found[x + '_error']))} "
                 f"(theory {found[x + '_theory']:.4g})"
                 for x in ("v", "K")
             ),

@@ -62,7 +62,7 @@ def frames_that_fit(run: Run, room: float) -> int:
     Up to half of the room is for collisions between frames.
     """
     more = (run.event_count is not None) + (run.image is not None)
-    more += 4 * ("orientation" in run.elements)
+    more += 4 * ("orientation" in run.disk_data)
     one = run.n_disks * (8 + more) * 4 / 3
     fixed = run.n_disks * (2 + 1 + 4 + 8) * 4 / 3  # species, size, mass and origin
     turns = 0 if run.event_count is None else TURN * float(run.event_count[-1].sum())
@@ -76,7 +76,7 @@ def quantities(run: Run) -> list[str]:
 
 def in_room(run: Run, place: np.ndarray) -> np.ndarray:
     """Places in units of what the page shows: the box, with room for sides that move."""
-    lower, upper = run.room
+    lower, upper = run.bounds
     return (place - lower) / (upper - lower)
 
 
@@ -88,7 +88,7 @@ def sides(run: Run) -> list[dict]:
         | {k: side[k] for k in LAWS if side.get(k) not in (None, "still")}
         for at, side in zip(places, run.sides, strict=True)
     ]
-    for k, (time, place) in run.pushed.items():
+    for k, (time, place) in run.piston_positions.items():
         some = thinned(len(time), MOST_FRAMES)
         found[k]["way"] = [time[some].tolist(), np.ravel(place)[some].tolist()]
     return found
@@ -131,7 +131,7 @@ def moving(run: Run, frames: list[int], top: float) -> dict[str, bytes]:
         if run.image is not None:
             crossed = np.clip(np.diff(run.image[[before, *some]], axis=0), -7, 7) + 8
             parts["shifts"] = (16 * crossed[..., 0] + crossed[..., 1]).astype("u1")
-        if "orientation" in run.elements:
+        if "orientation" in run.disk_data:
             parts["angles"] = run.orientation[some].astype("<f4")
         for name, part in parts.items():
             found[name] += part.tobytes()
@@ -237,8 +237,8 @@ def scene(run: Run) -> tuple[dict, dict]:
         "exact": run.n_disks <= FEW_DISKS,
         "settles": run.nature.in_equilibrium,
         "gravity": run.gravity.tolist(),
-        "lower": run.room[0].tolist(),
-        "edges": (run.room[1] - run.room[0]).tolist(),
+        "lower": run.bounds[0].tolist(),
+        "edges": (run.bounds[1] - run.bounds[0]).tolist(),
         "sides": sides(run),
         "periodic": run.periodic.tolist(),
         "obstacles": [[*map(float, o.centre), o.radius, o.inside] for o in run.obstacles],
@@ -299,7 +299,7 @@ def page(run: Run, film: dict | None) -> str:
     words = {
         "title": title,
         "caption": caption([run]),
-        "warning": run.shortcoming if film else "",
+        "warning": run.termination_note if film else "",
         "source": f"{run.path.name} (ricochet {commit})",
     }
     return paged(film, words)

@@ -30,8 +30,16 @@ import numpy as np
 BINS = np.linspace(0, 6, 49)  # free paths in units of their mean
 BLOCKS = 8  # of the frames of a single run
 #: With which disks fly straight and at one speed, in all parts of the box alike.
-STRAIGHT = {"walled", "mixture", "unlike", "lossy", "soft", "rough", "turning"}
-STRAIGHT |= {"thermal", "uneven", "sliding"}
+STRAIGHT = {
+    "walls",
+    "mixture",
+    "pair_restitution",
+    "inelastic",
+    "soft_contacts",
+    "rough",
+    "rotating",
+}
+STRAIGHT |= {"thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 
 
 def check(runs: list[Run]) -> None:
@@ -61,8 +69,8 @@ def over_all(runs: list[Run], skip: float | None, notes: list[str]) -> dict[str,
     for name in found[0]:
         power = 1.0 if name.startswith("pressure") else 0.5 * (name != "kT")
         members = [one[name].scaled(kt**power) for one, kt in zip(found, kts, strict=True)]
-        means[name] = statistics.combined(members)
-        notes += statistics.doubts(name, members)
+        means[name] = statistics.combine_runs(members)
+        notes += statistics.diagnostics(name, members)
     return means
 
 
@@ -155,7 +163,7 @@ def draw_pressure(axes: plt.Axes, curves: dict[str, Curve], mean: SeriesMean, st
 def draw_paths(axes: plt.Axes, paths: tuple[Estimate, Estimate], equal: bool) -> None:
     """The free paths, and those without memory."""
     mean, height = paths
-    label = f"measured, $\\ell$ = {' ± '.join(statistics.to_error(*mean))}"
+    label = f"measured, $\\ell$ = {' ± '.join(statistics.rounded_to_error(*mean))}"
     bars(axes, height, BINS, color=COLOURS[0], label=label)
     if equal:
         fine = np.linspace(0, BINS[-1], 200)
@@ -186,7 +194,7 @@ def main() -> None:
     check(runs)
     settled = td.all_settle(runs)
     start = max(td.start_of_steady_state(run, args.equilibration) for run in runs)
-    kicked = any("bathed" in run.nature for run in runs)
+    kicked = any("thermostatted" in run.nature for run in runs)
     paths = None if kicked else mean_and_density(runs, args.equilibration)
     means, curves = {}, {}
     count = settled + bool(paths)

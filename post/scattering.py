@@ -29,7 +29,7 @@ def moving_and_resting(run: Run) -> tuple[int, int]:
 def scattering(run: Run) -> dict[str, float]:
     """Impact parameter and deflection of the disk that moves at the start."""
     law = "the law is for two smooth disks that meet freely"
-    allow(run, law, "walled", "lossy", "turning", "mixture")
+    allow(run, law, "walls", "inelastic", "rotating", "mixture")
     i, k = moving_and_resting(run)
     v, w = run.velocity[0][i], run.velocity[-1][i]
     gap = run.position[0][k] - run.position[0][i]

@@ -31,13 +31,13 @@ from ricochet.analysis.statistics import (
     Estimate,
     SeriesMean,
     binned,
-    combined,
-    drifts,
+    combine_runs,
+    has_drift,
     estimate,
-    grows,
-    hold_against,
-    series_mean,
-    to_error,
+    has_trend,
+    goodness_of_fit,
+    correlated_mean,
+    rounded_to_error,
 )
 from ricochet.figures.drawing import bars, caption, colours, dilute_limit, noise_band, plt
 from ricochet.predictions.theory import RELAXATION, maxwell_cdf, maxwell_pdf
@@ -57,9 +57,9 @@ def state_of(run: Run) -> str:
     """That of the late frames, if nothing drifts."""
     if run.n_disks < 3:
         raise Refused(f"{run.path}: needs three disks and more, whose collisions make a law")
-    known = set(TRAITS) - {"changed", "collapsed", "sliding"}
+    known = set(TRAITS) - {"changed", "collapsed", "sliding_surfaces"}
     allow(run, "its speeds are of no single state; see fields.py", *known)
-    if run.nature.cooling or "moving" in run.nature:
+    if run.nature.cooling or "moving_sides" in run.nature:
         return COOLING if run.nature.cooling else MOVING
     return EQUILIBRIUM if run.nature.in_equilibrium else STEADY
 
@@ -70,11 +70,11 @@ def temperature(runs: list[Run], picked: list[list[int]]) -> tuple[SeriesMean, l
         kt_of_frames(run, slice(frames[0], frames[-1] + 1))
         for run, frames in zip(runs, picked, strict=True)
     ]
-    kt = combined([series_mean(track) for track in tracks])
+    kt = combine_runs([correlated_mean(track) for track in tracks])
     if all(run.nature.keeps_kinetic_energy for run in runs):
         kt = kt._replace(error=0.0, drift=0.0)  # however few there are
     ends = [float(np.mean([track[k] for track in tracks])) for k in (0, -1)]
-    return kt, ends, drifts(kt) or any(map(grows, tracks))
+    return kt, ends, has_drift(kt) or any(map(has_trend, tracks))
 
 
 def pooled(
@@ -84,8 +84,8 @@ def pooled(
     own, each = zip(runs, picked, strict=True), state not in (EQUILIBRIUM, STEADY)
     u = np.concatenate([reduced_speeds(*one, each=each) for one in own])
     n = runs[0].n_disks * sum(map(independent_frames, runs, picked))
-    maxwell, law = hold_against(u, maxwell_cdf, independent=n), exact_law(runs[0])
-    exact = hold_against(u, law, independent=n) if law else None
+    maxwell, law = goodness_of_fit(u, maxwell_cdf, independent=n), exact_law(runs[0])
+    exact = goodness_of_fit(u, law, independent=n) if law else None
     row = {
         "N": runs[0].n_disks,
         "runs": len(runs),
@@ -134,7 +134,7 @@ def draw_relaxation(axes: plt.Axes, groups: list) -> None:
         error = a2.error if len(runs) > 1 else None
         axes.errorbar(tau, a2.mean, error, color=colour, marker=".", lw=1, label=f"N = {count}")
         noise_band(axes, count * len(runs), colour)
-        closed = all(run.nature <= {"obstructed", "turning", "walled"} for run in runs)
+        closed = all(run.nature <= {"obstacles", "rotating", "walls"} for run in runs)
         equal = equal and closed and max(a[0] for _, a in tracks) < -0.4
     if equal:
         dilute_limit(axes, RELAXATION)
@@ -157,7 +157,7 @@ def label_of(row: dict, state: str) -> str:
     size, free, exact = row["speeds"], row["independent"], row["KS_p_exact"]
     words = f"N = {row['N']}: {size} speeds" + (f", {free} independent" if free < size else "")
     steady = state in (STEADY, MOVING)
-    words += f"\nkT = {' ± '.join(to_error(row['kT'], row['kT_error']))}" if steady else ""
+    words += f"\nkT = {' ± '.join(rounded_to_error(row['kT'], row['kT_error']))}" if steady else ""
     words += f"\n{cooling(row)}" if state in (COOLING, UNSTEADY) else ""
     words += f"\nKS test: {chance(row['KS_p'])} for Maxwell"
     return words + ("" if exact is None else f",\n{chance(exact)} for N disks of fixed energy")

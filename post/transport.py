@@ -24,7 +24,7 @@ large boxes.  N disks that share a fixed energy have a conductivity that is lowe
 it, a bulk viscosity by 5 / N, a viscosity by 2 / N (docs/theory.md).
 """
 
-from ricochet.analysis.statistics import combined
+from ricochet.analysis.statistics import combine_runs
 from ricochet.analysis.transport import Found, coefficients
 from ricochet.figures.drawing import COLOURS, band, caption, colours, plt
 from ricochet.script import by_packing, command_line, launch, measured, over_runs, points, report
@@ -49,7 +49,7 @@ def table(results: Results) -> tuple[list[dict], list[str]]:
         for name in filter(found.get, LABELS):
             members, theory, about = found[name].members, found[name].enskog, f"η = {eta:g}, {name}"
             row = {"packing": eta, "runs": len(members), "what": name}
-            row |= measured("value", combined(members).scaled(theory)) | {"enskog": theory}
+            row |= measured("value", combine_runs(members).scaled(theory)) | {"enskog": theory}
             rows.append(row | over_runs("ratio", members, notes, about))
             if found[name].lag < found[name].memory / 4:
                 unsettled.append(

@@ -17,7 +17,7 @@ from typing import NoReturn
 import matplotlib
 import numpy as np
 
-from .analysis.statistics import Curve, Estimate, SeriesMean, combined, doubts
+from .analysis.statistics import Curve, Estimate, SeriesMean, combine_runs, diagnostics
 from .analysis.thermodynamics import SPEEDS_FORGET, frames_from, packing, start_of_steady_state
 from .figures.drawing import LABELS, STYLE, plt, save, warn
 from .reading.files import destination, did_you_mean
@@ -279,7 +279,11 @@ def report(
     """
     if any(tables):
         print("\n\n".join(text_of(table) for table in tables if table), flush=True)
-    notes = [*(run.shortcoming for run in args.runs if run.shortcoming), *args.notes, *notes]
+    notes = [
+        *(run.termination_note for run in args.runs if run.termination_note),
+        *args.notes,
+        *notes,
+    ]
     notes = once(notes, {run.path.name for run in args.runs})
     for note in [*notes, *without_error(tables)]:
         print(f"warning: {note}", file=sys.stderr)
@@ -318,8 +322,8 @@ def over_runs(
     name: str, members: Sequence[SeriesMean], notes: list[str], about: str
 ) -> dict[str, float | None]:
     """The cells of what runs say together; to the notes goes what speaks against it."""
-    notes += doubts(about, members)
-    return measured(name, combined(members))
+    notes += diagnostics(about, members)
+    return measured(name, combine_runs(members))
 
 
 def spread(results: dict[str, dict]) -> dict[str, np.ndarray]:

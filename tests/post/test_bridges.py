@@ -111,9 +111,9 @@ def test_what_else_disks_have_is_exported_too(simulated):
     run = simulated(ROOT / "input/rough.nml", "stop.collisions_per_disk=2")
     table = np.genfromtxt(exported(run, "rough.csv", "--frames", "-1"), delimiter=",", names=True)
     head, *lines = exported(run, "rough.xyz", "--frames", "-1").read_text().splitlines()[1:]
-    assert {"angular_velocity", "orientation"} == set(run.elements)
-    for k, name in enumerate(run.elements):
-        np.testing.assert_array_equal(table[name], run.element(name)[-1])
+    assert {"angular_velocity", "orientation"} == set(run.disk_data)
+    for k, name in enumerate(run.disk_data):
+        np.testing.assert_array_equal(table[name], run.per_disk(name)[-1])
         assert f":{name}:R:1:" in head
         column = [float(line.split()[7 + k]) for line in lines]
-        np.testing.assert_array_equal(column, run.element(name)[-1])
+        np.testing.assert_array_equal(column, run.per_disk(name)[-1])

@@ -107,7 +107,7 @@ def test_disks_that_may_slip_may_lose_energy():
     rough = {"tangential_restitution": 1.0, "inertia": 0.5}
     for contact, there in ((rough, False), (rough | {"friction": 0.3}, True)):
         parts = {"contact": contact}, np.ones(9), np.ones(9)
-        assert ("lossy" in nature_of(*parts, lost=0.0, turning=True, collapsed=False)) == there
+        assert ("inelastic" in nature_of(*parts, lost=0.0, turning=True, collapsed=False)) == there
 
 
 def test_error_bars_are_counted_that_hold_the_truth(tmp_path, rng):
@@ -403,7 +403,7 @@ def test_soft_disks_cool_by_a_law_of_their_own(simulated, tmp_path, law):
     )
     curves, *_ = cool.haff([cool.energy_left(run)], 0.8, cool.soft_law([run]))
     np.testing.assert_allclose(curves["K_by_time"].mean, curves["haff"], rtol=0.15)
-    assert "soft" in run.nature and np.isnan(run.restitution)
+    assert "soft_contacts" in run.nature and np.isnan(run.restitution)
     (row,) = (row for row in drawn(tmp_path, "haff", run.path)[:1])
     assert any("below 10" in name for name in row)
 
@@ -531,8 +531,8 @@ def test_an_even_gas_has_no_fuller_half(rng):
     even = np.array([fuller(0.5 + one).mean() for one in noise])
     assert even.mean() == pytest.approx(0.5, abs=4 * even.std() / np.sqrt(2000))
     assert fuller(0.1 + 0.1 * noise[0]).mean() == pytest.approx(0.9, abs=0.02)
-    assert not any(map(statistics.grows, noise[:100])), "a memory is no drift"
-    assert all(statistics.grows(one + np.linspace(0, 1, 300)) for one in noise[:100])
+    assert not any(map(statistics.has_trend, noise[:100])), "a memory is no drift"
+    assert all(statistics.has_trend(one + np.linspace(0, 1, 300)) for one in noise[:100])
 
 
 # --- transport ---

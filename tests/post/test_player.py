@@ -412,9 +412,9 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
     every = [f"output.{what}_every_events=1" for what in samples]
     run = simulated(text, *every, "output.event_log=.true.")
     events, reach = run.event_log(), run.radius[:, None] + [-1e-9, -1e-9]
-    (lower, upper), place = run.sides_at(run.time), run.position[:]
+    (lower, upper), place = run.corners_at(run.time), run.position[:]
     assert np.all(place - reach >= lower[:, None]) and np.all(place + reach <= upper[:, None])
-    assert np.all(lower >= run.room[0]) and np.all(upper <= run.room[1])
+    assert np.all(lower >= run.bounds[0]) and np.all(upper <= run.bounds[1])
     sides = np.stack([lower, upper], axis=-1).reshape(-1, 4)
     hits = np.flatnonzero(events.j <= 0)
     axis, rim = -events.j[hits] // 2, run.radius[events.i[hits] - 1] * (-1) ** -events.j[hits]
@@ -426,13 +426,13 @@ def test_sides_are_drawn_where_disks_meet_them(simulated, playing, seed):
         draw_box(axes, run, run.time[k])
         segments = np.array(axes.collections[0].get_segments())
         assert np.all(segments.min((0, 1)) == lower[k]) and np.all(segments.max((0, 1)) == upper[k])
-    assert np.array_equal(np.transpose([axes.get_xlim(), axes.get_ylim()]), run.room)
+    assert np.array_equal(np.transpose([axes.get_xlim(), axes.get_ylim()]), run.bounds)
     plt.close()
     browser, some = playing(run.path), rng.uniform(*run.time[[0, -1]], 50)
     act = """return arguments[0].map(t => {
       show(t); return [sidesAt(moment.shown), source.nextEvent()]; })"""
     drawn, told = zip(*browser.run(act, some.tolist()), strict=True)
-    expected = np.stack(run.sides_at(some), axis=-1).reshape(-1, 4)
+    expected = np.stack(run.corners_at(some), axis=-1).reshape(-1, 4)
     np.testing.assert_allclose(drawn, expected, atol=1e-12)
     ends = np.append(events.time, run.time[-1])
     assert list(told) == ends[np.searchsorted(events.time, some, "right")].tolist()

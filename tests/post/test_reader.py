@@ -121,7 +121,7 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
     &contact tangential_restitution = 0.5 wall_rule = 'normal' /
     &species count = 20 radius = 0.03 temperature = 1 rotational_temperature = 1 /
     &stop time = 1 / &output frames_every_time = 0.1 event_log = .true. /""")
-    assert set(run.elements) == {"angular_velocity", "orientation"}
+    assert set(run.disk_data) == {"angular_velocity", "orientation"}
     energy = 0.5 * np.mean(run.inertia * run.angular_velocity[:] ** 2, axis=1)
     assert run.observable("all/rotational_energy").value[-1] == pytest.approx(energy[-1])
     assert run.orientation[-1].any() and not run.orientation[0].any()
@@ -130,7 +130,7 @@ def test_a_run_knows_how_disks_turn_and_what_happens_at_walls(simulated):
     size = np.hypot(*run.event_log().momentum_change.T)
     assert size == pytest.approx(run.event_log().impulse)
     with pytest.raises(RunError, match="no wall_hits in its frames"):
-        run.element("wall_hits")
+        run.per_disk("wall_hits")
     axes = plt.subplots()[1]
     marks = radius_marks(axes, run, run.n_frames - 1)
     dx, dy = np.transpose([b - a for a, b in marks.get_segments()])

@@ -514,7 +514,7 @@ def test_thermalisation_time_ignores_a_passing_agreement():
 
     def found(difference, error):
         known = statistics.Estimate(np.abs(difference), np.full(8, error))
-        return statistics.when(lambda curve: equipartition.entry(time, curve), known)
+        return statistics.propagate_error(lambda curve: equipartition.entry(time, curve), known)
 
     assert found(gap, 0.005) == pytest.approx((3 + 0.1 / 0.11, 0.005 / 0.11))  # of a steep line
     for unknown in (found(gap + 1, 0.04), found(gap, 0.06), found(gap, np.nan)):

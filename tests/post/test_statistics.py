@@ -18,8 +18,8 @@ def remembering(rng, length: int, memory: float) -> np.ndarray:
 
 def test_maxwell_sample_is_accepted_and_a_wrong_temperature_rejected(rng):
     u = np.linalg.norm(rng.normal(0, np.sqrt(0.5), (50000, 2)), axis=1)
-    right = statistics.hold_against(u, theory.maxwell_cdf)
-    wrong = statistics.hold_against(1.02 * u, theory.maxwell_cdf)
+    right = statistics.goodness_of_fit(u, theory.maxwell_cdf)
+    wrong = statistics.goodness_of_fit(1.02 * u, theory.maxwell_cdf)
     assert right.ks_p > 0.01 and right.chi2_p > 0.01 and right.ks < 1.63 / np.sqrt(right.n)
     assert wrong.ks_p < 0.01 and wrong.chi2_p < 0.01
     x = np.linspace(0, 4, 4001)
@@ -34,10 +34,10 @@ def test_finite_n_law_is_that_of_disks_sharing_an_energy(rng, periodic):
     v -= periodic * v.mean(axis=1, keepdims=True)
     k = np.sum(v**2, axis=2)
     u, law = np.sqrt(k[:, 0] / k.mean(axis=1)), theory.finite_n_cdf(5, periodic)
-    found = statistics.hold_against(u, law)
+    found = statistics.goodness_of_fit(u, law)
     assert found.ks_p > 0.01
-    assert statistics.hold_against(u, theory.finite_n_cdf(5, not periodic)).ks_p < 0.01
-    again = statistics.hold_against(np.repeat(u, 4), law, independent=len(u))
+    assert statistics.goodness_of_fit(u, theory.finite_n_cdf(5, not periodic)).ks_p < 0.01
+    again = statistics.goodness_of_fit(np.repeat(u, 4), law, independent=len(u))
     assert again == pytest.approx(found, rel=0.02)
 
 
@@ -108,11 +108,11 @@ def test_a_fit_says_that_it_misses_its_points_as_seldom_as_it_should(rng, runs):
 
 
 def test_errors_are_written_with_two_digits():
-    assert statistics.to_error(0.0000123, 0.00031) == ("0.00001", "0.00031")
-    assert statistics.to_error(-1e-9, 0.2) == ("0.00", "0.20")
-    assert statistics.to_error(945.3, 12.4) == ("945", "12")
-    assert statistics.to_error(0.9512, 0.00999) == ("0.951", "0.010")
-    assert statistics.to_error(0.5, 0.0) == ("0.5", "0")
+    assert statistics.rounded_to_error(0.0000123, 0.00031) == ("0.00001", "0.00031")
+    assert statistics.rounded_to_error(-1e-9, 0.2) == ("0.00", "0.20")
+    assert statistics.rounded_to_error(945.3, 12.4) == ("945", "12")
+    assert statistics.rounded_to_error(0.9512, 0.00999) == ("0.951", "0.010")
+    assert statistics.rounded_to_error(0.5, 0.0) == ("0.5", "0")
 
 
 # --- series in time ---
@@ -120,21 +120,21 @@ def test_errors_are_written_with_two_digits():
 
 def test_the_error_of_a_series_without_memory_is_that_of_its_scatter(rng):
     amount = rng.poisson(1000, 20000).astype(float)
-    found = statistics.series_mean(amount, np.full(20000, 2.0))
+    found = statistics.correlated_mean(amount, np.full(20000, 2.0))
     assert found.mean == pytest.approx(500, rel=0.01)
     assert found.error == pytest.approx(np.sqrt(1000) / 2 / np.sqrt(20000), rel=0.4)
 
 
 def test_a_series_in_decades_is_worth_its_last_samples_and_has_no_error(rng):
     times = np.diff(np.geomspace(1, 1e6, 200))
-    found = statistics.series_mean(times * rng.normal(5, 1, 199), times)
+    found = statistics.correlated_mean(times * rng.normal(5, 1, 199), times)
     assert found.mean == pytest.approx(5, abs=1.5) and np.isnan(found.error) and found.samples < 3
 
 
 @pytest.mark.parametrize("memory", [0.5, 5, 20])
 def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memory):
     means = [
-        statistics.series_mean(remembering(rng, 2000, memory) + 3 * rng.normal(size=2000))
+        statistics.correlated_mean(remembering(rng, 2000, memory) + 3 * rng.normal(size=2000))
         for _ in range(400)
     ]
     hit = np.mean([abs(one.mean) < one.error for one in means])
@@ -146,7 +146,7 @@ def test_68_of_100_intervals_hold_the_mean_of_a_series_that_remembers(rng, memor
 def test_what_samples_make_up_for_is_no_error(rng):
     """As of a wall, whose disks give it what they have: a sum that stays bounded."""
     series = np.diff(rng.normal(size=(400, 641))) + 0.1 * rng.normal(size=(400, 640))
-    means = [statistics.series_mean(one) for one in series]
+    means = [statistics.correlated_mean(one) for one in series]
     held = np.mean([abs(one.mean) < one.error for one in means])
     assert 0.6 <= held <= 0.85
 
@@ -160,22 +160,22 @@ def test_equilibrium_begins_where_a_drift_has_died_out(rng):
 
 
 def test_what_speaks_against_an_error_is_said(rng):
-    calm = [statistics.series_mean(rng.normal(size=640)) for _ in range(10)]
-    assert statistics.doubts("Z", calm) == []
+    calm = [statistics.correlated_mean(rng.normal(size=640)) for _ in range(10)]
+    assert statistics.diagnostics("Z", calm) == []
     slope = np.linspace(0, 0.5, 640)  # hardly seen in one run, but they all agree
-    drifting = [statistics.series_mean(rng.normal(size=640) + slope) for _ in range(10)]
-    assert "Z: still drifts" in statistics.doubts("Z", drifting)[0]
+    drifting = [statistics.correlated_mean(rng.normal(size=640) + slope) for _ in range(10)]
+    assert "Z: still drifts" in statistics.diagnostics("Z", drifting)[0]
     apart = [one._replace(mean=one.mean + k) for k, one in enumerate(calm)]
-    assert "runs scatter by 3" in statistics.doubts("Z", apart)[0]
-    assert statistics.combined(apart).error == pytest.approx(1, rel=0.1)
-    assert statistics.combined(apart).samples == 10, "a run is a sample"
-    assert statistics.memory(rng.normal(size=3)) > 1
+    assert "runs scatter by 3" in statistics.diagnostics("Z", apart)[0]
+    assert statistics.combine_runs(apart).error == pytest.approx(1, rel=0.1)
+    assert statistics.combine_runs(apart).samples == 10, "a run is a sample"
+    assert statistics.statistical_inefficiency(rng.normal(size=3)) > 1
     rounded = 1 + 1e-15 * remembering(rng, 640, 100)
-    assert statistics.doubts("kT", [statistics.series_mean(rounded)]) == []
-    short = statistics.series_mean(rng.normal(size=5))
-    assert "no error" in statistics.doubts("Z", [short])[0]
-    slow = statistics.series_mean(remembering(rng, 640, 100))
-    assert "independent samples; run longer" in " ".join(statistics.doubts("Z", [slow]))
+    assert statistics.diagnostics("kT", [statistics.correlated_mean(rounded)]) == []
+    short = statistics.correlated_mean(rng.normal(size=5))
+    assert "no error" in statistics.diagnostics("Z", [short])[0]
+    slow = statistics.correlated_mean(remembering(rng, 640, 100))
+    assert "independent samples; run longer" in " ".join(statistics.diagnostics("Z", [slow]))
 
 
 def test_windows_are_means():

@@ -286,7 +286,7 @@ def test_a_change_is_work_and_goes_on_in_the_program(program, tmp_path, monkeypa
     gas.advance(events=200).velocity = 2 * gas.velocity
     gas.advance(events=300)
     assert balance() == pytest.approx(before, rel=1e-12)
-    assert {"changed", "thermal", "falling", "soft"} <= gas.nature
+    assert {"changed", "thermal_walls", "gravity", "soft_contacts"} <= gas.nature
     gas.save("gas.h5", input="changed.nml")
     told = ran(program, "gas.nml", "-o", "gas.h5", "--resume", "--quiet", "--set=run.seed=5")
     assert told.returncode == 2 and "there box.gravity = [0, 3]" in told.stderr

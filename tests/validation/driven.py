@@ -5,7 +5,7 @@ from math import pi, sqrt
 import numpy as np
 
 from ricochet import Run, hard_disks as hd
-from ricochet.analysis.statistics import Estimate, combined, hold_against
+from ricochet.analysis.statistics import Estimate, combine_runs, goodness_of_fit
 from ricochet.analysis.thermodynamics import start_of_equilibrium
 from ricochet.analysis.transport import MOMENTS, of_moments
 from ricochet.predictions.theory import ROUGH_RATIOS, maxwell_cdf
@@ -66,7 +66,7 @@ def energies(run: Run) -> np.ndarray:
 def maxwell_p(*runs: Run) -> float:
     """Probability of the distance of all speeds from Maxwell's law at T."""
     speeds = [run.speed(slice(1, None)).ravel() * np.sqrt(1 / (2 * KT)) for run in runs]
-    return hold_against(np.concatenate(speeds), maxwell_cdf).ks_p
+    return goodness_of_fit(np.concatenate(speeds), maxwell_cdf).ks_p
 
 
 # --- rough disks that cool ---
@@ -125,7 +125,7 @@ def flowing(eta: float, size: float, mass: float) -> tuple[Member, ...]:
 def enskog_ratios(*runs: Run) -> Estimate:
     """Shear and bulk viscosity, and conductivity of equal disks, over those of Enskog's theory."""
     found = of_moments(list(runs), [start_of_equilibrium(run) for run in runs])
-    means = [combined(found[name].members) for name in MOMENTS if name in found]
+    means = [combine_runs(found[name].members) for name in MOMENTS if name in found]
     return Estimate(*(np.array([getattr(one, k) for one in means]) for k in ("mean", "error")))
 
 

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ricochet import Run
-from ricochet.analysis.statistics import Estimate, SeriesMean, combined, estimate, series_mean
+from ricochet.analysis.statistics import (
+    Estimate,
+    SeriesMean,
+    combine_runs,
+    estimate,
+    correlated_mean,
+)
 from ricochet.analysis.thermodynamics import steps
 
 
@@ -22,7 +28,7 @@ def over(measure: Callable[[Run], ArrayLike]) -> Callable[..., Estimate]:
 
 def pooled(measure: Callable[[Run], SeriesMean]) -> Callable[..., SeriesMean]:
     """The mean over runs whose own means have errors."""
-    return lambda *runs: combined([measure(run) for run in runs])
+    return lambda *runs: combine_runs([measure(run) for run in runs])
 
 
 def middle(measure: Callable[[Run], ArrayLike]) -> Callable[..., np.ndarray]:
@@ -53,10 +59,10 @@ def at_collisions(run: Run, name: str, tau: np.ndarray) -> np.ndarray:
 def hit_rate(run: Run) -> SeriesMean:
     """Hits of all sides per time."""
     s = steps(run)
-    return series_mean(s.hits, s.time)
+    return correlated_mean(s.hits, s.time)
 
 
 def force(run: Run) -> SeriesMean:
     """Mean force on one side."""
     s = steps(run)
-    return series_mean(s.impulse.mean(axis=1), s.time)
+    return correlated_mean(s.impulse.mean(axis=1), s.time)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ricochet import Run
-from ricochet.analysis.statistics import hold_against
+from ricochet.analysis.statistics import goodness_of_fit
 from ricochet.predictions.theory import maxwell_cdf
 
 from .case import AT_MOST, Case, Member, relative, sigmas, within
@@ -155,7 +155,7 @@ def square_distances(run: Run) -> list[float]:
     for name in MASS:
         energy = of(run, name, run.kinetic_energy(later(run))).ravel()
         u = np.sqrt(energy / energy.mean())
-        found.append(hold_against(u, maxwell_cdf).ks * sqrt(len(u)))
+        found.append(goodness_of_fit(u, maxwell_cdf).ks * sqrt(len(u)))
     return found
 
 

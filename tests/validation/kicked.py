@@ -127,7 +127,7 @@ def spread(lags: tuple[int, ...], law: Callable[[int], float]) -> Callable[[Run]
 
 def headings(run: Run) -> list[float]:
     """<cos> of the turn of the orientation at the lags, in frames."""
-    angle = run.element("orientation")[:]
+    angle = run.per_disk("orientation")[:]
     return [float(np.mean(np.cos(angle[k:] - angle[:-k]))) for k in LAGS]
 
 

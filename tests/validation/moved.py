@@ -6,7 +6,7 @@ import numpy as np
 
 from driven import fuller, share
 from ricochet import Run
-from ricochet.analysis.statistics import Estimate, combined, series_mean
+from ricochet.analysis.statistics import Estimate, combine_runs, correlated_mean
 from ricochet.predictions.hard_disks import adiabat
 from ricochet.predictions.theory import demon_share, pushed_width
 
@@ -142,7 +142,9 @@ def room(*runs: Run) -> Estimate:
     tracks = [run.observable("sides/right/position") for run in runs]
     widths = [np.ravel(place)[time > time[-1] / 20] for time, place in tracks]
     squares = [(x - x.mean()) ** 2 for x in widths]
-    return several([combined([series_mean(one) for one in own]) for own in (widths, squares)])
+    return several(
+        [combine_runs([correlated_mean(one) for one in own]) for own in (widths, squares)]
+    )
 
 
 def room_of_gas() -> tuple[float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from ricochet import Run
-from ricochet.analysis.statistics import Estimate, estimate, excess_kurtosis, hold_against
+from ricochet.analysis.statistics import Estimate, estimate, excess_kurtosis, goodness_of_fit
 from ricochet.analysis.thermodynamics import kt_at_start
 from ricochet.predictions.theory import finite_n_cdf, maxwell_cdf
 
@@ -40,7 +40,7 @@ def obeyed(
 
     def distance(run: Run) -> float:
         values, law = sample(run)
-        return hold_against(values, law).ks * sqrt(len(values))
+        return goodness_of_fit(values, law).ks * sqrt(len(values))
 
     what = f"{what}: KS distance sqrt(n)"
     return Case(name, what, members, middle(distance), LEAST, AT_MOST, source)

@@ -12,14 +12,19 @@ import numpy as np
 from ..predictions import hard_disks, theory
 from ..reading.nature import SOURCES, TRAITS, Refused, allow
 from ..reading.reader import Run
-from .statistics import Estimate, estimate, when
+from .statistics import Estimate, estimate, propagate_error
 from .thermodynamics import free_disks, kt_at_start, lightest_and_heaviest, packing
 
 Curves = dict[str, np.ndarray | Estimate]
 
 WINDOW = 2.0  # collisions per disk over which a cooling rate is taken
 SLOW = 0.9  # of Haff's law, below which a gas is no longer homogeneous
-SMOOTH = ("lossy", "soft", "mixture", "turning")  # what a gas may be that cools by Haff's law
+SMOOTH = (
+    "inelastic",
+    "soft_contacts",
+    "mixture",
+    "rotating",
+)  # what a gas may be that cools by Haff's law
 SETTLED = 0.005  # the ratio has forgotten its start when by the law it is so close to its limit
 
 
@@ -36,7 +41,7 @@ def energies(runs: list[Run], points: int = 201) -> Curves:
     `K_...` over that of all at the start, against `collisions_per_disk`; `ratio` of the
     temperatures, heaviest to lightest species; `energy_...` against `time`.
     """
-    names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "falling"}
+    names, alone = ("all", *runs[0].names), TRAITS.keys() - SOURCES - {"collapsed", "gravity"}
     for run in runs:
         allow(run, "it does not cool by itself", *alone)
     energy = [np.array([moving_energy(run, name) for name in names]) for run in runs]
@@ -71,9 +76,9 @@ def first_rate(run: Run) -> float:
     """w0: collisions per disk and time at the start, by the equation of state, or as counted."""
     law = "Haff's law is for smooth disks that only cool, in a periodic box"
     allow(run, law, *SMOOTH)
-    if "lossy" not in run.nature:
+    if "inelastic" not in run.nature:
         raise Refused(f"{run.path}: does not cool; {law}")
-    if {"soft", "mixture"} <= run.nature:
+    if {"soft_contacts", "mixture"} <= run.nature:
         raise Refused(f"{run.path}: is a mixture of soft disks; {law}, or of one kind")
     if "mixture" in run.nature:
         return counted_rate(run)
@@ -99,7 +104,7 @@ def energy_left(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def soft_law(runs: list[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """w0 t, collisions per disk, K / K0 by the law of soft disks; None if they are not."""
-    if "soft" not in runs[0].nature:
+    if "soft_contacts" not in runs[0].nature:
         return None
     thermal = np.mean([np.sqrt(kt_at_start(run) / run.mass[0]) for run in runs])
     return hard_disks.haff_soft(runs[0].contact_law, float(thermal))
@@ -147,7 +152,12 @@ def haff(
         "law": by_collisions,
         "rate": local,
     }
-    return curves, estimate(slopes), end, when(lambda c: homogeneous_until(tau, c, law), local)
+    return (
+        curves,
+        estimate(slopes),
+        end,
+        propagate_error(lambda c: homogeneous_until(tau, c, law), local),
+    )
 
 
 def exponent(time: np.ndarray, energy: np.ndarray) -> float:
@@ -170,7 +180,7 @@ def homogeneous_until(tau: np.ndarray, rate: np.ndarray, law: float | np.ndarray
 def rough_law(run: Run) -> tuple[float, float, float]:
     """xi, beta, q of a run that the laws of rough disks are for."""
     law = "the laws are for equal rough disks that cool in a periodic box, without contact.friction"
-    allow(run, law, "lossy", "rough", "turning")
+    allow(run, law, "inelastic", "rough", "rotating")
     if "rough" not in run.nature:
         raise Refused(f"{run.path}: has smooth disks; {law}")
     if run.parameter("contact", "friction") is not None:

@@ -36,7 +36,7 @@ from ..reading.files import RunError
 from ..reading.nature import KICKED, TRAITS, allow
 from ..reading.reader import Run
 from ..running.simulation import Simulation
-from .statistics import FEWEST, Curve, Estimate, estimate, series_mean
+from .statistics import FEWEST, Curve, Estimate, estimate, correlated_mean
 from .thermodynamics import ALONG_WALLS, later, refuse_others, unmoved
 
 PER_DECADE = 12
@@ -46,7 +46,7 @@ REACH = 0.3  # mean diameters
 CLOSE = 1e-9  # of a lag: times that differ by less are one
 MOST_PAIRS = 2 * 10**6  # whose lags are looked at
 CHUNK = 10**6  # disks in the frames that are read together
-FLOWING = {"sheared", "sliding", "changed"}
+FLOWING = {"sheared", "sliding_surfaces", "changed"}
 FIXED = ("msd", "fourth", "vacf", "diffusion", "overlap")
 
 
@@ -96,14 +96,14 @@ class Correlator:
         lags: np.ndarray | None = None,
     ):
         """For samples at these times, wave numbers [1/length] and lags [of the times]."""
-        cools = {"lossy"} if source.nature.cooling else set()
+        cools = {"inelastic"} if source.nature.cooling else set()
         what = "ways and memory are those of a steady state without flow"
         allow(source, what, *TRAITS.keys() - FLOWING - cools)
         self.times, self.waves = np.asarray(times, dtype=float), tuple(waves)
         self.lags = lags_of(self.times) if lags is None else np.asarray(lags, dtype=float)
         self.reach = REACH * 2 * float(source.radius.mean()) if reach is None else float(reach)
         self.kicked = bool(source.nature & KICKED)
-        walls = "walled" in source.nature and source.nature & ALONG_WALLS
+        walls = "walls" in source.nature and source.nature & ALONG_WALLS
         self.kept = unmoved(source) & (not walls)
         names = source.names if isinstance(source, Run) else source.parameters["species"]
         self.mass, self.names = source.mass, ("all", *names)
@@ -212,7 +212,7 @@ def mean_of(members: Sequence[Correlator], name: str, species: int, lags: np.nda
     for k, lag in enumerate(lags):
         some = one.pairs[lag] > 0
         if one.lags[lag] * FEWEST <= span * (1 + CLOSE) and np.isfinite(means[0][k]):
-            error[k] = series_mean(amounts[lag, some], one.pairs[lag, some]).error
+            error[k] = correlated_mean(amounts[lag, some], one.pairs[lag, some]).error
     return Estimate(means[0], error)
 
 

@@ -32,8 +32,17 @@ class Crater(NamedTuple):
 
 #: What a run may be in which nothing but a projectile moves a bed.
 QUIET: tuple[str, ...]
-QUIET = ("lossy", "soft", "rough", "turning", "unlike", "mixture", "obstructed", "walled")
-QUIET += ("stepped",)
+QUIET = (
+    "inelastic",
+    "soft_contacts",
+    "rough",
+    "rotating",
+    "pair_restitution",
+    "mixture",
+    "obstacles",
+    "walls",
+)
+QUIET += ("time_stepped",)
 FEW_HITS = 0.01  # of walls, per disk: up to here the box does not count
 
 

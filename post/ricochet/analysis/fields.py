@@ -17,7 +17,7 @@ import scipy
 from ..predictions import hard_disks
 from ..reading.files import RunError
 from ..reading.reader import SIDES, Run
-from .statistics import Estimate, memory, student
+from .statistics import Estimate, statistical_inefficiency, student
 from .structure import periods
 from .thermodynamics import after_start, free_disks, refuse_others
 
@@ -28,7 +28,7 @@ LONG = 1.5  # memories in a block
 POINTS = 1 << 16  # in a box with obstacles, to find where centres can be
 ACROSS = SIDES[:2], SIDES[2:]  # the two sides across each axis
 #: What a gas between two walls may be to have a theory.
-LAWFUL = {"walled", "thermal", "uneven", "sliding"}
+LAWFUL = {"walls", "thermal_walls", "unequal_temperatures", "sliding_surfaces"}
 Cells = tuple[int, int]
 
 
@@ -124,7 +124,7 @@ def longest_memory(run: Run, frames: list[int], cells: Cells) -> float:
             parts = run.mass * amount * wave
             series = parts.sum(axis=1)
             if np.ptp(series) > 1e-9 * np.mean(np.abs(parts).sum(axis=1)):  # else it is kept
-                found = max(found, memory(series))
+                found = max(found, statistical_inefficiency(series))
     return found
 
 
@@ -229,7 +229,7 @@ def sums(block: Block, cells: Cells, areas: list[np.ndarray]) -> np.ndarray:
     dense = 1 / np.where(area > 0, area, run.edges.prod() / np.prod(cells))  # beyond a moving side
     carried = [mass * x, mass * y, mass * x * x, mass * x * y, mass * y * y, square * x, square * y]
     turning = 0 * mass
-    if "angular_velocity" in run.elements:
+    if "angular_velocity" in run.disk_data:
         turning = (run.inertia * run.angular_velocity[frames] ** 2).ravel()
     each = [None, dense, mass, *carried, turning]
     rows = [np.bincount(cell, values, minlength=count) for values in each]
@@ -298,7 +298,7 @@ def fields(runs: list[Run], skip: float | None, cells: Cells) -> Fields:
     room = np.max(areas, axis=0)
     unseen = (disks == 0) & (room > 0)  # where there may be one
     error[0, unseen] += 1 / (frames * room)[unseen]
-    turns = "angular_velocity" in run.elements
+    turns = "angular_velocity" in run.disk_data
     names = {n: k for k, n in enumerate(NAMES) if turns or n != "rotational_temperature"}
     return Fields(
         {name: Estimate(mean[k], error[k]) for name, k in names.items()},

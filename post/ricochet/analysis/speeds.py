@@ -5,7 +5,7 @@ import numpy as np
 from ..predictions.theory import Law, finite_n_cdf
 from ..reading.nature import Refused
 from ..reading.reader import Run
-from .statistics import Estimate, estimate, excess_kurtosis, series_mean
+from .statistics import Estimate, estimate, excess_kurtosis, correlated_mean
 from .thermodynamics import conserved, drift, free_disks
 
 MEMORY = 5.0  # collisions per disk after which a speed is independent
@@ -81,7 +81,7 @@ def exact_law(run: Run) -> Law | None:
     """The law of N disks that share a fixed kinetic energy, for runs that have one."""
     axes = int(conserved(run).sum())
     free = not run.nature.keeps_kinetic_energy or run.n_disks < 2 + axes / 2
-    if free or "round" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
+    if free or "round_container" in run.nature or axes == 1 or (axes == 2 and np.ptp(run.mass) > 0):
         return None
     return finite_n_cdf(run.n_disks, axes == 2)
 
@@ -100,5 +100,5 @@ def means(runs: list[Run], frames: list[list[int]], name: str) -> tuple[Estimate
         whole = estimate([one.mean(axis=0) for one in members])
         (v, k), (dv, dk) = whole.mean, whole.error
         return Estimate(v, dv), Estimate(k, dk)
-    speed, energy = (series_mean(column) for column in members[0].T)
+    speed, energy = (correlated_mean(column) for column in members[0].T)
     return Estimate(speed.mean, speed.error), Estimate(energy.mean, energy.error)

@@ -1,7 +1,7 @@
 """Means with errors, fits, and tests of a sample against a law.
 
 Two kinds of error: `estimate` is for independent members, such as runs that differ by their seed;
-`series_mean` is for one series in time, whose samples remember each other.
+`correlated_mean` is for one series in time, whose samples remember each other.
 """
 
 from collections.abc import Callable, Sequence
@@ -63,7 +63,7 @@ class PowerLaw(NamedTuple):
         return self.factor * np.asarray(x, dtype=float) ** self.exponent
 
 
-def hold_against(
+def goodness_of_fit(
     sample: np.ndarray, cdf: Law, bins: int = 30, independent: int | None = None
 ) -> LawTest:
     """Kolmogorov-Smirnov and chi-square test of a sample against a law.
@@ -100,7 +100,7 @@ def estimate(values: ArrayLike, axis: int = 0) -> Estimate:
     return Estimate(mean, student(count) * values.std(axis=axis, ddof=1) / np.sqrt(count))
 
 
-def when(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
+def propagate_error(of: Callable[[np.ndarray], float], curve: Estimate) -> Estimate:
     """When something happens to a curve: the middle and half the width between its two limits.
 
     They are those of the curves an error below and above.  NaN if it never happens to one of them,
@@ -135,7 +135,7 @@ def cells(series: np.ndarray, count: int) -> np.ndarray:
     return series[len(series) % width :].reshape(-1, width).mean(axis=1)
 
 
-def memory(series: np.ndarray, least: float = 0.1) -> float:
+def statistical_inefficiency(series: np.ndarray, least: float = 0.1) -> float:
     """1 + 2 tau, tau the integrated autocorrelation time in samples: as many count as one.
 
     Below 1, but not below `least`, where samples make up for each other, as hits of a wall do.
@@ -156,7 +156,7 @@ def memory(series: np.ndarray, least: float = 0.1) -> float:
     return max(least, found) * (1 + (2 * lag + 1) / count)
 
 
-def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
+def correlated_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean:
     """Sum of a series (T,) in equilibrium over the sum of another, such as counts over times.
 
     The error is that of the mean of amount - ratio * per, from the autocorrelation of its cells,
@@ -173,8 +173,10 @@ def series_mean(amount: np.ndarray, per: np.ndarray | float = 1.0) -> SeriesMean
         return SeriesMean(mean, np.nan, worth, 0.0)
     rest = (amount - mean * per) / np.mean(per)
     coarse = cells(rest, COARSE)
-    least = min(1.0, memory(cells(rest, FINE)))  # few cells may seem to make up for each other
-    free = len(coarse) / memory(coarse, least)
+    least = min(
+        1.0, statistical_inefficiency(cells(rest, FINE))
+    )  # few cells may seem to make up for each other
+    free = len(coarse) / statistical_inefficiency(coarse, least)
     error = float(np.std(coarse, ddof=1) / np.sqrt(free))
     if not error > 1e-12 * np.max(np.abs(amount)) / np.mean(per):  # constant but for rounding
         return SeriesMean(mean, 0.0, float(len(rest)), 0.0)
@@ -196,7 +198,7 @@ def equilibration(series: np.ndarray) -> int:
     return 2 * int(np.argmin(scatter)) * max(1, len(series) // FINE)
 
 
-def combined(means: Sequence[SeriesMean]) -> SeriesMean:
+def combine_runs(means: Sequence[SeriesMean]) -> SeriesMean:
     """The mean over independent runs; their scatter counts where errors do not explain it, or lack.
 
     Samples add up, but where the scatter counts a run is one sample; drifts that agree grow.
@@ -222,24 +224,24 @@ def scatter_p(means: Sequence[SeriesMean]) -> float:
     return float(scipy.special.chdtrc(len(mean) - 1, chi2))
 
 
-def drifts(mean: SeriesMean) -> bool:
+def has_drift(mean: SeriesMean) -> bool:
     """Whether its halves differ by more than chance explains."""
     return bool(2 * scipy.special.ndtr(-abs(mean.drift)) < UNLIKELY)
 
 
-def grows(series: np.ndarray) -> bool:
+def has_trend(series: np.ndarray) -> bool:
     """Whether most of how a series (T,) varies is a straight line: it grows or falls all the time.
 
-    That looks like a long memory to `series_mean`, whose error then hides the drift.
+    That looks like a long memory to `correlated_mean`, whose error then hides the drift.
     """
     if len(series) < FEWEST or np.ptp(series) <= 1e-9 * np.max(np.abs(series)):
         return False
     return bool(np.corrcoef(np.arange(len(series)), series)[0, 1] ** 2 > 0.75)
 
 
-def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
+def diagnostics(name: str, means: Sequence[SeriesMean]) -> list[str]:
     """Why the mean over these runs should not be trusted, in sentences; none if it may be."""
-    found, whole = [], combined(means)
+    found, whole = [], combine_runs(means)
     if np.isnan(whole.error):
         return [f"{name}: no error, a run has fewer than {FEWEST} samples in equilibrium"]
     if scatter_p(means) < UNLIKELY:
@@ -250,7 +252,7 @@ def doubts(name: str, means: Sequence[SeriesMean]) -> list[str]:
         )
     elif whole.samples < FEW:
         found.append(f"{name}: worth only {whole.samples:.1f} independent samples; run longer")
-    if drifts(whole):
+    if has_drift(whole):
         more = "above" if whole.drift > 0 else "below"
         found.append(
             f"{name}: still drifts, the second half is {abs(whole.drift):.1f} errors {more} the "
@@ -284,7 +286,7 @@ def excess_kurtosis(speed: np.ndarray) -> float:
     return float(np.mean(square**2) / (2 * np.mean(square) ** 2) - 1)
 
 
-def to_error(mean: float, error: float) -> tuple[str, ...]:
+def rounded_to_error(mean: float, error: float) -> tuple[str, ...]:
     """Both with the two digits of the error that say something; the mean alone without an error."""
     if not np.isfinite(error):
         return (f"{mean:.4g}",)

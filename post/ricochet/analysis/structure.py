@@ -12,7 +12,7 @@ import scipy
 from ..reading.arrays import Index, chosen
 from ..reading.nature import TRAITS, allow
 from ..reading.reader import Run
-from .statistics import Curve, estimate, series_mean
+from .statistics import Curve, estimate, correlated_mean
 
 MOST_PAIRS = 2 * 10**5  # whose distances are looked at in a frame, for `bond_correlation`
 MOST_TERMS = 3e8  # of the sums over disks and wave vectors in a frame
@@ -26,7 +26,7 @@ def periods(run: Run) -> np.ndarray:
 
 def refuse(run: Run, *traits: str) -> None:
     """The images here do not slide, and waves take a box without walls."""
-    law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walled" in traits)
+    law = "structure is found in boxes at rest" + ", S(k) in periodic ones" * ("walls" in traits)
     allow(run, law, *TRAITS.keys() - set(traits))
 
 
@@ -46,7 +46,7 @@ def pair_correlation(
     sums = np.zeros(len(edges) - 1)
     expected = 0.0  # pairs per area, of disks at random
     for k in chosen(run.n_frames, frames):
-        x, (lower, upper) = run.position[k], run.sides_at(run.time[k])
+        x, (lower, upper) = run.position[k], run.corners_at(run.time[k])
         margin = np.where(run.periodic, -np.inf, r[-1])
         inner = one & np.all((x > lower + margin) & (x < upper - margin), axis=1)
         tree, part = (
@@ -71,7 +71,7 @@ def structure_factor(
     Of a `pair` of species: the product of their two sums, over the root of their numbers.  Periodic
     boxes.  Of many disks only every so many wave vector along x and y is taken.
     """
-    refuse(run, "sheared", "walled")
+    refuse(run, "sheared", "walls")
     unit = 2 * np.pi / run.edges  # the wave vectors are its multiples
     most = np.floor(edges[-1] / (2 * run.radius.mean()) / unit).astype(int)
     step = int(np.ceil(np.sqrt(2 * run.n_disks * np.prod(most + 1) / MOST_TERMS)))
@@ -125,7 +125,7 @@ def averaged(
     columns = values[np.ix_(seen, known)]
     if not alone:
         return Curve(middle[known], *estimate(columns))
-    each = [series_mean(one)[:2] for one in columns.T]
+    each = [correlated_mean(one)[:2] for one in columns.T]
     return Curve(middle[known], *np.reshape(each, (-1, 2)).T)
 
 

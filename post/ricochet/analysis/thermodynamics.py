@@ -16,14 +16,19 @@ from ..reading.files import RunError
 from ..reading.nature import KICKED, ROUNDING, SETTLED, Refused, allow
 from ..reading.reader import SIDES, Run, Species
 from ..running.simulation import Simulation
-from .statistics import FEWEST, FINE, SeriesMean, equilibration, series_mean
+from .statistics import FEWEST, FINE, SeriesMean, equilibration, correlated_mean
 
 TIMED = ("every_time", "at", "per_decade")  # samples at times, not after collisions
 SPEEDS_FORGET = 15.0  # collisions per disk after which no distribution of speeds remembers another
-ALONG_WALLS = {"thermal", "rough", "turning", "lossy"}  # walls may change what is along them
+ALONG_WALLS = {
+    "thermal_walls",
+    "rough",
+    "rotating",
+    "inelastic",
+}  # walls may change what is along them
 MANY = 1e8  # disks, to whom it makes no difference that their energy is fixed
 #: Beside equal smooth disks that keep their energy, what is a fluid in an empty box.
-FLUID = ("walled", "thermal", "bathed", "rough", "turning", "mixture")
+FLUID = ("walls", "thermal_walls", "thermostatted", "rough", "rotating", "mixture")
 
 
 class Steps(NamedTuple):
@@ -138,7 +143,7 @@ def unmoved(source: Run | Simulation) -> np.ndarray:
     """
     box, drive = source.parameters.get("box", {}), source.parameters.get("drive", {})
     kicked = source.nature & KICKED and not drive.get("keep_momentum", False)
-    if kicked or source.nature & {"obstructed", "sheared", "changed"}:
+    if kicked or source.nature & {"obstacles", "sheared", "changed"}:
         return np.zeros(2, dtype=bool)
     return (np.array(box["boundary"]) == "periodic") & (np.array(box.get("gravity", 0.0)) == 0)
 
@@ -201,9 +206,9 @@ def temperature(run: Run, skip: float | None = None) -> SeriesMean:
     start, (track, time, kt) = start_of_equilibrium(run, skip), kt_in_time(run)
     kt, time = kt[time >= start], time[time >= start]
     by_time = (run.parameter("output", f"{track}_{how}") for how in TIMED)
-    if all(given is None for given in by_time) and "falling" not in run.nature:
-        return series_mean(kt**0.5, kt**-0.5)
-    return series_mean(*between(time, kt)[::-1])
+    if all(given is None for given in by_time) and "gravity" not in run.nature:
+        return correlated_mean(kt**0.5, kt**-0.5)
+    return correlated_mean(*between(time, kt)[::-1])
 
 
 def between(time: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -297,21 +302,21 @@ def virial_over_kt(run: Run, skip: float | None = None) -> tuple[np.ndarray, np.
 def collision_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """Pair collisions per disk and time."""
     s = steps(run, skip)
-    return series_mean(s.collisions, s.time).scaled(2 / run.n_disks)
+    return correlated_mean(s.collisions, s.time).scaled(2 / run.n_disks)
 
 
 def z_virial(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the virial of the pairs."""
-    return series_mean(*virial_over_kt(run, skip)).scaled(1.0, 1.0)
+    return correlated_mean(*virial_over_kt(run, skip)).scaled(1.0, 1.0)
 
 
 def z_rate(run: Run, skip: float | None = None) -> SeriesMean:
     """P / (n kT) by the collision rate; equal masses."""
     s = steps(run, skip)
-    turning = run.n_disks / 2 if run.nature & {"rough", "turning"} else 0.0
+    turning = run.n_disks / 2 if run.nature & {"rough", "rotating"} else 0.0
     share = free_disks(run) + turning if run.nature.keeps_energy else MANY  # a fixed energy
     unit = hard_disks.collision_rate(2.0, 2 * run.radius[0], share, 1.0, run.mass[0])
-    return series_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.n_disks * unit), 1.0)
+    return correlated_mean(*over_kt(s.collisions, s, 0.5)).scaled(2 / (run.n_disks * unit), 1.0)
 
 
 def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
@@ -319,7 +324,7 @@ def z_wall(run: Run, skip: float | None = None) -> SeriesMean:
     s = steps(run, skip)
     a = run.edges - 2 * run.radius[0]
     work = s.impulse[:, :2].mean(axis=1) * a[0] + s.impulse[:, 2:].mean(axis=1) * a[1]
-    return series_mean(*over_kt(work, s, 1)).scaled(1 / (2 * run.n_disks))
+    return correlated_mean(*over_kt(work, s, 1)).scaled(1 / (2 * run.n_disks))
 
 
 def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
@@ -334,11 +339,11 @@ def z_ways(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
 def pressures(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     """By the virial, and by the sides that are walls; a side feels force per length."""
     s = steps(run, skip)
-    inside = series_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
+    inside = correlated_mean(run.n_disks * s.kt * s.time + s.virial / 2, s.time)
     found = {"pressure_virial": inside.scaled(1 / np.prod(run.edges))}
     for k, side in enumerate(SIDES):
         if not run.periodic[k // 2]:
-            force = series_mean(s.impulse[:, k], s.time)
+            force = correlated_mean(s.impulse[:, k], s.time)
             found[f"pressure_{side}"] = force.scaled(1 / run.edges[1 - k // 2])
     return found
 
@@ -359,7 +364,7 @@ def pair_rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
         for b, second in enumerate(run.names):
             weight = ((one == a) & (other == b)) * 1.0 + ((one == b) & (other == a))
             counts, _ = np.histogram(log.time[pairs], cuts, weights=weight)
-            rate = series_mean(counts, np.diff(cuts))
+            rate = correlated_mean(counts, np.diff(cuts))
             found[f"w_{first.name}_{second}"] = rate.scaled(1 / first.disks.sum())
     return found
 
@@ -370,5 +375,5 @@ def rates(run: Run, skip: float | None = None) -> dict[str, SeriesMean]:
     found["collisions_per_disk_and_time"] = collision_rate(run, skip)
     if not run.periodic.all():
         s = steps(run, skip)
-        found["side_hits_per_time"] = series_mean(s.hits, s.time)
+        found["side_hits_per_time"] = correlated_mean(s.hits, s.time)
     return found | (pair_rates(run, skip) if has_log(run) else {})

@@ -29,7 +29,7 @@ from ..reading.nature import allow
 from ..reading.reader import Run
 from . import thermodynamics as td
 from .correlations import Correlator
-from .statistics import Curve, SeriesMean, estimate, series_mean
+from .statistics import Curve, SeriesMean, estimate, correlated_mean
 
 PER_FREE_TIME = 4  # samples of the moments that are enough
 SUMS = ("helfand_stress", "virial_tensor", "helfand_heat", "heat_virial")
@@ -102,7 +102,7 @@ def diffusion(run: Run, frames: slice, lag: int) -> tuple[SeriesMean, SeriesMean
     area = np.cumsum(x, axis=0) - x / 2 - step / 12 * v  # the integral of x over time, in steps
     mean = (area[lag : lag + origins] - area[half : half + origins]) / (lag - half)
     memory = np.sum(v[:origins] * (mean - x[:origins]), axis=2).mean(axis=1) / 2
-    return series_mean(spread), series_mean(memory)
+    return correlated_mean(spread), correlated_mean(memory)
 
 
 # --- Helfand moments ---
@@ -162,7 +162,7 @@ def coefficient(moment: np.ndarray, step: float, lag: int) -> SeriesMean:
     """
     half = lag // 2
     near, far = squares(moment, half), squares(moment, lag)
-    return series_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
+    return correlated_mean((far - near[: len(far)]) / (2 * step * (lag - half)))
 
 
 # --- coefficients over those of Enskog ---

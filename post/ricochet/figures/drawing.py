@@ -141,7 +141,7 @@ def chosen_colour(run: Run, wish: str | None) -> str:
 
 def aspect_of(run: Run) -> float:
     """Height over width of what is drawn."""
-    width, height = run.room[1] - run.room[0]
+    width, height = run.bounds[1] - run.bounds[0]
     return height / width
 
 
@@ -156,8 +156,8 @@ def draw_box(axes: Axes, run: Run, time: float | None = None) -> None:
     Sides that move are drawn where they are at this time [their own places], what lies beyond them
     grey.  Walls that heat or slide say so.
     """
-    low, high = run.room
-    (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.sides_at(time)
+    low, high = run.bounds
+    (x0, y0), (x1, y1) = (run.lower, run.upper) if time is None else run.corners_at(time)
     lines = [(x0, y0), (x0, y1)], [(x1, y0), (x1, y1)], [(x0, y0), (x1, y0)], [(x0, y1), (x1, y1)]
     styles = ["--" if periodic else "-" for periodic in np.repeat(run.periodic, 2)]
     sides: dict[str, Any]
@@ -202,7 +202,7 @@ def draw_circles(axes: Axes, run: Run, grey: dict[str, Any]) -> None:
 
 def name_walls(axes: Axes, run: Run) -> None:
     """Along each side and wall its temperature, and how fast and where to it slides."""
-    (x0, y0), (x1, y1) = run.room
+    (x0, y0), (x1, y1) = run.bounds
     ends_of = [((x0, y0), (x0, y1), 1), ((x1, y0), (x1, y1), -1)]
     ends_of += [((x0, y0), (x1, y0), -1), ((x0, y1), (x1, y1), 1)]
     shown: list[Any] = [*zip(run.sides, ends_of, strict=True)]
@@ -260,7 +260,7 @@ def disk_collection(axes: Axes, run: Run, position: np.ndarray, **style: Any) ->
 
 def radius_marks(axes: Axes, run: Run, frame: int) -> LineCollection | None:
     """A radius of each disk that shows how it has turned; None where disks have no orientation."""
-    if "orientation" not in run.elements:
+    if "orientation" not in run.disk_data:
         return None
     which, places = with_images(run, run.position[frame])
     angle = run.orientation[frame][which]

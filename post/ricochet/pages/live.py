@@ -163,7 +163,7 @@ class Live:
                 run = read_run(self.part if self.part.exists() else self.final)
                 stamp = f"{run.n_frames} {end}"
                 if stamp != self.stamp:
-                    news = {"stamp": stamp, "end": end, "warning": run.shortcoming}
+                    news = {"stamp": stamp, "end": end, "warning": run.termination_note}
                     self.news = json.dumps(news | self.filmed(run), allow_nan=False).encode()
                     self.stamp = stamp
             ends = bool(end) and self.stamp.endswith(end)

@@ -33,7 +33,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.statistics import SeriesMean, equilibration, series_mean
+from ..analysis.statistics import SeriesMean, equilibration, correlated_mean
 from ..predictions import hard_disks
 from ..reading.nature import Nature
 from ..reading.reader import Run, Series, obstacles_of, walls_of
@@ -107,7 +107,7 @@ class Bench:
         facts |= {
             "top": float(1.5 * np.sqrt(2 * np.mean(speed**2)) or 1.0),
             "rest": float(np.mean(speed == 0)),
-            "turning": TURNS in run.elements,
+            "turning": TURNS in run.disk_data,
             "stepped": bool(run.time_step),
         }
         scene = {"is": "scene", "changed": changed, "run": self.wish.get("run")}
@@ -235,8 +235,8 @@ class Bench:
         """Send a frame."""
         run, simulation = self.run, self.simulation
         now = simulation.time
-        lower, upper = run.sides_at(now)
-        if np.any(lower < run.room[0]) or np.any(upper > run.room[1]):
+        lower, upper = run.corners_at(now)
+        if np.any(lower < run.bounds[0]) or np.any(upper > run.bounds[1]):
             self.renew(changed=True)
             return
         head = [
@@ -248,7 +248,7 @@ class Bench:
             upper[1],
         ]
         parts = [simulation.position, simulation.velocity]
-        if TURNS in run.elements:
+        if TURNS in run.disk_data:
             parts.append(simulation.orientation)
         body = b"".join(np.asarray(part, dtype=np.float32).tobytes() for part in parts)
         send(b"b", struct.pack("6d", *head) + body)
@@ -281,7 +281,7 @@ class Bench:
         }
         if not run.gravity.any():
             energies["potential"] = None
-        if TURNS not in run.elements:
+        if TURNS not in run.disk_data:
             energies["rotational"] = None
         own = value["all/temperature"], value["all/mean_speed"]
         sample = (*sampled(run.n_disks, value), *own)
@@ -309,14 +309,16 @@ class Pictured(Run):
         value = np.asarray(self.simulation.observable(name))
         return Series(np.array([self.simulation.time]), value[None])
 
-    pushed = property(Run.pushed.func)  # at each look: sides that disks push move on
+    piston_positions = property(
+        Run.piston_positions.func
+    )  # at each look: sides that disks push move on
 
     @cached_property
-    def room(self) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """With some way left for such sides."""
         way = np.zeros(4)
-        way[[*self.pushed]] = WAY * self.edges.max()
-        lower, upper = Run.room.func(self)
+        way[[*self.piston_positions]] = WAY * self.edges.max()
+        lower, upper = Run.bounds.func(self)
         return lower - way[::2], upper + way[1::2]
 
     @cached_property
@@ -340,7 +342,7 @@ def pictured_run(simulation: Simulation) -> Pictured:
         velocity=simulation.velocity[None],
         image=None,
         event_count=None,
-        elements=elements,
+        disk_data=elements,
         mass=simulation.mass,
         radius=simulation.radius,
         species=simulation.species,
@@ -375,7 +377,7 @@ def pressure_between(samples: np.ndarray, count: int) -> SeriesMean:
     """Mean pressure from the first to the last of these samples; sides may move meanwhile."""
     (kinetic, virial, area), apart = samples[1:4], np.diff(samples[0])
     gain = count * kinetic[1:] * apart + np.diff(virial) / 2
-    return series_mean(gain / area[1:], apart)
+    return correlated_mean(gain / area[1:], apart)
 
 
 def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
@@ -395,8 +397,8 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
         if len(time) - first > FEWEST // 2:
             late = samples[:, first:]
             for name, one in (
-                ("temperature", series_mean(kt[first:])),
-                ("mean_speed", series_mean(speed[first:])),
+                ("temperature", correlated_mean(kt[first:])),
+                ("mean_speed", correlated_mean(speed[first:])),
                 ("mean_pressure", pressure_between(late, run.n_disks)),
             ):
                 known = one.mean, one.error
@@ -405,7 +407,11 @@ def means(run: Run, samples: np.ndarray, value: dict, settles: bool) -> dict:
     if settles and len(run.by_species) == 1 and run.by_species[0].alike:
         now, mass = found["temperature"][0], run.mass[0]
         theory["mean_speed"] = float(np.sqrt(np.pi * now / (2 * mass)))
-        if run.periodic.all() and not run.nature & {"obstructed", "stepped"} and run.n_disks > FEW:
+        if (
+            run.periodic.all()
+            and not run.nature & {"obstacles", "time_stepped"}
+            and run.n_disks > FEW
+        ):
             area = float(np.prod(run.edges))
             eta = float(np.pi * np.sum(run.radius**2)) / area
             theory["mean_pressure"] = float(hard_disks.henderson(eta)) * run.n_disks * now / area
@@ -525,7 +531,7 @@ def measured(text: str, lines: list[str], name: str) -> tuple[float, float | Non
         one = pressure_between(late, count)
     else:
         gain = np.diff(late[-1]) if name in COUNTED else late[-1][1:] * apart
-        one = series_mean(gain, apart)
+        one = correlated_mean(gain, apart)
     return float(one.mean), float(one.error) if settles and np.isfinite(one.error) else None
 
 

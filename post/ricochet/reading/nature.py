@@ -1,9 +1,9 @@
 """What kind of run this is: the one place that says it, and in which words a law refuses a run.
 
-    run.nature                      # Nature({'lossy', 'walled', ...}), what sets it apart from
+    run.nature                      # Nature({'inelastic', 'walls', ...}), what sets it apart from
                                     # equal smooth elastic disks in an empty periodic box
     run.nature.closed               # whether no energy comes or goes but what collisions lose
-    allow(run, "Haff's law", "lossy", "mixture")   # refuses a run with any other trait
+    allow(run, "Haff's law", "inelastic", "mixture")   # refuses a run with any other trait
 
 A trait is found from the parameters of a run and from its balance of energy, by a pure function of
 both: a file, a file that is still being written and a simulation in memory have the same nature.
@@ -21,34 +21,46 @@ ROUNDING = 1e-6  # of the energy; more than that is lost in collisions or not at
 TRAITS = {
     "changed": "was changed while it ran",
     "collapsed": "passed a collapse, and is decided by rounding from then on",
-    "stepped": "is made by time steps",
+    "time_stepped": "is made by time steps",
     "sheared": "is sheared (box.shear_rate)",
-    "noisy": "is heated by noise (&drive)",
+    "noise_driven": "is heated by noise (&drive)",
     "active": "has disks that drive themselves (&drive)",
-    "moving": "has sides that move",
-    "pushed": "has sides that disks push",
-    "sliding": "has surfaces that slide",
-    "uneven": "is heated and cooled at different temperatures",
-    "bathed": "is kicked by a heat bath (&drive)",
-    "thermal": "has walls that heat and cool (temperature)",
-    "falling": "falls (box.gravity)",
-    "lossy": "is not elastic: it loses energy in collisions",
-    "soft": "has a restitution that depends on the speed (contact.restitution_law)",
+    "moving_sides": "has sides that move",
+    "piston": "has sides that disks push",
+    "sliding_surfaces": "has surfaces that slide",
+    "unequal_temperatures": "is heated and cooled at different temperatures",
+    "thermostatted": "is kicked by a heat bath (&drive)",
+    "thermal_walls": "has walls that heat and cool (temperature)",
+    "gravity": "falls (box.gravity)",
+    "inelastic": "is not elastic: it loses energy in collisions",
+    "soft_contacts": "has a restitution that depends on the speed (contact.restitution_law)",
     "rough": "has rough disks, whose collisions turn them",
-    "turning": "has disks that turn",
-    "round": "keeps its angular momentum in a round container",
-    "obstructed": "has obstacles or walls in the box",
-    "unlike": "has a restitution for each pair of species",
-    "walled": "has walls",
+    "rotating": "has disks that turn",
+    "round_container": "keeps its angular momentum in a round container",
+    "obstacles": "has obstacles or walls in the box",
+    "pair_restitution": "has a restitution for each pair of species",
+    "walls": "has walls",
     "mixture": "has disks of different mass or radius",
 }
 #: By which energy comes and goes, other than by being lost in collisions.
-SOURCES = {"changed", "sheared", "noisy", "active", "moving", "pushed", "sliding"}
-SOURCES |= {"bathed", "thermal"}
+SOURCES = {
+    "changed",
+    "sheared",
+    "noise_driven",
+    "active",
+    "moving_sides",
+    "piston",
+    "sliding_surfaces",
+}
+SOURCES |= {"thermostatted", "thermal_walls"}
 #: With which velocities change between collisions, too.
-KICKED = {"noisy", "active", "bathed"}
+KICKED = {"noise_driven", "active", "thermostatted"}
 #: With which velocities do not settle to Maxwell's law.
-UNSETTLED = {*SOURCES, "uneven", "lossy", "soft", "round"} - {"bathed", "thermal", "pushed"}
+UNSETTLED = {*SOURCES, "unequal_temperatures", "inelastic", "soft_contacts", "round_container"} - {
+    "thermostatted",
+    "thermal_walls",
+    "piston",
+}
 #: With which they do.
 SETTLED = TRAITS.keys() - UNSETTLED
 
@@ -73,17 +85,17 @@ class Nature(frozenset[str]):
     @property
     def cooling(self) -> bool:
         """Whether disks only lose energy: nothing lasts."""
-        return self.closed and "lossy" in self
+        return self.closed and "inelastic" in self
 
     @property
     def keeps_energy(self) -> bool:
         """Whether the total energy is that of the start at any time."""
-        return self.closed and "lossy" not in self
+        return self.closed and "inelastic" not in self
 
     @property
     def keeps_kinetic_energy(self) -> bool:
         """Whether the energy of translation is that of the start at any time, and so is kT."""
-        return self.keeps_energy and not self & {"falling", "rough", "turning"}
+        return self.keeps_energy and not self & {"gravity", "rough", "rotating"}
 
     @property
     def in_equilibrium(self) -> bool:
@@ -124,29 +136,37 @@ def nature_of(
     found = {
         "changed": bool(parameters.get("changes")),
         "collapsed": collapsed,
-        "stepped": parameters.get("run", {}).get("dynamics") == "steps",
+        "time_stepped": parameters.get("run", {}).get("dynamics") == "steps",
         "sheared": box.get("shear_rate", 0.0) != 0,
-        "noisy": kind == "noise",
+        "noise_driven": kind == "noise",
         "active": kind == "active",
-        "moving": bool(motions - {"still", "piston"}),
-        "pushed": "piston" in motions,
-        "sliding": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
-        "uneven": len(baths) > 1,
-        "bathed": kind in ("andersen", "brownian"),
-        "thermal": thermal,
-        "falling": bool(np.any(box.get("gravity", 0.0))),
-        "lossy": inelastic or lost > ROUNDING,
-        "soft": contact.get("restitution_law", "constant") != "constant"
+        "moving_sides": bool(motions - {"still", "piston"}),
+        "piston": "piston" in motions,
+        "sliding_surfaces": any(one.get("surface_velocity", 0.0) != 0 for one in surfaces),
+        "unequal_temperatures": len(baths) > 1,
+        "thermostatted": kind in ("andersen", "brownian"),
+        "thermal_walls": thermal,
+        "gravity": bool(np.any(box.get("gravity", 0.0))),
+        "inelastic": inelastic or lost > ROUNDING,
+        "soft_contacts": contact.get("restitution_law", "constant") != "constant"
         and (inelastic or lost > ROUNDING),
         "rough": beta > -1,
-        "turning": turning,
-        "obstructed": "obstacle" in parameters or "wall" in parameters,
-        "unlike": len(pairs) > 1,
-        "walled": any(kind == "wall" for kind in box.get("boundary", ())),
+        "rotating": turning,
+        "obstacles": "obstacle" in parameters or "wall" in parameters,
+        "pair_restitution": len(pairs) > 1,
+        "walls": any(kind == "wall" for kind in box.get("boundary", ())),
         "mixture": bool(np.ptp(mass) > 0 or np.ptp(radius) > 0),
     }
-    torques = ("thermal", "falling", "noisy", "active", "bathed", "lossy", "rough")
-    found["round"] = held_round(parameters) and not any(found[name] for name in torques)
+    torques = (
+        "thermal_walls",
+        "gravity",
+        "noise_driven",
+        "active",
+        "thermostatted",
+        "inelastic",
+        "rough",
+    )
+    found["round_container"] = held_round(parameters) and not any(found[name] for name in torques)
     return Nature(name for name, there in found.items() if there)
 
 

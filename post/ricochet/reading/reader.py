@@ -193,7 +193,7 @@ class Run:
     velocity: Frames  # (T, N, 2); to read it fails where `output.frame_columns` has left it out
     image: Frames | None  # (T, N, 2) periods a disk has travelled; None: no side is periodic
     event_count: Frames | None  # (T, N) of each disk since the start; None: not in the frames
-    elements: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
+    disk_data: dict[str, Frames]  # (T, N) what else the disks of this run have, by name
     mass: np.ndarray  # (N,)
     radius: np.ndarray  # (N,)
     species: np.ndarray  # (N,) 1-based
@@ -232,14 +232,14 @@ class Run:
         """What the input says of each side, in the order of `SIDES`; empty if nothing."""
         return [self.parameters.get("side", {}).get(name, {}) for name in SIDES]
 
-    def sides_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def corners_at(self, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(..., 2) lower left and upper right corner of the box at a time; its sides may move.
 
         One that disks push is between its places at the observables.
         """
         inwards = np.stack([displaced(side, np.asarray(time)) for side in self.sides], axis=-1)
         inwards = inwards + self.offsets
-        for k, place in self.pushed.items():
+        for k, place in self.piston_positions.items():
             end = (self.lower, self.upper)[k % 2][k // 2]
             at = np.interp(time, place.time, np.ravel(place.value))
             inwards[..., k] = (-1) ** k * (at - end)
@@ -253,17 +253,17 @@ class Run:
         return (np.array(starts, dtype=float) - ends) * [1, -1, 1, -1]
 
     @cached_property
-    def pushed(self) -> dict[int, Series]:
+    def piston_positions(self) -> dict[int, Series]:
         """Places of the sides that disks push, by their numbers in `sides`."""
         free = [k for k, side in enumerate(self.sides) if side.get("motion") == "piston"]
         return {k: self.observable(f"sides/{SIDES[k]}/position") for k in free}
 
     @cached_property
-    def room(self) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """(2,) corners of what sides that move never leave: the box, and how far they go beyond."""
         swings = np.array([outmost(side) for side in self.sides])
         swings = np.maximum(0.0, swings - self.offsets)
-        for k, place in self.pushed.items():
+        for k, place in self.piston_positions.items():
             beyond = (self.lower[k // 2] - place.value, place.value - self.upper[k // 2])[k % 2]
             swings[k] = max(0.0, np.max(beyond))
         return self.lower - swings[::2], self.upper + swings[1::2]
@@ -310,21 +310,21 @@ class Run:
         """(..., N) straight-line distance from the place in the frame `origin`."""
         return np.linalg.norm(self.unwrapped(frame) - self.unwrapped(origin), axis=-1)
 
-    def element(self, name: str) -> Frames:
+    def per_disk(self, name: str) -> Frames:
         """(T, N) what only some runs have of each disk, such as 'angular_velocity'."""
-        if name not in self.elements:
+        if name not in self.disk_data:
             raise RunError(f"{self.path}: has no {name} in its frames")
-        return self.elements[name]
+        return self.disk_data[name]
 
     @property
     def angular_velocity(self) -> Frames:
         """(T, N) of disks that can turn."""
-        return self.element("angular_velocity")
+        return self.per_disk("angular_velocity")
 
     @property
     def orientation(self) -> Frames:
         """(T, N) angle to the x axis in radians, not wrapped; of disks that have a direction."""
-        return self.element("orientation")
+        return self.per_disk("orientation")
 
     @property
     def inertia(self) -> np.ndarray:
@@ -379,7 +379,7 @@ class Run:
 
         dimensions = ("time", "disk", "component")
         frames: dict[str, Frames | None]
-        frames = {"position": self.position, "velocity": self.velocity, **self.elements}
+        frames = {"position": self.position, "velocity": self.velocity, **self.disk_data}
         frames |= {"image": self.image, "event_count": self.event_count}
         data: dict[str, tuple[Any, np.ndarray]] = {
             name: (dimensions[: values.ndim], values[:])
@@ -443,7 +443,7 @@ class Run:
         side that oscillates counts at its mean position, as in the program's own pressure.
         """
         drifts = np.array([side.get("motion") in DRIFTING for side in self.sides])
-        lower, upper = self.sides_at(time)
+        lower, upper = self.corners_at(time)
         lower = np.where(drifts[::2], lower, self.lower)
         upper = np.where(drifts[1::2], upper, self.upper)
         area = np.prod(upper - lower, axis=-1)
@@ -502,7 +502,7 @@ class Run:
         contact = self.parameters.get("contact", {})
         values = np.unique(contact.get("pair_restitution", contact.get("restitution", 1.0)))
         xi = float(values[0]) if len(values) == 1 else float("nan")
-        if "soft" not in self.nature:
+        if "soft_contacts" not in self.nature:
             return Restitution(xi)
         return Restitution(xi, contact["restitution_law"], float(contact["reference_speed"]))
 
@@ -527,7 +527,7 @@ class Run:
         )
 
     @property
-    def shortcoming(self) -> str:
+    def termination_note(self) -> str:
         """Why this is not a run that went on until a stop rule was met; empty if it is."""
         note = "".join(filter(str.isprintable, str(self.provenance.get("note", ""))))
         if self.path.suffix != ".part":
@@ -587,7 +587,7 @@ def run_of(path: Path, file: h5py.File) -> Run:
         velocity=frames.pop("velocity", Frames(path, "velocity", plane)),
         image=frames.pop("image", Frames(path, "image", plane) if any(periodic) else None),
         event_count=frames.pop("event_count", None),
-        elements=frames,
+        disk_data=frames,
         mass=rows(disks["mass"]),
         radius=rows(disks["radius"]),
         species=rows(disks["species"]),
